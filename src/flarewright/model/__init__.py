@@ -1,0 +1,42 @@
+"""Frozen data without algorithms: lens, glass, coating, iris, light, camera, project."""
+
+from .camera import Camera
+from .coating import Bare, Coating, Film, QuarterWave, Stack
+from .glass import Dispersion, Medium
+from .iris import Iris
+from .layer import Layer
+from .lens import Lens, Row, Stop, Surface
+from .light import D65, BlackBody, EqualEnergy, Light, Lines, Spectrum, Tabulated
+from .project import AsLens, CoatingChoice, Everywhere, Output, PerRow, Preset, Project, Quality
+
+__all__ = [
+    "D65",
+    "AsLens",
+    "Bare",
+    "BlackBody",
+    "Camera",
+    "Coating",
+    "CoatingChoice",
+    "Dispersion",
+    "EqualEnergy",
+    "Everywhere",
+    "Film",
+    "Iris",
+    "Layer",
+    "Lens",
+    "Light",
+    "Lines",
+    "Medium",
+    "Output",
+    "PerRow",
+    "Preset",
+    "Project",
+    "Quality",
+    "QuarterWave",
+    "Row",
+    "Spectrum",
+    "Stack",
+    "Stop",
+    "Surface",
+    "Tabulated",
+]

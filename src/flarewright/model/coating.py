@@ -1,0 +1,49 @@
+"""Anti-reflection coatings of a surface, as a person states them."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from .base import Frozen
+
+Index = Annotated[float, Field(ge=1.0, le=4.0)]
+ThicknessNm = Annotated[float, Field(ge=0.0, le=20000.0)]
+
+
+class Bare(Frozen):
+    """No coating: Fresnel reflection."""
+
+    kind: Literal["none"] = "none"
+
+
+class QuarterWave(Frozen):
+    """One film, a quarter of the centre wavelength thick at normal incidence.
+
+    `index = "real"` takes sqrt(n0 n2) but not less than magnesium fluoride's 1.38; "ideal" takes sqrt(n0 n2) as it is.
+    `thickness_offset_nm` thickens the film on purpose (greje656 notes): the anti-reflection gets worse.
+    """
+
+    kind: Literal["quarter-wave"] = "quarter-wave"
+    center_wavelength_nm: float = Field(ge=100.0, le=3000.0)
+    index: Literal["real", "ideal"] | Index = "real"
+    thickness_offset_nm: float = Field(0.0, ge=-1000.0, le=5000.0)
+
+
+class Film(Frozen):
+    """One film of stated index and thickness."""
+
+    kind: Literal["film"] = "film"
+    index: Index
+    thickness_nm: ThicknessNm
+
+
+class Stack(Frozen):
+    """Several films, listed from the side of the lower index (air) to the glass."""
+
+    kind: Literal["stack"] = "stack"
+    layers: tuple[Film, ...] = Field(min_length=1, max_length=200)
+
+
+Coating = Annotated[Bare | QuarterWave | Film | Stack, Field(discriminator="kind")]

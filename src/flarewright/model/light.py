@@ -1,0 +1,77 @@
+"""Lights and their spectra."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from .base import Frozen
+
+
+class EqualEnergy(Frozen):
+    """The same power at every wavelength."""
+
+    kind: Literal["equal-energy"] = "equal-energy"
+
+
+class D65(Frozen):
+    """CIE daylight D65: white of Rec.709."""
+
+    kind: Literal["d65"] = "d65"
+
+
+class BlackBody(Frozen):
+    """Planck's law at a temperature."""
+
+    kind: Literal["black-body"] = "black-body"
+    temperature_k: float = Field(ge=500.0, le=100000.0)
+
+
+class Lines(Frozen):
+    """Spectral lines: (wavelength in nm, relative power) each."""
+
+    kind: Literal["lines"] = "lines"
+    lines: tuple[tuple[Annotated[float, Field(ge=360.0, le=830.0)], Annotated[float, Field(ge=0.0)]], ...] = Field(
+        min_length=1
+    )
+
+
+class Tabulated(Frozen):
+    """Relative power at rising wavelengths in nm, linear between; zero outside (a CSV file of two columns)."""
+
+    kind: Literal["table"] = "table"
+    wavelength_nm: tuple[float, ...] = Field(min_length=2)
+    power: tuple[Annotated[float, Field(ge=0.0)], ...] = Field(min_length=2)
+
+    @model_validator(mode="after")
+    def _columns_match(self) -> Tabulated:
+        if len(self.wavelength_nm) != len(self.power):
+            raise ValueError("a spectrum table needs as many powers as wavelengths")
+        if any(b <= a for a, b in zip(self.wavelength_nm, self.wavelength_nm[1:], strict=False)):
+            raise ValueError("the wavelengths of a spectrum table must rise")
+        return self
+
+
+Spectrum = Annotated[EqualEnergy | D65 | BlackBody | Lines | Tabulated, Field(discriminator="kind")]
+
+
+class Light(Frozen):
+    """A distant light.
+
+    Attributes
+    ----------
+    field_deg : tuple of float
+        Field angles (X, Y) in degrees: the direct image lies near (+efl tan X right, +efl tan Y up) in the upright picture.
+    intensity : float
+        Irradiance (luminous, so a white light of 1 is RGB 1, 1, 1) on a plane that faces the light.
+    spectrum : Spectrum
+    """
+
+    name: str = "light"
+    field_deg: tuple[
+        Annotated[float, Field(gt=-90.0, lt=90.0)],
+        Annotated[float, Field(gt=-90.0, lt=90.0)],
+    ]
+    intensity: float = Field(1.0, ge=0.0)
+    spectrum: Spectrum = D65()

@@ -1,0 +1,126 @@
+"""A project: everything that a render needs, in one record."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from .base import Frozen
+from .camera import Camera, Colorspace
+from .coating import Coating
+from .iris import Iris
+from .lens import Lens
+from .light import Light
+
+
+class AsLens(Frozen):
+    """Each surface keeps the coating of the lens file."""
+
+    kind: Literal["lens"] = "lens"
+
+
+class Preset(Frozen):
+    """One of the lens file's named coating presets."""
+
+    kind: Literal["preset"] = "preset"
+    name: str
+
+
+class Everywhere(Frozen):
+    """One coating on every surface between glass and air; cemented surfaces stay bare."""
+
+    kind: Literal["everywhere"] = "everywhere"
+    coating: Coating
+
+
+class PerRow(Frozen):
+    """One coating a row, the stop's ignored."""
+
+    kind: Literal["per-row"] = "per-row"
+    coatings: tuple[Coating | None, ...]
+
+
+CoatingChoice = Annotated[AsLens | Preset | Everywhere | PerRow, Field(discriminator="kind")]
+
+
+class Quality(Frozen):
+    """How much work goes into a picture.
+
+    Attributes
+    ----------
+    mode : {"draft", "final"}
+        draft: paraxial matrices; final: traced ray bundles.
+    wavelengths : int
+        Traced wavelengths; 3 is a draft of the colours, 7 to 31 for final pictures.
+    bridge : bool
+        Fill the gap between neighbouring wavelengths so that lateral colour shows no steps (final only).
+    paths : {"all", "same-side"}
+        Which two-reflection paths: all, or those that reflect twice on one side of the stop.
+    tolerance_px : float
+        The bundle's grid is refined until interpolation errs by less than this, in pixels.
+    cull : float
+        Paths that carry less than this part of all ghost flux are left out, and said so.
+    """
+
+    mode: Literal["draft", "final"] = "final"
+    wavelengths: int = Field(7, ge=1, le=81)
+    bridge: bool = True
+    paths: Literal["all", "same-side"] = "all"
+    tolerance_px: float = Field(0.25, gt=0.0, le=10.0)
+    cull: float = Field(0.0, ge=0.0, lt=1.0)
+
+
+class Output(Frozen):
+    """What is written.
+
+    Attributes
+    ----------
+    layers : {"beauty", "passes", "ghosts"}
+        beauty: one picture; passes: beauty, starburst, ghosts; ghosts: also one layer a ghost.
+    brightest : int or None
+        Of the single ghosts only the N brightest get a layer of their own.
+    colorspace : {"rec709", "acescg"}
+    pixel_type : {"half", "float"}
+    starburst : bool
+        Whether the direct image of the light with its diffraction pattern is part of the picture.
+    """
+
+    layers: Literal["beauty", "passes", "ghosts"] = "passes"
+    brightest: int | None = Field(None, ge=1)
+    colorspace: Colorspace = "rec709"
+    pixel_type: Literal["half", "float"] = "float"
+    starburst: bool = True
+
+
+class Project(Frozen):
+    """Everything that a render needs; the command line's flags are its shorthand.
+
+    Attributes
+    ----------
+    lens : str or Lens
+        A shipped lens' name, a path, or the prescription itself.
+    f_number : float or None
+        None: wide open.
+    iris : Iris or None
+        None: the lens file's.
+    """
+
+    schema_version: Literal[1] = 1
+    lens: str | Lens
+    f_number: float | None = Field(None, gt=0.3, le=256.0)
+    iris: Iris | None = None
+    coating: CoatingChoice = AsLens()
+    lights: tuple[Light, ...] = Field(min_length=1)
+    camera: Camera = Camera()
+    quality: Quality = Quality()
+    output: Output = Output()
+
+    @model_validator(mode="after")
+    def _picture_is_sane(self) -> Project:
+        width, height = self.camera.size_px
+        if not (1 <= width <= 32768 and 1 <= height <= 32768):
+            raise ValueError(f"camera.size_px: {width}x{height} is not between 1 and 32768 pixels a side")
+        if min(self.camera.sensor) <= 0:
+            raise ValueError("camera.sensor_mm: a sensor has a width and a height above 0 mm")
+        return self
