@@ -1,0 +1,187 @@
+"""Coatings as a person writes them, on the command line and in lens files.
+
+| text | coating |
+|---|---|
+| `none` | bare glass |
+| `quarter-wave:550` | one film, a quarter of 550 nm, index sqrt(n0 n2) but not below 1.38 |
+| `quarter-wave:550:ideal` | the same with index sqrt(n0 n2) as it is |
+| `quarter-wave:550:1.38` | the same with index 1.38 |
+| `quarter-wave:550+10` | 10 nm too thick (`-10`: too thin); may follow an index too |
+| `film:1.38:96.4` | one film of index 1.38, 96.4 nm thick |
+| `stack:1.38:96.4,2.1:120` | several films, from the air to the glass |
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+from pydantic import TypeAdapter, ValidationError
+
+from flarewright.errors import ProjectError
+from flarewright.model import Bare, Coating, CoatingChoice, Everywhere, Film, PerRow, QuarterWave, Stack
+
+from .sentences import validation_sentences
+from .text_file import read_toml
+
+HELP = "write none, quarter-wave:550, quarter-wave:550:ideal, film:1.38:96.4 or stack:1.38:96.4,2.1:120"
+
+UNCOATED = "-"
+"""In a list of one coating a row: this row has none, the stop for example."""
+
+_NUMBER = r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
+_QUARTER_WAVE = re.compile(
+    rf"quarter-wave:(?P<center>{_NUMBER})"
+    rf"(?P<early>[+-]{_NUMBER})?"
+    rf"(?::(?P<index>ideal|real|{_NUMBER}))?"
+    rf"(?P<late>[+-]{_NUMBER})?"
+)
+_COATING: TypeAdapter[Any] = TypeAdapter(Coating)
+
+
+def parse_coating(text: str) -> Coating:
+    """Read a coating from its text form.
+
+    Parameters
+    ----------
+    text : str
+        See the table above; case and surrounding spaces do not matter.
+
+    Returns
+    -------
+    Bare, QuarterWave, Film or Stack
+
+    Raises
+    ------
+    ProjectError
+        The text is none of the forms, or a number is out of its range.
+    """
+    plain = re.sub(r"\s+", "", text).lower()
+    if plain in ("none", "bare"):
+        return Bare()
+    kind, _, rest = plain.partition(":")
+    try:
+        if kind == "quarter-wave" and (match := _QUARTER_WAVE.fullmatch(plain)):
+            return _quarter_wave(match, text)
+        if kind == "film":
+            return _film(rest)
+        if kind == "stack":
+            return Stack(layers=tuple(_film(part) for part in rest.split(",")))
+    except ValidationError as error:
+        raise ProjectError(f"coating {text!r}: {'; '.join(validation_sentences(error))}") from None
+    except ValueError:
+        pass
+    raise ProjectError(f"coating {text!r} is not understood: {HELP}")
+
+
+def coating_from(value: object) -> Coating | None:
+    """Read a coating as TOML gives it.
+
+    Parameters
+    ----------
+    value : object
+        A text (`UNCOATED` and the empty text give None) or a table with `kind` and the fields of the coating.
+
+    Returns
+    -------
+    Coating or None
+
+    Raises
+    ------
+    ProjectError
+        The value is neither, or holds something a coating cannot be.
+    """
+    if isinstance(value, str):
+        return None if value.strip() in ("", UNCOATED) else parse_coating(value)
+    if isinstance(value, dict):
+        try:
+            coating: Coating = _COATING.validate_python(value)
+        except ValidationError as error:
+            raise ProjectError(f"coating table: {'; '.join(validation_sentences(error))}") from None
+        return coating
+    raise ProjectError(f"coating {value!r} is neither a text nor a table: {HELP}")
+
+
+def format_coating(coating: Coating) -> str:
+    """Write a coating in its text form; `parse_coating` gives the same coating back.
+
+    Parameters
+    ----------
+    coating : Bare, QuarterWave, Film or Stack
+
+    Returns
+    -------
+    str
+    """
+    if isinstance(coating, Bare):
+        return "none"
+    if isinstance(coating, Film):
+        return f"film:{_number(coating.index)}:{_number(coating.thickness_nm)}"
+    if isinstance(coating, Stack):
+        return "stack:" + ",".join(f"{_number(film.index)}:{_number(film.thickness_nm)}" for film in coating.layers)
+    index = coating.index if isinstance(coating.index, str) else _number(coating.index)
+    suffix = "" if index == "real" else f":{index}"
+    if coating.thickness_offset_nm:
+        sign = "-" if coating.thickness_offset_nm < 0 else "+"
+        suffix += sign + _number(abs(coating.thickness_offset_nm))
+    return f"quarter-wave:{_number(coating.center_wavelength_nm)}{suffix}"
+
+
+def read_coating_file(path: str | Path) -> CoatingChoice:
+    """Read a coating file: TOML with either `coating = "..."` or `rows = [...]`, one entry a row.
+
+    Parameters
+    ----------
+    path : str or Path
+
+    Returns
+    -------
+    Everywhere or PerRow
+
+    Raises
+    ------
+    ProjectError
+        The file cannot be read, has neither or both of the keys, or an entry is no coating; all bad entries are named.
+    """
+    try:
+        table = read_toml(path, "a coating file")
+    except ValueError as error:
+        raise ProjectError(str(error)) from None
+    if set(table) == {"coating"}:
+        return Everywhere(coating=coating_from(table["coating"]) or Bare())
+    if set(table) == {"rows"} and isinstance(table["rows"], list):
+        coatings: list[Coating | None] = []
+        problems: list[str] = []
+        for k, entry in enumerate(table["rows"]):
+            try:
+                coatings.append(coating_from(entry))
+            except ProjectError as error:
+                problems.append(f"row {k}: {error}")
+        if problems:
+            raise ProjectError(f"{path}: " + "; ".join(problems))
+        return PerRow(coatings=tuple(coatings))
+    raise ProjectError(
+        f'{path} is no coating file: it holds either one line coating = "quarter-wave:550" '
+        f'or rows = ["quarter-wave:550", "{UNCOATED}", ...] with one entry for each row of the lens'
+    )
+
+
+def _quarter_wave(match: re.Match[str], text: str) -> QuarterWave:
+    early, late, index = match["early"], match["late"], match["index"] or "real"
+    if early and late:
+        raise ProjectError(f"coating {text!r} has two thickness offsets: keep one")
+    return QuarterWave(
+        center_wavelength_nm=float(match["center"]),
+        index=index if index in ("real", "ideal") else float(index),  # type: ignore[arg-type]
+        thickness_offset_nm=float(early or late or 0.0),
+    )
+
+
+def _film(text: str) -> Film:
+    index, thickness_nm = (float(part) for part in text.split(":"))
+    return Film(index=index, thickness_nm=thickness_nm)
+
+
+def _number(value: float) -> str:
+    return repr(float(value)).removesuffix(".0")

@@ -1,0 +1,229 @@
+"""The glass catalogue: formulas of six makers, found by name or by nearest (n_d, V_d).
+
+The data are baked by `tools/bake_glass.py` from the refractiveindex.info database (CC0 1.0); they are read on first use.
+"""
+
+from __future__ import annotations
+
+import difflib
+import gzip
+import json
+import re
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flarewright.errors import GlassError
+from flarewright.model import Dispersion
+
+N_D_TOLERANCE = 0.002
+"""A catalogue glass stands in for a stated (n_d, V_d) when its n_d is this near ..."""
+
+V_D_TOLERANCE = 0.02
+"""... and its V_d differs by no more than this part."""
+
+_MAKERS = ("SCHOTT", "OHARA", "HOYA", "HIKARI", "CDGM", "SUMITA")
+
+# Minerals that prescriptions call by their own names.
+_ALIASES = {
+    "CAF2": "LITHOTECCAF2",
+    "FLUORITE": "LITHOTECCAF2",
+    "SILICA": "LITHOSILQ",
+    "FUSEDSILICA": "LITHOSILQ",
+    "SIO2": "LITHOSILQ",
+}
+
+
+@dataclass(frozen=True)
+class CatalogueGlass:
+    """One glass of the catalogue.
+
+    Attributes
+    ----------
+    maker, name : str
+        As the maker writes them, "SCHOTT" and "N-BK7".
+    n_d : float
+        Index at 587.56 nm, from the formula.
+    v_d : float
+        Abbe number, from the formula.
+    dispersion : Dispersion
+    """
+
+    maker: str
+    name: str
+    n_d: float
+    v_d: float
+    dispersion: Dispersion
+
+    @property
+    def full_name(self) -> str:
+        """Maker and name, "SCHOTT N-BK7"."""
+        return f"{self.maker} {self.name}"
+
+
+@dataclass(frozen=True)
+class _Catalogue:
+    rows: list[list[Any]]
+    n_d: NDArray[np.float64]
+    v_d: NDArray[np.float64]
+    by_key: dict[str, tuple[int, ...]]
+
+
+def by_name(name: str, n_d: float | None = None) -> CatalogueGlass:
+    """Find a glass by its catalogue name.
+
+    Case, spaces, hyphens and underscores do not matter; a maker's name may stand in front. An old Schott name that the
+    catalogue lacks finds the glass that replaced it ("LAKN7" finds "N-LAK7"), so compare the answer's `name`.
+
+    Parameters
+    ----------
+    name : str
+        "N-BK7", "n bk7" or "SCHOTT N-BK7".
+    n_d : float, optional
+        Where several makers use the name, the glass whose index is nearest to this one; without it Schott comes first.
+
+    Returns
+    -------
+    CatalogueGlass
+
+    Raises
+    ------
+    GlassError
+        No glass has that name; the message suggests near ones.
+    """
+    catalogue = _catalogue()
+    key, maker = _split_maker(name)
+    for candidate in _spellings(key):
+        found = [k for k in catalogue.by_key.get(candidate, ()) if maker in (None, catalogue.rows[k][0])]
+        if found:
+            if n_d is not None:
+                found.sort(key=lambda k: abs(float(catalogue.n_d[k]) - n_d))
+            return _glass(found[0])
+    raise GlassError(_unknown(name, key, maker))
+
+
+def nearest(n_d: float, v_d: float | None = None) -> tuple[CatalogueGlass, float]:
+    """Find the catalogue glass nearest to an index and an Abbe number.
+
+    Parameters
+    ----------
+    n_d : float
+        Index at 587.56 nm.
+    v_d : float or None
+        Abbe number; None searches by index alone.
+
+    Returns
+    -------
+    glass : CatalogueGlass
+    distance : float
+        max(|dn| / 0.002, |dV| / (0.02 V)): up to 1 the glass is a fair stand-in, beyond it is not.
+    """
+    catalogue = _catalogue()
+    by_index = np.abs(catalogue.n_d - n_d) / N_D_TOLERANCE
+    by_abbe = np.zeros_like(by_index) if v_d is None else np.abs(catalogue.v_d / v_d - 1.0) / V_D_TOLERANCE
+    distance = np.maximum(by_index, by_abbe)
+    best = int(np.argmin(distance))
+    return _glass(best), float(distance[best])
+
+
+def cauchy_from_abbe(n_d: float, v_d: float) -> Dispersion:
+    """Make a two-term Cauchy formula that has the given n_d and V_d.
+
+    Parameters
+    ----------
+    n_d : float
+        Index at 587.56 nm.
+    v_d : float
+        Abbe number, above 0.
+
+    Returns
+    -------
+    Dispersion
+        n = A + B / L^2 with B = 0.52345 (n_d - 1) / V_d and A = n_d - B / 0.34523, L in micrometres.
+
+    Notes
+    -----
+    The constants are L_d^2 = 0.34523 and 1 / (L_F^-2 - L_C^-2) = 0.52345. The last resort: real glass bends more in the blue.
+    """
+    b = 0.52345 * (n_d - 1.0) / v_d
+    return Dispersion(glass="Cauchy", formula="cauchy", coefficients=(n_d - b / 0.34523, b), range_nm=(360.0, 1100.0))
+
+
+def size() -> int:
+    """Return how many glasses the catalogue holds."""
+    return len(_catalogue().rows)
+
+
+def all_names() -> tuple[str, ...]:
+    """Return "MAKER NAME" of every glass."""
+    return tuple(f"{row[0]} {row[1]}" for row in _catalogue().rows)
+
+
+def same_name(a: str, b: str) -> bool:
+    """Tell whether two spellings mean the same catalogue name, a maker in front or not."""
+    return _split_maker(a)[0] == _split_maker(b)[0]
+
+
+@cache
+def _catalogue() -> _Catalogue:
+    packed = (files("flarewright.io") / "data" / "glasses.json.gz").read_bytes()
+    rows: list[list[Any]] = json.loads(gzip.decompress(packed))["glasses"]
+    by_key: dict[str, tuple[int, ...]] = {}
+    for k, row in enumerate(rows):
+        key = _key(row[1])
+        by_key[key] = (*by_key.get(key, ()), k)
+
+    # Where makers share a name the order of _MAKERS decides.
+    for key, found in by_key.items():
+        by_key[key] = tuple(sorted(found, key=lambda k: _MAKERS.index(rows[k][0])))
+    n_d = np.array([row[2] for row in rows])
+    v_d = np.array([row[3] for row in rows])
+    return _Catalogue(rows, n_d, v_d, by_key)
+
+
+@cache
+def _glass(k: int) -> CatalogueGlass:
+    maker, name, n_d, v_d, formula, low_nm, high_nm, coefficients = _catalogue().rows[k]
+    dispersion = Dispersion(
+        glass=f"{maker} {name}", formula=formula, coefficients=tuple(coefficients), range_nm=(low_nm, high_nm)
+    )
+    return CatalogueGlass(maker, name, n_d, v_d, dispersion)
+
+
+def _key(name: str) -> str:
+    return re.sub(r"[\s\-_:]+", "", name).upper()
+
+
+def _split_maker(name: str) -> tuple[str, str | None]:
+    key = _key(name)
+    for maker in _MAKERS:
+        if key.startswith(maker) and len(key) > len(maker):
+            return key[len(maker) :], maker
+    return key, None
+
+
+def _spellings(key: str) -> list[str]:
+    """List the keys to try, the exact one first, then the names under which an old glass lives on."""
+    tried = [key]
+    if key in _ALIASES:
+        tried.append(_ALIASES[key])
+    tried.append("N" + key)
+    if old := re.fullmatch(r"([A-Z]+)N(\d+[A-Z]?)", key):
+        tried += [f"N{old[1]}{old[2]}", f"{old[1]}{old[2]}"]
+
+    # Hikari's J- and E- series and Ohara's S- series repeat the classical names.
+    tried += ["J" + key, "E" + key, "S" + key]
+    return tried
+
+
+def _unknown(name: str, key: str, maker: str | None) -> str:
+    catalogue = _catalogue()
+    spelled = {k: catalogue.rows[rows[0]] for k, rows in catalogue.by_key.items()}
+    near = difflib.get_close_matches(key, spelled, n=3, cutoff=0.6)
+    hint = "; near names: " + ", ".join(f"{spelled[k][0]} {spelled[k][1]}" for k in near) if near else ""
+    whose = f"{maker}'s catalogue" if maker else "the catalogue"
+    return f"glass {name!r} is not in {whose}: give n_d and v_d instead{hint}"

@@ -1,0 +1,340 @@
+"""Flarewright's own lens file: TOML that a person can write, one row of the prescription a line.
+
+    schema_version = 1
+    name = "Heliar-Tronnier"
+    source = "US 2,645,156"
+    f_number = 3.5
+    rows = [
+      { radius = 30.81, thickness = 7.7, glass = "LAKN7", n_d = 1.652, v_d = 58.5, semi_diameter = 15.0, coating = "quarter-wave:550" },
+      { radius = "flat", thickness = 2.0 },
+      { stop = true, thickness = 3.0 },
+    ]
+
+A row without `glass` and `n_d` has air behind it. `lens_json_schema` documents every key.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from flarewright.errors import GlassError, LensError, ProjectError
+from flarewright.model import Coating, Iris, Lens, Row, Stop, Surface
+from flarewright.model.raw_lens import LensReading, RawLens
+
+from . import dotlens, media
+from .coating_text import coating_from
+from .lens_fields import (
+    CURVATURE,
+    RADIUS,
+    ROW_NUMBERS,
+    STOP_KEYS,
+    SURFACE_KEYS,
+    TOP_KEYS,
+    TOP_NUMBERS,
+    TOP_TEXTS,
+    NumberField,
+)
+from .sentences import count, did_you_mean, shorten, validation_sentences
+from .text_file import read_toml
+
+MOST_ROWS = 500
+"""Lenses of photography end at some sixty rows; beyond this the file is no lens."""
+
+
+def read_lens(path: str | Path) -> LensReading | RawLens:
+    """Read a lens file of any known kind.
+
+    Parameters
+    ----------
+    path : str or Path
+        `.toml` is our own format; `.lens` the text table that several flare tools share.
+
+    Returns
+    -------
+    LensReading or RawLens
+        A `.lens` file still has to be judged and repaired by `optics.repair`.
+
+    Raises
+    ------
+    LensError
+        The file cannot be read or is no lens; `problems` holds every finding.
+    """
+    suffix = Path(path).suffix.lower()
+    if suffix == ".lens":
+        return dotlens.read_dotlens(path)
+    if suffix == ".toml" or Path(path).is_dir() or not Path(path).exists():
+        return read_lens_toml(path)
+    raise LensError(f"{path} is not of a kind that can be read: Flarewright reads .toml (its own) and .lens files")
+
+
+def read_lens_toml(path: str | Path) -> LensReading:
+    """Read a lens file of our own format.
+
+    Parameters
+    ----------
+    path : str or Path
+
+    Returns
+    -------
+    LensReading
+        The lens, each medium with its dispersion, and remarks on glasses that had to be substituted.
+
+    Raises
+    ------
+    LensError
+        The file cannot be read or is no lens; the message sums up, `problems` holds every finding with its row.
+    """
+    try:
+        table = read_toml(path, "a lens file")
+    except ValueError as error:
+        raise LensError(str(error), (str(error),)) from None
+    return lens_from_table(table, str(path))
+
+
+def lens_from_table(table: dict[str, Any], where: str) -> LensReading:
+    """Make a lens of a parsed TOML table; `where` (the file) begins the message of an error.
+
+    Parameters
+    ----------
+    table : dict
+    where : str
+
+    Returns
+    -------
+    LensReading
+
+    Raises
+    ------
+    LensError
+        The table is no lens; the message sums up, `problems` holds every finding with its row.
+    """
+    problems: list[str] = []
+    fields = _top_level(table, problems)
+    findings: list[tuple[int, media.Finding]] = []
+    rows = _rows(table.get("rows"), problems, findings)
+    presets = _presets(table.get("coating_presets", {}), len(rows), problems)
+    lens: Lens | None = None
+    if not problems:
+        try:
+            lens = Lens(**fields, rows=tuple(row for row in rows if row is not None), coating_presets=presets)
+        except ValidationError as error:
+            problems += validation_sentences(error)
+    if lens is None:
+        raise LensError(summary(where, problems), tuple(problems))
+    return LensReading(lens, media.remarks(findings))
+
+
+def summary(where: str, problems: list[str]) -> str:
+    """Say in one sentence what is wrong with a file.
+
+    Parameters
+    ----------
+    where : str
+        The file.
+    problems : list of str
+        At least one.
+
+    Returns
+    -------
+    str
+    """
+    if len(problems) == 1:
+        return f"{where}: {problems[0]}"
+    return f"{where} has {count(len(problems), 'problem')} (rows are counted from 0), the first: {problems[0]}"
+
+
+def _top_level(table: dict[str, Any], problems: list[str]) -> dict[str, Any]:
+    """Check everything above the rows and return the fields for Lens."""
+    version = table.get("schema_version")
+    if version is None:
+        problems.append("schema_version is missing: begin the file with schema_version = 1")
+    elif isinstance(version, bool) or version != 1:
+        problems.append(f"schema_version is {shorten(version)}: this version of Flarewright reads 1")
+    _unknown_keys(table, TOP_KEYS, "", problems)
+    fields: dict[str, Any] = {}
+    for key in TOP_TEXTS:
+        value = table.get(key, "")
+        if not isinstance(value, str):
+            problems.append(f"{key} is {shorten(value)}, a text in quotes was expected")
+        elif key == "name" and not value.strip():
+            problems.append('name is missing: add name = "..."')
+        else:
+            fields[key] = value
+    if "f_number" not in table:
+        problems.append("f_number is missing: it sets the size of the stop, add f_number = 2.8 for example")
+    for key, field in TOP_NUMBERS.items():
+        if key in table and (value := _number(table[key], key, field, problems)) is not None:
+            fields[key] = value
+    iris = table.get("iris", {})
+    if not isinstance(iris, dict):
+        problems.append(f"iris is {shorten(iris)}, a table was expected: [iris] with blades = 5 for example")
+    else:
+        _unknown_keys(iris, tuple(Iris.model_fields), "iris: ", problems)
+        try:
+            fields["iris"] = Iris.model_validate({k: v for k, v in iris.items() if k in Iris.model_fields}, strict=True)
+        except ValidationError as error:
+            problems += [f"iris: {sentence}" for sentence in validation_sentences(error)]
+    return fields
+
+
+def _rows(table: object, problems: list[str], findings: list[tuple[int, media.Finding]]) -> list[Row | None]:
+    """Check each row on its own, then what the rows make together; a bad row is None."""
+    if table is None:
+        problems.append("rows is missing: a lens is rows = [ { radius = ..., thickness = ... }, ... ]")
+        return []
+    if not isinstance(table, list):
+        problems.append(f"rows is {shorten(table)}, a list of tables was expected")
+        return []
+    if len(table) > MOST_ROWS:
+        problems.append(f"rows has {len(table)} entries, a lens has at most {MOST_ROWS}")
+        return []
+    rows: list[Row | None] = []
+    for k, entry in enumerate(table):
+        if not isinstance(entry, dict):
+            problems.append(f"row {k}: is {shorten(entry)}, a table {{ radius = ..., thickness = ... }} was expected")
+            rows.append(None)
+        elif _is_stop(entry, k, problems):
+            rows.append(_stop(entry, k, problems))
+        else:
+            rows.append(_surface(entry, k, problems, findings))
+    stops = [k for k, entry in enumerate(table) if isinstance(entry, dict) and entry.get("stop") is True]
+    if not stops:
+        problems.append("no row is the stop: add { stop = true, thickness = ... } where the iris sits")
+    elif len(stops) > 1:
+        problems.append(f"rows {', '.join(map(str, stops))} are all stops: a lens has one, remove the others")
+    _whole(rows, problems)
+    return rows
+
+
+def _whole(rows: list[Row | None], problems: list[str]) -> None:
+    """Check what no single row can know."""
+    if any(row is None for row in rows):
+        return
+    glassy = [isinstance(row, Surface) and row.medium is not None for row in rows]
+    if not any(glassy):
+        problems.append("no row has glass behind it, so nothing bends the light: give a row glass or n_d")
+    elif glassy[-1]:
+        problems.append(
+            f"row {len(rows) - 1}: behind the last row must be air: remove its glass, or add the rear surface"
+        )
+
+
+def _is_stop(entry: dict[str, Any], k: int, problems: list[str]) -> bool:
+    stop = entry.get("stop", False)
+    if not isinstance(stop, bool):
+        problems.append(f"row {k}: stop is {shorten(stop)}, true or false was expected")
+    return bool(stop)
+
+
+def _stop(entry: dict[str, Any], k: int, problems: list[str]) -> Stop | None:
+    before = len(problems)
+    for key in entry:
+        if key in SURFACE_KEYS and key not in STOP_KEYS:
+            why = "its opening follows from f_number" if key.startswith("semi_diameter") else "it bends no light"
+            problems.append(f"row {k}: the stop has no {key}, {why}: remove it")
+    _unknown_keys(entry, (*STOP_KEYS, *SURFACE_KEYS), f"row {k}: ", problems)
+    thickness = _number(entry.get("thickness", 0.0), f"row {k}: thickness", ROW_NUMBERS["thickness"], problems)
+    return Stop(thickness=thickness) if len(problems) == before and thickness is not None else None
+
+
+def _surface(
+    entry: dict[str, Any], k: int, problems: list[str], findings: list[tuple[int, media.Finding]]
+) -> Surface | None:
+    before = len(problems)
+    _unknown_keys(entry, ("stop", *SURFACE_KEYS), f"row {k}: ", problems)
+    values: dict[str, Any] = {"curvature": _curvature(entry, k, problems)}
+    numbers = {
+        key: _number(entry[key], f"row {k}: {key}", field, problems)
+        for key, field in ROW_NUMBERS.items()
+        if key in entry
+    }
+    estimated = entry.get("semi_diameter_estimated", False)
+    if not isinstance(estimated, bool):
+        problems.append(f"row {k}: semi_diameter_estimated is {shorten(estimated)}, true or false was expected")
+    values |= {key: numbers[key] for key in ("conic", "thickness", "semi_diameter") if key in numbers}
+    values["semi_diameter_estimated"] = estimated
+    if "coating" in entry:
+        values["coating"] = _coating(entry["coating"], f"row {k}", problems)
+
+    # The medium behind the row.
+    glass = entry.get("glass")
+    if glass is not None and (not isinstance(glass, str) or not glass.strip()):
+        problems.append(f'row {k}: glass is {shorten(glass)}, a catalogue name like "N-BK7" was expected')
+    elif (glass is not None or "n_d" in entry or "v_d" in entry) and None not in numbers.values():
+        try:
+            values["medium"], finding = media.attach(glass, numbers.get("n_d"), numbers.get("v_d"))
+            findings.append((k, finding))
+        except GlassError as error:
+            problems.append(f"row {k}: {error}")
+    if (numbers.get("thickness") or 0.0) < 0.0 and ("n_d" in entry or glass is not None):
+        problems.append(f"row {k}: thickness is {entry['thickness']!r}: glass cannot be thinner than 0 mm")
+    return Surface(**values) if len(problems) == before else None
+
+
+def _curvature(entry: dict[str, Any], k: int, problems: list[str]) -> float:
+    if "radius" in entry and "curvature" in entry:
+        problems.append(f"row {k}: radius and curvature are both given: keep one")
+    elif "curvature" in entry:
+        return _number(entry["curvature"], f"row {k}: curvature", CURVATURE, problems) or 0.0
+    elif "radius" not in entry:
+        problems.append(f'row {k}: radius is missing: give it in mm, or radius = "flat"')
+    else:
+        return _curvature_of(entry["radius"], k, problems)
+    return 0.0
+
+
+def _curvature_of(radius: object, k: int, problems: list[str]) -> float:
+    if radius == "flat":
+        return 0.0
+    if isinstance(radius, str):
+        problems.append(f'row {k}: radius is {shorten(radius)}, a number in mm or "flat" was expected')
+    elif radius in (0, float("inf"), float("-inf")) and not isinstance(radius, bool):
+        problems.append(f'row {k}: radius is {radius!r}: for a plane surface write radius = "flat"')
+    elif (value := _number(radius, f"row {k}: radius", RADIUS, problems)) is not None:
+        if abs(1.0 / value) <= CURVATURE.high:
+            return 1.0 / value
+        problems.append(f"row {k}: radius is {shorten(radius)}: less than a micrometre is no lens surface")
+    return 0.0
+
+
+def _coating(value: object, where: str, problems: list[str]) -> Coating | None:
+    try:
+        return coating_from(value)
+    except ProjectError as error:
+        problems.append(f"{where}: {error}")
+        return None
+
+
+def _presets(table: object, row_count: int, problems: list[str]) -> dict[str, tuple[Coating | None, ...]]:
+    if not isinstance(table, dict):
+        problems.append(f'coating_presets is {shorten(table)}, a table was expected: NAME = ["none", ...]')
+        return {}
+    presets: dict[str, tuple[Coating | None, ...]] = {}
+    for name, entries in table.items():
+        where = f"coating preset {name!r}"
+        if not isinstance(entries, list):
+            problems.append(f"{where} is {shorten(entries)}, a list with one coating for each row was expected")
+            continue
+        if row_count and len(entries) != row_count:
+            problems.append(
+                f"{where} has {count(len(entries), 'entry', 'entries')}, the lens has {count(row_count, 'row')}: give one each"
+            )
+        presets[name] = tuple(_coating(entry, f"{where}, row {k}", problems) for k, entry in enumerate(entries))
+    return presets
+
+
+def _number(value: object, where: str, field: NumberField, problems: list[str]) -> float | None:
+    refusal = field.refuse(value)
+    if refusal is None:
+        return float(value)  # type: ignore[arg-type]
+    problems.append(f"{where} {refusal}")
+    return None
+
+
+def _unknown_keys(table: dict[str, Any], known: tuple[str, ...], where: str, problems: list[str]) -> None:
+    problems += [
+        f"{where}{shorten(key)} is not a known key{did_you_mean(key, known)}" for key in table if key not in known
+    ]

@@ -1,0 +1,56 @@
+"""The lenses that ship with Flarewright, and how a name or a path finds a lens file."""
+
+from __future__ import annotations
+
+import difflib
+from functools import cache
+from importlib.resources import files
+from pathlib import Path
+
+from flarewright.errors import LensError
+
+
+@cache
+def shipped() -> tuple[str, ...]:
+    """Return the names of the lenses that ship, in alphabetical order."""
+    folder = files("flarewright") / "lenses"
+    if not folder.is_dir():
+        return ()
+    return tuple(sorted(entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml")))
+
+
+def lens_path(name_or_path: str | Path) -> Path:
+    """Find a lens file by the name of a shipped lens or by its path.
+
+    Parameters
+    ----------
+    name_or_path : str or Path
+        "heliar-tronnier" (case, spaces and underscores do not matter) or "my/lens.toml".
+
+    Returns
+    -------
+    Path
+
+    Raises
+    ------
+    LensError
+        Neither a shipped lens nor a file; near names are suggested.
+    """
+    text = str(name_or_path)
+    by_key = {_key(name): name for name in shipped()}
+    if (name := by_key.get(_key(text))) and not (isinstance(name_or_path, Path) and name_or_path.exists()):
+        return Path(str(files("flarewright") / "lenses" / f"{name}.toml"))
+    path = Path(text).expanduser()
+    if path.exists():
+        return path
+    if path.suffix in (".toml", ".lens") or path.parent != Path():
+        raise LensError(
+            f"{text} does not exist: check the path, or choose a shipped lens (flarewright lenses lists them)"
+        )
+    near = difflib.get_close_matches(_key(text), by_key, n=3, cutoff=0.5)
+    hint = f": did you mean {' or '.join(by_key[key] for key in near)}?" if near else ""
+    raise LensError(f"{text!r} is neither a shipped lens nor a file{hint or ': flarewright lenses lists the names'}")
+
+
+def _key(name: str) -> str:
+    return "-".join(name.lower().replace("_", " ").replace("-", " ").split())

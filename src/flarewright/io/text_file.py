@@ -1,0 +1,87 @@
+"""Read a person's text file with every way to fail told in a sentence."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Any
+
+LARGEST = 4_000_000
+"""Bytes; a text file beyond it is something else under a wrong name."""
+
+
+def read_text(path: str | Path, what: str) -> str:
+    """Read a small UTF-8 text file.
+
+    Parameters
+    ----------
+    path : str or Path
+    what : str
+        What the file should be, "a lens file", for the message.
+
+    Returns
+    -------
+    str
+        Line ends are "\\n"; a byte order mark is dropped.
+
+    Raises
+    ------
+    ValueError
+        The file is missing, a folder, not readable, too large, empty or not UTF-8; the message is one sentence.
+    """
+    file = Path(path)
+    try:
+        if file.is_dir():
+            raise ValueError(f"{file} is a folder, not {what}: give the path of a file")
+        if not file.exists():
+            raise ValueError(f"{file} does not exist: check the path and the spelling")
+        if not file.is_file():
+            raise ValueError(f"{file} is not a regular file: give the path of {what}")
+        size = file.stat().st_size
+        if size > LARGEST:
+            raise ValueError(f"{file} has {size / 1e6:.1f} MB, too large for {what}: is it the right file?")
+        data = file.read_bytes()
+    except OSError as error:
+        raise ValueError(
+            f"{file} cannot be read ({(error.strerror or str(error)).lower()}): check its permissions"
+        ) from None
+    if not data.strip():
+        raise ValueError(f"{file} is empty: {what} was expected")
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = data.count(b"\n", 0, error.start) + 1
+        raise ValueError(f"{file} is not UTF-8 text (line {line}): save it as UTF-8") from None
+    return text.replace("\r\n", "\n")
+
+
+def read_toml(path: str | Path, what: str) -> dict[str, Any]:
+    """Read a TOML file.
+
+    Parameters
+    ----------
+    path : str or Path
+    what : str
+        What the file should be, "a lens file", for the message.
+
+    Returns
+    -------
+    dict
+
+    Raises
+    ------
+    ValueError
+        The file cannot be read (as in `read_text`) or is not TOML; the message is one sentence with the line.
+    """
+    text = read_text(path, what)
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise ValueError(f"{path} is not valid TOML: {lower_first(str(error))}") from None
+    except RecursionError:
+        raise ValueError(f"{path} is not {what}: its tables are nested too deeply") from None
+
+
+def lower_first(text: str) -> str:
+    """Return the text with a small first letter, to stand inside a sentence."""
+    return text[:1].lower() + text[1:]

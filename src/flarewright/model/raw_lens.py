@@ -1,0 +1,89 @@
+"""A prescription as a foreign file states it, before anyone judged or repaired it."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from .base import Frozen
+from .glass import Medium
+from .lens import Lens
+
+
+class LensReading(NamedTuple):
+    """A usable lens and everything that was noticed, assumed or repaired on the way to it.
+
+    Attributes
+    ----------
+    lens : Lens
+    remarks : tuple of str
+        One sentence each; rows are counted from 0.
+    """
+
+    lens: Lens
+    remarks: tuple[str, ...]
+
+
+class RawRow(Frozen):
+    """One row of the file's table.
+
+    Attributes
+    ----------
+    line : int
+        Line of the file, counted from 1.
+    stop : bool
+    curvature : float
+        1 / radius in 1/mm; 0 is flat.
+    thickness : float
+        Distance to the next row, mm.
+    n_d, v_d : float
+        Of the medium behind the row; 1 and 0 for air.
+    medium : Medium or None
+        The same with its dispersion; None is air.
+    aperture : float
+        The aperture column, mm: a diameter or a semi-diameter, nobody knows yet.
+    coating_layers : int
+    """
+
+    line: int
+    stop: bool = False
+    curvature: float = 0.0
+    thickness: float = 0.0
+    n_d: float = 1.0
+    v_d: float = 0.0
+    medium: Medium | None = None
+    aperture: float = 0.0
+    coating_layers: int = 0
+
+
+class RawLens(Frozen):
+    """What a `.lens` file says, row for row; `optics.repair` makes a Lens of it or tells why it is none.
+
+    Attributes
+    ----------
+    file : str
+        File name, for messages.
+    name : str
+        The `name:` line.
+    title, patent : str
+        From the header comment.
+    f_number : float or None
+        From the header comment; None when it states none.
+    focal_length : float or None
+        The `focal_length:` line in mm; None for infinity or when missing.
+    stated_surfaces, stated_elements : int or None
+        Counts of the header comment.
+    rows : tuple of RawRow
+    remarks : tuple of str
+        What the reader noticed (glasses, odd lines).
+    """
+
+    file: str
+    name: str
+    title: str = ""
+    patent: str = ""
+    f_number: float | None = None
+    focal_length: float | None = None
+    stated_surfaces: int | None = None
+    stated_elements: int | None = None
+    rows: tuple[RawRow, ...]
+    remarks: tuple[str, ...] = ()

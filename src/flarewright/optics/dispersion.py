@@ -1,0 +1,117 @@
+"""Index of refraction against wavelength: the one place where dispersion formulas are evaluated."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flarewright.errors import GlassError
+from flarewright.model import Dispersion, Medium
+
+LINE_D_NM = 587.5618
+LINE_F_NM = 486.1327
+LINE_C_NM = 656.2725
+
+# Smooth formulas may be stretched a little beyond the maker's range; visible light always may.
+_STRETCH = 0.15
+_VISIBLE_NM = (360.0, 830.0)
+
+
+def refractive_index(medium: Medium | None, wavelength_nm: NDArray[np.float64] | float) -> NDArray[np.float64]:
+    """Return the index of a medium.
+
+    Parameters
+    ----------
+    medium : Medium or None
+        None is air, index 1.
+    wavelength_nm : array_like, any shape
+        Vacuum wavelengths in nm.
+
+    Returns
+    -------
+    ndarray, shape of `wavelength_nm`
+        n(lambda) = n_d + f(lambda) - f(587.56 nm), so that the prescription's own n_d holds.
+
+    Raises
+    ------
+    GlassError
+        The medium carries no dispersion, or a wavelength is far outside the range of its formula.
+    """
+    wavelength = np.asarray(wavelength_nm, dtype=np.float64)
+    if medium is None:
+        return np.ones_like(wavelength)
+    if medium.dispersion is None:
+        label = medium.glass or f"n_d = {medium.n_d:g}"
+        raise GlassError(f"the glass {label} has no dispersion: load the lens with load_lens, which attaches one")
+    change = evaluate(medium.dispersion, wavelength) - evaluate(medium.dispersion, np.float64(LINE_D_NM))
+    return np.asarray(medium.n_d + change, dtype=np.float64)
+
+
+def evaluate(dispersion: Dispersion, wavelength_nm: NDArray[np.float64] | np.float64) -> NDArray[np.float64]:
+    """Evaluate a dispersion formula.
+
+    Parameters
+    ----------
+    dispersion : Dispersion
+    wavelength_nm : ndarray, any shape
+        Vacuum wavelengths in nm.
+
+    Returns
+    -------
+    ndarray, shape of `wavelength_nm`
+
+    Raises
+    ------
+    GlassError
+        A wavelength is far outside the range of the formula, or the formula gives no index above 1 there.
+
+    Notes
+    -----
+    The forms are those of `model.Dispersion`; with no medium's n_d in between, for comparison with a catalogue.
+    """
+    wavelength = np.asarray(wavelength_nm, dtype=np.float64)
+    _check_range(dispersion, wavelength)
+    c = dispersion.coefficients
+    L = wavelength * 1e-3
+    L2 = L * L
+    with np.errstate(all="ignore"):
+        if dispersion.formula == "cauchy":
+            n = c[0] + c[1] / L2
+        elif dispersion.formula == "sellmeier":
+            n = np.sqrt(1.0 + c[0] + sum(B * L2 / (L2 - C) for B, C in zip(c[1::2], c[2::2], strict=True)))
+        else:
+            n = np.sqrt(c[0] + sum(a * L**p for a, p in zip(c[1::2], c[2::2], strict=True)))
+    if not np.all(n > 1.0):
+        raise GlassError(f"the formula of {dispersion.glass} gives no index above 1 at {_span(wavelength)} nm")
+    return np.asarray(n, dtype=np.float64)
+
+
+def abbe_number(dispersion: Dispersion) -> float:
+    """Return V_d = (n_d - 1) / (n_F - n_C) of a formula.
+
+    Parameters
+    ----------
+    dispersion : Dispersion
+
+    Returns
+    -------
+    float
+    """
+    n_d, n_F, n_C = evaluate(dispersion, np.array([LINE_D_NM, LINE_F_NM, LINE_C_NM]))
+    return float((n_d - 1.0) / (n_F - n_C))
+
+
+def _check_range(dispersion: Dispersion, wavelength: NDArray[np.float64]) -> None:
+    low, high = dispersion.range_nm
+    low = min(low * (1.0 - _STRETCH), _VISIBLE_NM[0])
+    high = max(high * (1.0 + _STRETCH), _VISIBLE_NM[1])
+    if wavelength.size and not bool(np.all((wavelength >= low) & (wavelength <= high))):
+        raise GlassError(
+            f"{dispersion.glass} is known from {dispersion.range_nm[0]:g} to {dispersion.range_nm[1]:g} nm, "
+            f"not at {_span(wavelength)} nm: keep the wavelengths between {low:.0f} and {high:.0f} nm"
+        )
+
+
+def _span(wavelength: NDArray[np.float64]) -> str:
+    low, high = float(np.min(wavelength)), float(np.max(wavelength))
+    return f"{low:g}" if low == high else f"{low:g} to {high:g}"
