@@ -1,0 +1,75 @@
+"""From CIE XYZ to linear RGB: Rec.709 and ACEScg, white is (1, 1, 1) for D65 in both."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flarewright.model.camera import Colorspace
+
+Floats = NDArray[np.float64]
+
+D65_WHITE = (0.3127, 0.3290)
+"""Chromaticity of the white of Rec.709 (ITU-R BT.709-6, item 1.4)."""
+
+ACES_WHITE = (0.32168, 0.33767)
+"""Chromaticity of the ACES white point (SMPTE ST 2065-1, TB-2018-001), near D60."""
+
+_PRIMARIES = {
+    "rec709": ((0.640, 0.330), (0.300, 0.600), (0.150, 0.060)),
+    "acescg": ((0.713, 0.293), (0.165, 0.830), (0.128, 0.044)),
+}
+_BRADFORD = np.array([[0.8951, 0.2664, -0.1614], [-0.7502, 1.7135, 0.0367], [0.0389, -0.0685, 1.0296]])
+
+__all__ = ["ACES_WHITE", "D65_WHITE", "xyz_to_rgb_matrix"]
+
+
+@lru_cache
+def xyz_to_rgb_matrix(colorspace: Colorspace) -> Floats:
+    """Matrix from XYZ (D65 white, Y = 1) to linear RGB of a colour space.
+
+    Parameters
+    ----------
+    colorspace : {"rec709", "acescg"}
+
+    Returns
+    -------
+    ndarray, shape (3, 3), read-only
+        rgb = matrix @ xyz.
+
+    Raises
+    ------
+    ValueError
+        When the colour space is not one of the two.
+
+    Notes
+    -----
+    Derived from primaries and white as in SMPTE RP 177. For ACEScg (AP1) the D65 white is adapted to the ACES white
+    with Bradford's matrix, as the ACES transforms and OpenColorIO's built-in ones do.
+    """
+    if colorspace not in _PRIMARIES:
+        raise ValueError(f"colour space {colorspace!r} is unknown; use one of {', '.join(_PRIMARIES)}")
+    white = D65_WHITE if colorspace == "rec709" else ACES_WHITE
+    matrix = np.linalg.inv(_rgb_to_xyz(_PRIMARIES[colorspace], white)) @ _bradford(D65_WHITE, white)
+    matrix.flags.writeable = False
+    return matrix
+
+
+def _xyz(xy: tuple[float, float]) -> Floats:
+    """XYZ with Y = 1 of a chromaticity."""
+    x, y = xy
+    return np.array([x / y, 1.0, (1.0 - x - y) / y])
+
+
+def _rgb_to_xyz(primaries: tuple[tuple[float, float], ...], white: tuple[float, float]) -> Floats:
+    P = np.stack([_xyz(xy) for xy in primaries], axis=1)
+    scaled: Floats = P * np.linalg.solve(P, _xyz(white))
+    return scaled
+
+
+def _bradford(source: tuple[float, float], target: tuple[float, float]) -> Floats:
+    gain = (_BRADFORD @ _xyz(target)) / (_BRADFORD @ _xyz(source))
+    adapted: Floats = np.linalg.inv(_BRADFORD) @ np.diag(gain) @ _BRADFORD
+    return adapted
