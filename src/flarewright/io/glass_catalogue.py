@@ -1,6 +1,6 @@
 """The glass catalogue: formulas of six makers, found by name or by nearest (n_d, V_d).
 
-The data are baked by `tools/bake_glass.py` from the refractiveindex.info database (CC0 1.0); they are read on first use.
+The data are baked by `tools/bake_glass.py` from the refractiveindex.info database (CC0 1.0) and read on first use.
 """
 
 from __future__ import annotations
@@ -147,7 +147,8 @@ def cauchy_from_abbe(n_d: float, v_d: float) -> Dispersion:
 
     Notes
     -----
-    The constants are L_d^2 = 0.34523 and 1 / (L_F^-2 - L_C^-2) = 0.52345. The last resort: real glass bends more in the blue.
+    The constants are L_d^2 = 0.34523 and 1 / (L_F^-2 - L_C^-2) = 0.52345. The last resort: the blue of real glass is
+    bent more.
     """
     b = 0.52345 * (n_d - 1.0) / v_d
     return Dispersion(glass="Cauchy", formula="cauchy", coefficients=(n_d - b / 0.34523, b), range_nm=(360.0, 1100.0))

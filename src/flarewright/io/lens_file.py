@@ -5,7 +5,7 @@
     source = "US 2,645,156"
     f_number = 3.5
     rows = [
-      { radius = 30.81, thickness = 7.7, glass = "LAKN7", n_d = 1.652, v_d = 58.5, semi_diameter = 15.0, coating = "quarter-wave:550" },
+      { radius = 30.81, thickness = 7.7, glass = "LAKN7", n_d = 1.652, v_d = 58.5, coating = "quarter-wave:550" },
       { radius = "flat", thickness = 2.0 },
       { stop = true, thickness = 3.0 },
     ]
@@ -37,7 +37,7 @@ from .lens_fields import (
     TOP_TEXTS,
     NumberField,
 )
-from .sentences import count, did_you_mean, shorten, validation_sentences
+from .sentences import count, did_you_mean, shorten, summary, validation_sentences
 from .text_file import read_toml
 
 MOST_ROWS = 500
@@ -125,25 +125,6 @@ def lens_from_table(table: dict[str, Any], where: str) -> LensReading:
     if lens is None:
         raise LensError(summary(where, problems), tuple(problems))
     return LensReading(lens, media.remarks(findings))
-
-
-def summary(where: str, problems: list[str]) -> str:
-    """Say in one sentence what is wrong with a file.
-
-    Parameters
-    ----------
-    where : str
-        The file.
-    problems : list of str
-        At least one.
-
-    Returns
-    -------
-    str
-    """
-    if len(problems) == 1:
-        return f"{where}: {problems[0]}"
-    return f"{where} has {count(len(problems), 'problem')} (rows are counted from 0), the first: {problems[0]}"
 
 
 def _top_level(table: dict[str, Any], problems: list[str]) -> dict[str, Any]:
@@ -320,7 +301,7 @@ def _presets(table: object, row_count: int, problems: list[str]) -> dict[str, tu
             continue
         if row_count and len(entries) != row_count:
             problems.append(
-                f"{where} has {count(len(entries), 'entry', 'entries')}, the lens has {count(row_count, 'row')}: give one each"
+                f"{where} has {count(len(entries), 'entry', 'entries')}, the lens has {count(row_count, 'row')}: one each"
             )
         presets[name] = tuple(_coating(entry, f"{where}, row {k}", problems) for k, entry in enumerate(entries))
     return presets

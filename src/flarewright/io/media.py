@@ -21,7 +21,8 @@ class Finding:
     Attributes
     ----------
     kind : {"named", "nearest", "told"}
-        named: the catalogue's own glass, nothing to say; nearest: `text` is the stand-in's name; told: `text` is a remark.
+        named: the catalogue's own glass, nothing to say; nearest: `text` is the stand-in's name;
+        told: `text` is a remark.
     text : str
     """
 
@@ -67,7 +68,8 @@ def attach(glass: str | None, n_d: float | None, v_d: float | None) -> tuple[Med
     abbe_off = v_d is not None and abs(v_d / known.v_d - 1.0) > _OWN_ABBE_TOLERANCE
     if n_d is not None and (index_off or abbe_off):
         stated = f"n_d = {n_d:g}" + (f", V_d = {v_d:g}" if v_d is not None else "")
-        off = f"{glass} is stated with {stated}, but {known.full_name} has {known.n_d:.5f}, {known.v_d:.2f}; the stated numbers hold"
+        listed = f"{known.full_name} has {known.n_d:.5f}, {known.v_d:.2f}"
+        off = f"{glass} is stated with {stated}, but {listed}; the stated numbers hold"
         if v_d is None:
             medium = Medium(glass=glass, n_d=n_d, v_d=None, dispersion=known.dispersion)
             return medium, Finding("told", off)
@@ -114,21 +116,23 @@ def complete(lens: Lens) -> tuple[Lens, tuple[str, ...]]:
     return lens.replace(rows=tuple(rows)), remarks(findings)
 
 
-def remarks(findings: list[tuple[int, Finding]]) -> tuple[str, ...]:
+def remarks(findings: list[tuple[int, Finding]], place: str = "row") -> tuple[str, ...]:
     """Gather the findings of all rows into few sentences.
 
     Parameters
     ----------
     findings : list of (int, Finding)
-        Row and what was found there.
+        Where, and what was found there.
+    place : str
+        What the numbers count: "row", or "line" of a file.
 
     Returns
     -------
     tuple of str
         All stand-ins in one sentence, one more for each row with something of its own to tell.
     """
-    told = tuple(f"row {row}: {finding.text}" for row, finding in findings if finding.kind == "told")
-    nearest = [f"row {row} {finding.text}" for row, finding in findings if finding.kind == "nearest"]
+    told = tuple(f"{place} {number}: {finding.text}" for number, finding in findings if finding.kind == "told")
+    nearest = [f"{place} {number} {finding.text}" for number, finding in findings if finding.kind == "nearest"]
     if not nearest:
         return told
     return (*told, f"dispersion of the nearest catalogue glass: {', '.join(nearest)}")

@@ -48,3 +48,22 @@ def did_you_mean(word: str, known: Iterable[str]) -> str:
 def count(number: int, noun: str, plural: str | None = None) -> str:
     """Return "1 row" or "3 rows"."""
     return f"{number} {noun if number == 1 else plural or noun + 's'}"
+
+
+def summary(where: str, problems: list[str]) -> str:
+    """Say in one sentence what is wrong with a file.
+
+    Parameters
+    ----------
+    where : str
+        The file.
+    problems : list of str
+        At least one.
+
+    Returns
+    -------
+    str
+    """
+    if len(problems) == 1:
+        return f"{where}: {problems[0]}"
+    return f"{where} has {count(len(problems), 'problem')}, the first: {problems[0]}"

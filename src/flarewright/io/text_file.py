@@ -22,7 +22,7 @@ def read_text(path: str | Path, what: str) -> str:
     Returns
     -------
     str
-        Line ends are "\\n"; a byte order mark is dropped.
+        Lines end with a line feed alone; a byte order mark is dropped.
 
     Raises
     ------

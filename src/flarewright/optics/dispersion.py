@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from flarewright.errors import GlassError
 from flarewright.model import Dispersion, Medium
 
-LINE_D_NM = 587.5618
+LINE_D_NM = 587.56
 LINE_F_NM = 486.1327
 LINE_C_NM = 656.2725
 

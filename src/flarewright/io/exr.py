@@ -1,0 +1,238 @@
+"""OpenEXR files: layers as parts, the project in the metadata.
+
+The first part is what every program opens: the first layer (the beauty) with plain channels R, G, B. Each further
+layer is a part of its own, named after the layer, with channels `layer.R`, `layer.G`, `layer.B`, so that compositing
+programs list it under its name whether they go by parts or by channel names. A file with one layer is an ordinary
+single-part file. Pixels are linear and scene-referred; `chromaticities` states the primaries.
+
+The parts of single ghosts cover their own data window only, so that a lens with 171 ghosts makes a file of tens of
+megabytes in a second. Nuke, Fusion, Natron and OpenImageIO place such a part where it belongs; Blender (up to 5 at
+least) puts it into the picture's corner, for which `full_windows=True` writes every layer at the size of the picture.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from os import PathLike
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import FlarewrightError, OutputError
+from ..model.camera import Colorspace
+from ..model.layer import Layer
+from .atomic import write_atomically
+
+HALF_MAX = 65504.0
+"""The largest number that 16-bit floating point holds."""
+
+# (red x, y, green x, y, blue x, y, white x, y): ITU-R BT.709-6 table 3; ACEScg as S-2014-004, AP1 with the ACES white.
+CHROMATICITIES: Mapping[Colorspace, tuple[float, ...]] = {
+    "rec709": (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290),
+    "acescg": (0.713, 0.293, 0.165, 0.830, 0.128, 0.044, 0.32168, 0.33767),
+}
+
+# Names of the ASWF Color Interop Forum for the same two spaces.
+_INTEROP_ID: Mapping[Colorspace, str] = {"rec709": "lin_rec709_scene", "acescg": "lin_ap1_scene"}
+
+_PREFIX = "flarewright."
+_CHANNELS = "RGB"
+
+
+@dataclass(frozen=True)
+class ExrContents:
+    """What `read_exr` finds in a file.
+
+    Attributes
+    ----------
+    layers : tuple of Layer
+        In the order of the file, pixels as float32 within each part's data window.
+    size_px : tuple of int
+        Width and height of the display window.
+    pixel_type : {"half", "float"}
+        Of the first part.
+    metadata : dict of str to str
+        What `write_exr` was given.
+    header : dict of str to object
+        All attributes of the first part.
+    """
+
+    layers: tuple[Layer, ...]
+    size_px: tuple[int, int]
+    pixel_type: Literal["half", "float"]
+    metadata: dict[str, str]
+    header: dict[str, Any] = field(default_factory=dict)
+
+
+def write_exr(
+    path: str | PathLike[str],
+    layers: Sequence[Layer],
+    size_px: tuple[int, int],
+    *,
+    pixel_type: Literal["half", "float"],
+    metadata: Mapping[str, str],
+    pixel_aspect: float = 1.0,
+    colorspace: Colorspace = "rec709",
+    full_windows: bool = False,
+) -> tuple[str, ...]:
+    """Write layers into one EXR file, under a temporary name first.
+
+    Parameters
+    ----------
+    path : path
+    layers : sequence of Layer
+        The first one becomes the part that every program opens.
+    size_px : tuple of int
+        Width and height of the whole picture.
+    pixel_type : {"half", "float"}
+    metadata : mapping of str to str
+        Goes into the first part's header, each name prefixed by "flarewright.".
+    pixel_aspect : float
+        Width of a pixel over its height.
+    colorspace : {"rec709", "acescg"}
+        Primaries of the pixels; nothing is converted.
+    full_windows : bool
+        Write single ghosts at the size of the picture too (for Blender).
+
+    Returns
+    -------
+    tuple of str
+        Remarks for a person, e.g. that values had to be clipped to fit into half floats.
+
+    Raises
+    ------
+    OutputError
+        When the file cannot be written.
+    FlarewrightError
+        When there is no layer, or two of the same name.
+    """
+    import OpenEXR
+
+    names = [layer.name for layer in layers]
+    if not names or len(set(names)) != len(names):
+        raise FlarewrightError(f"an EXR file needs at least one layer and no name twice, not {names}")
+    clipped = 0
+    parts = []
+    for k, layer in enumerate(layers):
+        # Passes always cover the picture; only a single ghost has a window worth cropping to.
+        whole = k == 0 or full_windows or not layer.name.startswith("ghost.")
+        pixels, window = _over_picture(layer, size_px) if whole else (layer.pixels, layer.window)
+        channels, lost = _channels(pixels, "" if k == 0 else f"{layer.name}.", pixel_type)
+        clipped += lost
+        header = _header(layer, window, size_px, pixel_aspect, colorspace)
+        if k == 0:
+            header |= {f"{_PREFIX}{name}": text for name, text in metadata.items()}
+        parts.append(OpenEXR.Part(header, channels, layer.name))
+
+    def write(temporary: Path) -> None:
+        try:
+            OpenEXR.File(parts).write(str(temporary))
+        except RuntimeError as error:
+            # The library has no exception of its own; what it cannot do with a valid header is reach the file.
+            raise OSError(str(error).rstrip(".")) from error
+
+    write_atomically(Path(path), write)
+    if not clipped:
+        return ()
+    return (
+        f"{clipped} values above {HALF_MAX:.0f} were clipped to it because half floats end there; "
+        "write floats (--float) to keep them",
+    )
+
+
+def read_exr(path: str | PathLike[str]) -> ExrContents:
+    """Read back a file that `write_exr` wrote.
+
+    Parameters
+    ----------
+    path : path
+
+    Returns
+    -------
+    ExrContents
+
+    Raises
+    ------
+    OutputError
+        When it is no readable EXR file.
+    """
+    import OpenEXR
+
+    try:
+        file = OpenEXR.File(str(path), separate_channels=True)
+    except RuntimeError as error:
+        raise OutputError(f"{path} cannot be read as an EXR file: {error}") from error
+    layers = []
+    for k, part in enumerate(file.parts):
+        prefix = "" if k == 0 else f"{part.name()}."
+        planes = [part.channels[f"{prefix}{name}"].pixels for name in _CHANNELS]
+        pixels = np.stack(planes, axis=-1).astype(np.float32)
+        x, y = (int(value) for value in part.header["dataWindow"][0])
+        about = _prefixed(part.header, f"{_PREFIX}layer.")
+        name = part.name() or "beauty"
+        layers.append(Layer(name, pixels, (x, y, pixels.shape[1], pixels.shape[0]), about))
+    header = dict(file.parts[0].header)
+    low, high = header["displayWindow"]
+    metadata = {k: str(v) for k, v in _prefixed(header, _PREFIX).items() if not k.startswith("layer.")}
+    kind: Literal["half", "float"] = "half" if file.parts[0].channels["R"].pixels.dtype == np.float16 else "float"
+    size = (int(high[0] - low[0]) + 1, int(high[1] - low[1]) + 1)
+    return ExrContents(tuple(layers), size, kind, metadata, header)
+
+
+def _prefixed(header: Mapping[str, Any], prefix: str) -> dict[str, Any]:
+    return {name.removeprefix(prefix): value for name, value in header.items() if name.startswith(prefix)}
+
+
+def _over_picture(layer: Layer, size_px: tuple[int, int]) -> tuple[NDArray[np.float32], tuple[int, int, int, int]]:
+    """Return a layer's pixels at the size of the picture, black around its window."""
+    width, height = size_px
+    picture = (0, 0, width, height)
+    if layer.window == picture:
+        return layer.pixels, picture
+    x, y, w, h = layer.window
+    pixels = np.zeros((height, width, 3), np.float32)
+    left, top, right, bottom = max(x, 0), max(y, 0), min(x + w, width), min(y + h, height)
+    if left < right and top < bottom:
+        pixels[top:bottom, left:right] = layer.pixels[top - y : bottom - y, left - x : right - x]
+    return pixels, picture
+
+
+def _channels(
+    pixels: NDArray[np.float32], prefix: str, pixel_type: Literal["half", "float"]
+) -> tuple[dict[str, NDArray[Any]], int]:
+    """Return the planes by channel name, and how many values half floats could not hold."""
+    lost = 0
+    channels: dict[str, NDArray[Any]] = {}
+    for c, name in enumerate(_CHANNELS):
+        plane = np.ascontiguousarray(pixels[..., c])
+        if pixel_type == "half":
+            lost += int(np.count_nonzero(np.abs(plane) > HALF_MAX))
+            plane = np.clip(plane, -HALF_MAX, HALF_MAX).astype(np.float16)
+        channels[f"{prefix}{name}"] = plane
+    return channels, lost
+
+
+def _header(
+    layer: Layer,
+    window: tuple[int, int, int, int],
+    size_px: tuple[int, int],
+    pixel_aspect: float,
+    colorspace: Colorspace,
+) -> dict[str, Any]:
+    import OpenEXR
+
+    x, y, w, h = window
+    about = {f"{_PREFIX}layer.{name}": value for name, value in layer.about.items()}
+    return {
+        "type": OpenEXR.scanlineimage,
+        "compression": OpenEXR.ZIP_COMPRESSION,
+        "displayWindow": ((0, 0), (size_px[0] - 1, size_px[1] - 1)),
+        "dataWindow": ((x, y), (x + w - 1, y + h - 1)),
+        "pixelAspectRatio": float(pixel_aspect),
+        "chromaticities": CHROMATICITIES[colorspace],
+        "colorInteropID": _INTEROP_ID[colorspace],
+        **about,
+    }

@@ -1,0 +1,496 @@
+"""Project files: TOML that holds everything a render needs.
+
+```toml
+schema_version = 1
+lens = "heliar-tronnier"        # a shipped name, or a file beside this one
+
+[[lights]]
+field_deg = [10.0, 5.0]
+spectrum = "black-body:5600"
+```
+
+Relative paths (lens, iris mask, coating, spectrum table) start at the project file's folder. A light's `spectrum` and
+the project's `coating` may be given as the same short text that the command line takes, or as a table.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+from typing import Any, cast
+
+from pydantic import BaseModel, ValidationError
+
+from ..errors import FlarewrightError, LensError, ProjectError
+from ..model import coating as coatings
+from ..model import light as lights
+from ..model import project as choices
+from ..model.camera import Camera
+from ..model.iris import Iris
+from ..model.lens import Lens, Surface
+from ..model.project import CoatingChoice, Output, Project, Quality
+from .coating_text import UNCOATED, coating_from, format_coating, parse_coating, read_coating_file
+from .lens_file import lens_from_table
+from .sentences import count, did_you_mean, shorten
+from .spectrum_text import parse_spectrum, spectrum_text
+from .text_file import read_toml
+
+LENS_SUFFIXES = (".toml", ".lens", ".json", ".zmx", ".seq")
+
+_NEWEST = 1
+
+
+class ProjectFileError(ProjectError):
+    """A project file with findings.
+
+    Parameters
+    ----------
+    message : str
+        One sentence.
+    problems : tuple of str
+        Every finding, one sentence each.
+    """
+
+    def __init__(self, message: str, problems: tuple[str, ...] = ()) -> None:
+        super().__init__(message)
+        self.problems = problems
+
+
+def read_project(path: str | os.PathLike[str]) -> Project:
+    """Read and check a project file.
+
+    Parameters
+    ----------
+    path : path
+        A TOML file.
+
+    Returns
+    -------
+    Project
+        Short texts are replaced by what they mean, relative paths by paths from the working folder.
+
+    Raises
+    ------
+    ProjectError
+        When the file cannot be read or has mistakes; `problems` then lists all of them.
+    """
+    path = Path(path)
+    try:
+        data = read_toml(path, "a project file")
+    except ValueError as error:
+        raise ProjectError(str(error)) from None
+    version = data.get("schema_version", 1)
+    if isinstance(version, int) and version > _NEWEST:
+        raise ProjectError(
+            f"the project file {path} has schema_version {version}, newer than this program's {_NEWEST}: "
+            "update Flarewright"
+        )
+    return project_from_data(data, folder=path.parent, where=str(path))
+
+
+def project_from_data(data: dict[str, Any], *, folder: Path, where: str) -> Project:
+    """Return the project that parsed TOML (or JSON) describes.
+
+    Parameters
+    ----------
+    data : dict
+        As read from the file; not changed.
+    folder : path
+        Where relative paths start.
+    where : str
+        The file's name for messages.
+
+    Returns
+    -------
+    Project
+
+    Raises
+    ------
+    ProjectError
+        With all problems.
+    """
+    problems: list[str] = []
+    expanded = _expanded(data, folder, problems)
+    try:
+        project = Project.model_validate(expanded)
+    except ValidationError as error:
+        problems += explain(error, expanded)
+    if not problems:
+        return project
+    if len(problems) == 1:
+        raise ProjectFileError(f"{where}: {problems[0]}")
+    raise ProjectFileError(f"{where} has {count(len(problems), 'problem')}, the first: {problems[0]}", tuple(problems))
+
+
+def _expanded(data: dict[str, Any], folder: Path, problems: list[str]) -> dict[str, Any]:
+    """Return the data with short texts and relative paths replaced, and note what cannot be."""
+    out = dict(data)
+    match out.get("lens"):
+        case str(name):
+            out["lens"] = lens_location(name, folder)
+        case dict(table):
+            out["lens"] = _embedded_lens(table, problems)
+        case None:
+            pass
+        case other:
+            problems.append(f"lens should be a name, a file or a table, not {shorten(other)}")
+            out["lens"] = "?"
+    if isinstance(out.get("iris"), dict) and isinstance(out["iris"].get("mask"), str):
+        out["iris"] = {**out["iris"], "mask": str(folder / out["iris"]["mask"])}
+    if "coating" in out:
+        try:
+            out["coating"] = _coating(out["coating"], folder)
+        except FlarewrightError as error:
+            problems.append(f"coating: {error}")
+            del out["coating"]
+    if isinstance(out.get("lights"), list):
+        out["lights"] = [_light(light, f"lights[{k}]", folder, problems) for k, light in enumerate(out["lights"])]
+    return out
+
+
+def _embedded_lens(table: dict[str, Any], problems: list[str]) -> Any:
+    """Accept a prescription inside the project, as in a lens file or as `project_text` writes it (rows with a kind)."""
+    rows = table.get("rows")
+    if isinstance(rows, list) and all(isinstance(row, dict) and "kind" in row for row in rows):
+        presets = table.get("coating_presets")
+        if not isinstance(presets, dict) or not all(isinstance(entries, list) for entries in presets.values()):
+            return table
+        try:
+            read = {name: [coating_from(entry) for entry in entries] for name, entries in presets.items()}
+        except FlarewrightError as error:
+            problems.append(f"lens.coating_presets: {error}")
+            return "?"
+        return {**table, "coating_presets": read}
+    try:
+        return lens_from_table(table, "lens").lens
+    except LensError as error:
+        problems.extend(f"lens: {problem}" for problem in error.problems or (str(error),))
+        return "?"
+
+
+def _coating(value: Any, folder: Path) -> Any:
+    """Expand the short texts of a coating: the choice itself, or those inside its table."""
+    if isinstance(value, str):
+        return parse_coating_choice(value, folder=folder)
+    if isinstance(value, dict) and isinstance(value.get("coatings"), list):
+        return {**value, "coatings": [coating_from(item) for item in value["coatings"]]}
+    if isinstance(value, dict) and isinstance(value.get("coating"), str):
+        return {**value, "coating": coating_from(value["coating"])}
+    return value
+
+
+def _light(light: Any, where: str, folder: Path, problems: list[str]) -> Any:
+    if not isinstance(light, dict) or not isinstance(light.get("spectrum"), str):
+        return light
+    try:
+        return {**light, "spectrum": parse_spectrum(light["spectrum"], folder=folder)}
+    except FlarewrightError as error:
+        problems.append(f"{where}.spectrum: {error}")
+        return {key: value for key, value in light.items() if key != "spectrum"}
+
+
+def lens_location(name: str, folder: Path) -> str:
+    """Return a shipped lens' name as it is, and a file's name as a path from the working folder."""
+    is_file = name.lower().endswith(LENS_SUFFIXES) or "/" in name or "\\" in name
+    return str(folder / name) if is_file else name
+
+
+def parse_coating_choice(text: str, *, folder: Path | None = None) -> CoatingChoice:
+    """Return the coatings that a short text means.
+
+    Parameters
+    ----------
+    text : str
+        `lens`, `none`, `preset:NAME`, `quarter-wave:NM` and the other forms of `io.coating_text`, or a coating file.
+    folder : path, optional
+        Where a relative file starts; None: the working folder.
+
+    Returns
+    -------
+    CoatingChoice
+
+    Raises
+    ------
+    FlarewrightError
+        When the text is none of the forms.
+    """
+    word, _, rest = text.strip().partition(":")
+    if text.strip() == "lens":
+        return choices.AsLens()
+    if word == "preset":
+        if not rest.strip():
+            raise ProjectError(f"the coating {text!r} names no preset: write preset:NAME, a name from the lens file")
+        return choices.Preset(name=rest.strip())
+    if text.strip().lower().endswith(".toml"):
+        return read_coating_file((folder or Path()) / text.strip())
+    return choices.Everywhere(coating=parse_coating(text))
+
+
+# ---------------------------------------------------------------------------------------------------------------------
+# Findings
+
+
+def explain(error: ValidationError, data: Any) -> list[str]:
+    """Return one sentence for each finding of a failed validation.
+
+    Parameters
+    ----------
+    error : pydantic.ValidationError
+    data : object
+        What was validated; names the places as a person wrote them.
+
+    Returns
+    -------
+    list of str
+    """
+    sentences: list[str] = []
+    for finding in error.errors(include_url=False):
+        if finding["type"] == "too_short" and finding.get("ctx", {}).get("actual_length") != len(finding["input"]):
+            continue  # Its items were refused one by one, which is told already.
+        keys = _written_keys(finding["loc"], data, finding["type"])
+        place = _place(keys)
+        match finding["type"]:
+            case "missing":
+                sentence = f"{place} is missing"
+            case "extra_forbidden":
+                sentence = f"{place} is not a known key{_suggestion(keys)}"
+            case "value_error":
+                reason = finding["msg"].removeprefix("Value error, ")
+                sentence = f"{place}: {reason}" if place else reason
+            case _:
+                reason = finding["msg"].replace("Input should be", "should be")
+                reason = reason[0].lower() + reason[1:]
+                sentence = f"{place} {reason}{_given(finding['input'])}".strip()
+        if sentence not in sentences:
+            sentences.append(sentence)
+    return sentences
+
+
+def _written_keys(loc: tuple[int | str, ...], data: Any, kind: str) -> list[int | str]:
+    """Drop from a place what pydantic put in and no one wrote: the tags of unions."""
+    keys: list[int | str] = []
+    for position, key in enumerate(loc):
+        if isinstance(data, BaseModel):
+            data = dict(data)
+        if (isinstance(data, dict) and key in data) or (
+            isinstance(data, list | tuple) and isinstance(key, int) and key < len(data)
+        ):
+            keys.append(key)
+            data = data[cast(Any, key)]
+        elif kind == "missing" and position == len(loc) - 1:
+            keys.append(key)
+    return keys
+
+
+def _place(keys: list[int | str]) -> str:
+    text = ""
+    for key in keys:
+        text += f"[{key}]" if isinstance(key, int) else f".{key}" if text else key
+    return text
+
+
+def _given(value: Any) -> str:
+    return f", not {shorten(value)}" if isinstance(value, str | int | float | bool) else ""
+
+
+_SECTIONS: dict[str, tuple[type[BaseModel], ...]] = {
+    "": (Project,),
+    "iris": (Iris,),
+    "camera": (Camera,),
+    "quality": (Quality,),
+    "output": (Output,),
+    "lights": (lights.Light,),
+    "spectrum": (lights.EqualEnergy, lights.D65, lights.BlackBody, lights.Lines, lights.Tabulated),
+    "coating": (choices.Preset, choices.Everywhere, choices.PerRow, coatings.QuarterWave, coatings.Film),
+    "lens": (Lens,),
+    "rows": (Surface,),
+}
+
+
+def _suggestion(keys: list[int | str]) -> str:
+    wrong = str(keys[-1]) if keys else ""
+    section = next((key for key in reversed(keys[:-1]) if isinstance(key, str)), "")
+    known = [name for model in _SECTIONS.get(section, ()) for name in model.model_fields]
+    if near := did_you_mean(wrong, known):
+        return near
+    for other, models in _SECTIONS.items():
+        if other and any(wrong in model.model_fields for model in models):
+            return f" here; it belongs into [{other}]" if other != "lights" else " here; it belongs into [[lights]]"
+    return f"; known are {', '.join(dict.fromkeys(known))}" if known else ""
+
+
+# ---------------------------------------------------------------------------------------------------------------------
+# Writing
+
+_ABOUT = {
+    "lens": "a shipped lens (`flarewright lenses`), or a lens file beside this project",
+    "f_number": "2.8   # left out: wide open",
+    "coating": '"lens", "none", "preset:NAME", "quarter-wave:NM" or a file, on every glass-air surface',
+    "iris": "left out: the lens file's blades",
+    "iris.blades": "0 is round",
+    "iris.mask": '"iris.png"   # an image instead of blades, white transmits',
+    "lights.field_deg": "degrees right and up in the picture",
+    "lights.intensity": "irradiance on a plane that faces the light",
+    "lights.spectrum": '"d65", "equal-energy", "black-body:3200", "lines:589.0,589.6" or "lamp.csv"',
+    "camera.sensor_mm": "[36.0, 20.25]   # left out: 36 mm wide, square pixels",
+    "camera.sensor_distance": "80.0   # last vertex to sensor, mm; left out: the paraxial focus",
+    "camera.focus_distance": "2000.0   # mm in front of the first vertex; left out: infinity",
+    "quality.mode": '"draft": paraxial matrices, "final": traced ray bundles',
+    "quality.wavelengths": "3 for a draft of the colours, 7 to 31 for final pictures",
+    "quality.paths": '"all" or "same-side" of the stop',
+    "output.layers": '"beauty", "passes" or "ghosts" (one layer a ghost)',
+    "output.brightest": "20   # of the single ghosts only so many",
+    "output.colorspace": '"rec709" or "acescg", linear',
+    "output.pixel_type": '"half" or "float"',
+}
+
+
+def project_text(project: Project, *, folder: Path | None = None, comments: bool = False) -> str:
+    """Return a project as TOML that `read_project` reads back to the same project.
+
+    Parameters
+    ----------
+    project : Project
+    folder : path, optional
+        The folder that the text will lie in: files are named relative to it. None keeps paths as they are.
+    comments : bool
+        Teach: a comment beside the keys, and the keys that are left out as comments.
+
+    Returns
+    -------
+    str
+    """
+    data = cast(dict[str, Any], _without_none(project.model_dump(mode="json")))
+    if folder is not None:
+        _make_relative(data, folder)
+    data["coating"] = _short_coating(project.coating)
+    for written, light in zip(data["lights"], project.lights, strict=True):
+        written["spectrum"] = spectrum_text(light.spectrum) or written["spectrum"]
+    nothing = _left_out(project) if comments else {}
+    out: list[str] = []
+    _emit_table(out, data, (), nothing, _ABOUT if comments else {})
+    return "\n".join(out).strip() + "\n"
+
+
+def _make_relative(data: dict[str, Any], folder: Path) -> None:
+    def relative(name: str) -> str:
+        return Path(os.path.relpath(name, folder)).as_posix() if not Path(name).is_absolute() else name
+
+    if isinstance(data["lens"], str) and lens_location(data["lens"], Path("x")) != data["lens"]:
+        data["lens"] = relative(data["lens"])
+        if "/" not in data["lens"] and not data["lens"].lower().endswith(LENS_SUFFIXES):
+            data["lens"] = f"./{data['lens']}"
+    if data.get("iris", {}).get("mask"):
+        data["iris"]["mask"] = relative(data["iris"]["mask"])
+
+
+def _short_coating(choice: CoatingChoice) -> str | dict[str, Any]:
+    match choice:
+        case choices.AsLens():
+            return "lens"
+        case choices.Preset():
+            return f"preset:{choice.name}"
+        case choices.Everywhere():
+            return format_coating(choice.coating)
+        case choices.PerRow():
+            texts = [UNCOATED if item is None else format_coating(item) for item in choice.coatings]
+            return {"kind": "per-row", "coatings": texts}
+
+
+def _without_none(value: Any) -> Any:
+    """TOML has no null: leave such keys out; inside a list of coatings, "-" stands for it."""
+    if isinstance(value, dict):
+        return {key: _without_none(item) for key, item in value.items() if item is not None}
+    if isinstance(value, list):
+        return [UNCOATED if item is None else _without_none(item) for item in value]
+    return value
+
+
+def _left_out(project: Project) -> dict[tuple[str, ...], list[str]]:
+    """Return by section the keys whose value is None and which are worth a commented line."""
+    found: dict[tuple[str, ...], list[str]] = {}
+    for section, record in (("", project), ("camera", project.camera), ("output", project.output)):
+        for name in type(record).model_fields:
+            if getattr(record, name) is None and f"{section}.{name}".strip(".") in _ABOUT:
+                found.setdefault((section,) if section else (), []).append(name)
+    return found
+
+
+def _emit_table(
+    out: list[str],
+    table: dict[str, Any],
+    path: tuple[str, ...],
+    left_out: dict[tuple[str, ...], list[str]],
+    about: dict[str, str],
+) -> None:
+    """Append a table's own keys, then its sub-tables under their headings."""
+    below: list[tuple[str, Any]] = []
+    for key, value in table.items():
+        if isinstance(value, dict) or (isinstance(value, list) and value and isinstance(value[0], dict)):
+            below.append((key, value))
+            continue
+        note = about.get(".".join((*path, key)))
+        out.append(f"{_key(key)} = {_value(value)}" + (f"   # {note}" if note else ""))
+    for key in left_out.get(path, ()):
+        if key != "iris":
+            out.append(f"# {key} = {about['.'.join((*path, key))]}")
+    for key, value in below:
+        heading = ".".join(_key(part) for part in (*path, key))
+        for item in value if isinstance(value, list) else [value]:
+            out.extend(["", f"[[{heading}]]" if isinstance(value, list) else f"[{heading}]"])
+            _emit_table(out, item, (*path, key), left_out, about)
+
+
+def _key(key: str) -> str:
+    plain = key.replace("-", "").replace("_", "")
+    return key if plain.isalnum() and plain.isascii() else _value(key)
+
+
+def _value(value: Any) -> str:
+    match value:
+        case bool():
+            return "true" if value else "false"
+        case str():
+            # JSON's string escapes are TOML's, except for DEL, which TOML wants escaped.
+            return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+        case int() | float():
+            return repr(value)
+        case list():
+            return "[" + ", ".join(_value(item) for item in value) + "]"
+        case dict():
+            return "{ " + ", ".join(f"{_key(key)} = {_value(item)}" for key, item in value.items()) + " }"
+    raise ProjectError(f"a project cannot hold {value!r}")
+
+
+def project_json_schema() -> dict[str, Any]:
+    """Return the JSON Schema (draft 2020-12) of a project file, for editors that check while a person types."""
+    schema = Project.model_json_schema()
+    schema["$schema"] = "https://json-schema.org/draft/2020-12/schema"
+    schema["title"] = "Flarewright project"
+    spectra = schema["$defs"]["Light"]["properties"]["spectrum"]
+    choice = schema["properties"]["coating"]
+    for owner, words in ((choice, _ABOUT["coating"]), (spectra, _ABOUT["lights.spectrum"])):
+        _accept_text(owner, words)
+    _accept_coating_texts(schema["$defs"])
+    return schema
+
+
+def _accept_text(node: dict[str, Any], words: str) -> None:
+    """Let a schema node be a short text too."""
+    table = {key: node.pop(key) for key in list(node) if key in ("oneOf", "discriminator")}
+    node.pop("default", None)
+    node |= {"description": words, "anyOf": [{"type": "string"}, table]}
+
+
+def _accept_coating_texts(node: Any) -> None:
+    """Let every coating below a schema node be a short text too."""
+    if isinstance(node, dict):
+        if "quarter-wave" in node.get("discriminator", {}).get("mapping", {}):
+            _accept_text(node, "a table, or a short text like quarter-wave:550")
+        else:
+            for value in node.values():
+                _accept_coating_texts(value)
+    elif isinstance(node, list):
+        for value in node:
+            _accept_coating_texts(value)

@@ -1,0 +1,230 @@
+"""Turn a traced bundle into light on the sensor: pictures of it, and numbers about it."""
+
+import numpy as np
+
+from ._jit import compiled
+from .clip import (
+    MAX_VERTICES,
+    PP,
+    PQ,
+    PSTOP,
+    PW,
+    PX,
+    PY,
+    clip_triangle,
+    cut_to_rectangle,
+    polygon_area,
+)
+from .raster import fill_polygon, splat_line
+from .trace import ALIVE, WEIGHT, X, Y
+
+# polygons thinner than this, in square pixels, are drawn as lines
+SLIVER = 1e-4
+
+
+@compiled
+def _triangle_flux(data, pupil, triangle):
+    """Return the flux entering a triangle of the pupil times its mean weight, and its signed area on the sensor."""
+    a, b, c = triangle[0], triangle[1], triangle[2]
+    area = (pupil[b, 0] - pupil[a, 0]) * (pupil[c, 1] - pupil[a, 1])
+    area -= (pupil[b, 1] - pupil[a, 1]) * (pupil[c, 0] - pupil[a, 0])
+    spread = (data[b, X] - data[a, X]) * (data[c, Y] - data[a, Y])
+    spread -= (data[b, Y] - data[a, Y]) * (data[c, X] - data[a, X])
+    return 0.5 * area * (data[a, WEIGHT] + data[b, WEIGHT] + data[c, WEIGHT]) / 3.0, 0.5 * spread
+
+
+@compiled
+def node_densities(data, pupil, triangles):
+    """Average the irradiance of the triangles around each node, by flux and area (Hullin 2011, section 4.3, "Smooth shading").
+
+    Parameters
+    ----------
+    data : ndarray, shape (N, >= 5)
+    pupil : ndarray, shape (N, 2)
+    triangles : ndarray, shape (T, 3)
+
+    Returns
+    -------
+    ndarray, shape (N,)
+        Flux per mm^2 of the sensor; finite on caustics because areas of either orientation add.
+    """
+    flux, area = np.zeros(pupil.shape[0]), np.zeros(pupil.shape[0])
+    for t in range(triangles.shape[0]):
+        if data[triangles[t, 0], ALIVE] * data[triangles[t, 1], ALIVE] * data[triangles[t, 2], ALIVE] == 0.0:
+            continue
+        f, a = _triangle_flux(data, pupil, triangles[t])
+        for m in range(3):
+            flux[triangles[t, m]] += f
+            area[triangles[t, m]] += abs(a)
+    for k in range(flux.size):
+        flux[k] = flux[k] / area[k] if area[k] > 0.0 else 0.0
+    return flux
+
+
+@compiled
+def draw_bundle(data, pupil, triangles, densities, crossings, blades, axes, to_pixels, gain, rgb, plane, cover, low, high):
+    """Add a bundle and its mirror image to a picture, flux for flux.
+
+    Parameters
+    ----------
+    data, pupil, triangles
+        The traced bundle (`build_mesh`, `trace_nodes`).
+    densities : ndarray, shape (N,)
+        From `node_densities`.
+    crossings, blades, axes
+        As in `clip_triangle`.
+    to_pixels : ndarray, shape (4,)
+        Column of the axis, row of the axis, pixels per mm across and down.
+    gain : float
+        Multiplies the flux: the cosine of the field angle, the light's intensity.
+    rgb : ndarray, shape (3,)
+    plane : ndarray, shape (3, H, W), float32
+        Flux per pixel, added to.
+    cover, low, high
+        Scratch of `fill_polygon`.
+
+    Notes
+    -----
+    A triangle's flux is its pupil area times its mean weight, spread over its image with a density that is linear
+    between its nodes; rims and blades cut it geometrically, so edges are exact and folded sheets add. Slivers are
+    drawn as lines.
+    """
+    height, width = plane.shape[1], plane.shape[2]
+    columns = PSTOP + 2 * crossings
+    polygon, other = np.empty((MAX_VERTICES, columns)), np.empty((MAX_VERTICES, columns))
+    values = np.empty(MAX_VERTICES)
+    corner = np.empty((3, 3))
+    pixel_area = to_pixels[2] * to_pixels[3]
+    for t in range(triangles.shape[0]):
+        triangle = triangles[t]
+        if data[triangle[0], ALIVE] * data[triangle[1], ALIVE] * data[triangle[2], ALIVE] == 0.0:
+            continue
+        flux, area = _triangle_flux(data, pupil, triangle)
+        flux *= gain
+        if flux == 0.0:
+            continue
+        for half in range(2):
+            mirror = 1.0 - 2.0 * half
+            _corners(data, triangle, mirror, axes, to_pixels, densities, corner)
+            if (
+                max(max(corner[0, 0], corner[1, 0]), corner[2, 0]) <= 0.0
+                or min(min(corner[0, 0], corner[1, 0]), corner[2, 0]) >= width
+                or max(max(corner[0, 1], corner[1, 1]), corner[2, 1]) <= 0.0
+                or min(min(corner[0, 1], corner[1, 1]), corner[2, 1]) >= height
+            ):
+                continue
+            count = clip_triangle(data, pupil, triangle, mirror, crossings, blades, axes, polygon, other, values)
+            if count == 0:
+                continue
+            for k in range(count):
+                x, y = polygon[k, PX], polygon[k, PY]
+                polygon[k, PX] = to_pixels[0] - to_pixels[2] * (x * axes[0, 0] + y * axes[1, 0])
+                polygon[k, PY] = to_pixels[1] + to_pixels[3] * (x * axes[0, 1] + y * axes[1, 1])
+            drawn = abs(area) * pixel_area
+            if drawn < SLIVER:
+                whole = (pupil[triangle[1], 0] - pupil[triangle[0], 0]) * (pupil[triangle[2], 1] - pupil[triangle[0], 1])
+                whole -= (pupil[triangle[1], 1] - pupil[triangle[0], 1]) * (pupil[triangle[2], 0] - pupil[triangle[0], 0])
+                part = abs(polygon_area(polygon, count, PP, PQ)) / abs(0.5 * whole)
+                _splat_polygon(polygon, count, flux * part, rgb, plane)
+                continue
+            count = cut_to_rectangle(polygon, count, other, values, float(width), float(height))
+            if count < 3:
+                continue
+            base, gx, gy, dense_low, dense_high = _plane_through(corner, flux / drawn, gain / pixel_area, drawn)
+            fill_polygon(polygon, count, base, gx, gy, dense_low, dense_high, rgb, plane, cover, low, high)
+
+
+@compiled
+def _corners(data, triangle, mirror, axes, to_pixels, densities, corner):
+    """Fill pixel x, y and density of a triangle's nodes."""
+    for m in range(3):
+        k = triangle[m]
+        x, y = mirror * data[k, X], data[k, Y]
+        # the upright picture is the sensor turned by 180 degrees
+        corner[m, 0] = to_pixels[0] - to_pixels[2] * (x * axes[0, 0] + y * axes[1, 0])
+        corner[m, 1] = to_pixels[1] + to_pixels[3] * (x * axes[0, 1] + y * axes[1, 1])
+        corner[m, 2] = densities[k]
+
+
+@compiled
+def _plane_through(corner, mean, unit, drawn):
+    """Return the linear density through three nodes, scaled to a mean: value at the origin, gradient, bounds.
+
+    `unit` is what a node's density of 1 makes in a pixel when the triangle agrees with its neighbours.
+    """
+    average = (corner[0, 2] + corner[1, 2] + corner[2, 2]) / 3.0
+    ratio = mean / average if average > 0.0 else 0.0
+    # where neighbours differ wildly (a fold) or nothing can be seen of a slope, flat is the honest choice
+    if drawn < 0.5 or not 0.5 * unit < ratio < 2.0 * unit:
+        return mean, 0.0, 0.0, mean, mean
+    x1, y1 = corner[1, 0] - corner[0, 0], corner[1, 1] - corner[0, 1]
+    x2, y2 = corner[2, 0] - corner[0, 0], corner[2, 1] - corner[0, 1]
+    d0, d1, d2 = corner[0, 2] * ratio, corner[1, 2] * ratio, corner[2, 2] * ratio
+    inverse = 1.0 / (x1 * y2 - x2 * y1)
+    gx = ((d1 - d0) * y2 - (d2 - d0) * y1) * inverse
+    gy = ((d2 - d0) * x1 - (d1 - d0) * x2) * inverse
+    base = d0 - gx * corner[0, 0] - gy * corner[0, 1]
+    return base, gx, gy, min(min(d0, d1), d2), max(max(d0, d1), d2)
+
+
+@compiled
+def _splat_polygon(polygon, count, flux, rgb, plane):
+    """Draw a polygon without area as the line between its two farthest vertices."""
+    best, a, b = -1.0, 0, 0
+    for k in range(count):
+        for m in range(k + 1, count):
+            length = (polygon[k, PX] - polygon[m, PX]) ** 2 + (polygon[k, PY] - polygon[m, PY]) ** 2
+            if length > best:
+                best, a, b = length, k, m
+    splat_line(polygon[a, PX], polygon[a, PY], polygon[b, PX], polygon[b, PY], flux, rgb, plane)
+
+
+@compiled
+def measure_bundle(data, pupil, triangles, crossings, blades, axes):
+    """Integrate a bundle over what passes.
+
+    Parameters
+    ----------
+    data, pupil, triangles, crossings, blades, axes
+        As in `draw_bundle`.
+
+    Returns
+    -------
+    ndarray, shape (8,)
+        Integrals over the pupil of weight times 1, x, y, x^2 + y^2 (sensor, upright frame, mm), the accepted pupil area,
+        and the largest |x|, least y, largest y on the sensor in the meridional frame.
+
+    Notes
+    -----
+    Weight and position are linear within a triangle, so mid-edge quadrature is exact to second order.
+    """
+    columns = PSTOP + 2 * crossings
+    polygon, other = np.empty((MAX_VERTICES, columns)), np.empty((MAX_VERTICES, columns))
+    values = np.empty(MAX_VERTICES)
+    sums = np.zeros(8)
+    sums[6], sums[7] = np.inf, -np.inf
+    for t in range(triangles.shape[0]):
+        triangle = triangles[t]
+        if data[triangle[0], ALIVE] * data[triangle[1], ALIVE] * data[triangle[2], ALIVE] == 0.0:
+            continue
+        for half in range(2):
+            count = clip_triangle(data, pupil, triangle, 1.0 - 2.0 * half, crossings, blades, axes, polygon, other, values)
+            for k in range(count):
+                sums[5] = max(sums[5], abs(polygon[k, PX]))
+                sums[6], sums[7] = min(sums[6], polygon[k, PY]), max(sums[7], polygon[k, PY])
+            for k in range(1, count - 1):
+                area = (polygon[k, PP] - polygon[0, PP]) * (polygon[k + 1, PQ] - polygon[0, PQ])
+                area -= (polygon[k, PQ] - polygon[0, PQ]) * (polygon[k + 1, PP] - polygon[0, PP])
+                third = abs(area) / 6.0
+                sums[4] += 3.0 * third
+                for edge in range(3):
+                    a = 0 if edge == 0 else (k if edge == 1 else k + 1)
+                    b = k if edge == 0 else (k + 1 if edge == 1 else 0)
+                    w = 0.5 * (polygon[a, PW] + polygon[b, PW]) * third
+                    mx, my = 0.5 * (polygon[a, PX] + polygon[b, PX]), 0.5 * (polygon[a, PY] + polygon[b, PY])
+                    x, y = mx * axes[0, 0] + my * axes[1, 0], mx * axes[0, 1] + my * axes[1, 1]
+                    sums[0] += w
+                    sums[1] -= w * x
+                    sums[2] -= w * y
+                    sums[3] += w * (x * x + y * y)
+    return sums

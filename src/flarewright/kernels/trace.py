@@ -1,0 +1,241 @@
+"""Sequential ray tracing of one path at one wavelength, in lanes that the compiler vectorises."""
+
+from math import sqrt
+
+import numpy as np
+
+from ._jit import compiled, inlined
+from .intersect import intersect_conic
+
+REFRACT = 0
+REFLECT = 1
+STOP = 2
+
+LANES = 64
+
+# columns of a traced node
+X, Y, WEIGHT, REL, ALIVE = 0, 1, 2, 3, 4
+STOP_X = 5  # then stop y, and the same for a second and third crossing
+
+
+@inlined
+def bend(curvature, conic, x, y, z, dx, dy, dz, root, heading, eta, mirror):
+    """Refract or reflect a ray at a hit.
+
+    Parameters
+    ----------
+    curvature, conic : float
+    x, y, z : float
+        The hit, mm, relative to the vertex.
+    dx, dy, dz : float
+        Unit direction.
+    root : float
+        From `intersect_conic`.
+    heading : float
+        +1 or -1, the leg's direction.
+    eta : float
+        Index before over index behind.
+    mirror : float
+        1 reflects, 0 refracts.
+
+    Returns
+    -------
+    nx, ny, nz : float
+        New unit direction.
+    cos_in, cos_out : float
+        Cosines before and behind the surface, both >= 0.
+    inside : float
+        cos_out squared; negative beyond the critical angle.
+
+    Notes
+    -----
+    d' = eta d + (eta c - sqrt k) N and d' = d + 2 c N with c = -N.d, k = 1 - eta^2 (1 - c^2) (physics.md). The normal
+    against the ray is heading * gradient / norm, which holds beyond a sphere's equator too.
+    """
+    gx = curvature * x
+    gy = curvature * y
+    gz = curvature * (1.0 + conic) * z - 1.0
+    inv_norm = 1.0 / sqrt(gx * gx + gy * gy + gz * gz)
+    cos_in = root * inv_norm
+    inside = 1.0 - eta * eta * (1.0 - cos_in * cos_in)
+    cos_out = sqrt(max(inside, 0.0))
+    along = (2.0 * cos_in if mirror > 0.0 else eta * cos_in - cos_out) * heading * inv_norm
+    scale = 1.0 if mirror > 0.0 else eta
+    return scale * dx + along * gx, scale * dy + along * gy, scale * dz + along * gz, cos_in, cos_out, inside
+
+
+@compiled
+def trace_nodes(rows, actions, curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, tilt, px, py, out):
+    """Trace rays of one distant light along one path to the sensor plane.
+
+    Parameters
+    ----------
+    rows, actions : ndarray, shape (S,), int64
+        Row met at each step and what happens there (REFRACT, REFLECT, STOP).
+    curvature, conic, z_vertex, inv_semi : ndarray, shape (K,)
+        Geometry of the rows; `inv_semi` is 1 / semi-diameter, 0 for the stop.
+    n_gap : ndarray, shape (K + 1,)
+        Index before row 0, behind row 0, behind row 1, ...
+    reflectance : ndarray, shape (K, M)
+        R of each row against the cosine on its lower-index side, uniform over [0, 1].
+    sensor_z : float
+        Sensor plane, mm from the first vertex.
+    tilt : float
+        The rays' direction is (0, sin tilt, cos tilt) in the meridional frame.
+    px, py : ndarray, shape (N,)
+        Where the rays cross the plane of the first vertex, mm.
+    out : ndarray, shape (N, 5 + 2 C)
+        Filled with x, y on the sensor, weight (product of R and T), the largest r / semi-diameter met, alive (1 or 0),
+        and x, y at each of the C crossings of the stop.
+
+    Notes
+    -----
+    physics.md, sequential tracing. A ray ends when it misses, is totally reflected where it should refract, or turns the
+    wrong way along its leg. A mirror beyond the critical angle has R = 1.
+    """
+    n_rays = px.shape[0]
+    samples = reflectance.shape[1]
+    last_cell = samples - 2
+    x = np.empty(LANES)
+    y = np.empty(LANES)
+    z = np.empty(LANES)
+    dx = np.empty(LANES)
+    dy = np.empty(LANES)
+    dz = np.empty(LANES)
+    weight = np.empty(LANES)
+    rel2 = np.empty(LANES)
+    alive = np.empty(LANES)
+    cos_low = np.empty(LANES)
+    for start in range(0, n_rays, LANES):
+        count = min(LANES, n_rays - start)
+        for m in range(LANES):
+            k = start + min(m, count - 1)
+            x[m] = px[k]
+            y[m] = py[k]
+            z[m] = 0.0
+            dx[m] = 0.0
+            dy[m] = np.sin(tilt)
+            dz[m] = np.cos(tilt)
+            weight[m] = 1.0
+            rel2[m] = 0.0
+            alive[m] = 1.0
+        heading = 1.0
+        crossing = 0
+        for step in range(rows.shape[0]):
+            row = rows[step]
+            action = actions[step]
+            vertex = z_vertex[row]
+            if action == STOP:
+                for m in range(LANES):
+                    t = (vertex - z[m]) / dz[m]
+                    x[m] += t * dx[m]
+                    y[m] += t * dy[m]
+                    z[m] = vertex
+                for m in range(count):
+                    out[start + m, STOP_X + 2 * crossing] = x[m]
+                    out[start + m, STOP_X + 2 * crossing + 1] = y[m]
+                crossing += 1
+                continue
+            c = curvature[row]
+            kappa = conic[row]
+            inv2 = inv_semi[row] * inv_semi[row]
+            if heading > 0.0:
+                n_in = n_gap[row]
+                n_out = n_gap[row + 1]
+            else:
+                n_in = n_gap[row + 1]
+                n_out = n_gap[row]
+            eta = n_in / n_out
+            mirror = 1.0 if action == REFLECT else 0.0
+            low_in = 1.0 if n_in <= n_out else 0.0
+            for m in range(LANES):
+                zl = z[m] - vertex
+                t, root, discriminant = intersect_conic(c, kappa, x[m], y[m], zl, dx[m], dy[m], dz[m], heading)
+                hx = x[m] + t * dx[m]
+                hy = y[m] + t * dy[m]
+                hz = zl + t * dz[m]
+                nx, ny, nz, cos_in, cos_out, inside = bend(
+                    c, kappa, hx, hy, hz, dx[m], dy[m], dz[m], root, heading, eta, mirror
+                )
+                ok = alive[m]
+                ok = ok if discriminant >= 0.0 else 0.0
+                ok = ok if (mirror > 0.0 or inside >= 0.0) else 0.0
+                ok = ok if nz * heading * (1.0 - 2.0 * mirror) > 0.0 else 0.0
+                r2 = (hx * hx + hy * hy) * inv2
+                alive[m] = ok
+                rel2[m] = max(rel2[m], r2)
+                cos_low[m] = cos_in if low_in > 0.0 else cos_out
+                x[m] = hx
+                y[m] = hy
+                z[m] = hz + vertex
+                dx[m] = nx
+                dy[m] = ny
+                dz[m] = nz
+            table = reflectance[row]
+            for m in range(LANES):
+                place = min(cos_low[m], 1.0) * (samples - 1)
+                cell = min(np.int64(place), last_cell)
+                low = table[cell]
+                r = low + (place - cell) * (table[cell + 1] - low)
+                weight[m] *= r if mirror > 0.0 else 1.0 - r
+            if mirror > 0.0:
+                heading = -heading
+        for m in range(count):
+            t = (sensor_z - z[m]) / dz[m]
+            out[start + m, X] = x[m] + t * dx[m]
+            out[start + m, Y] = y[m] + t * dy[m]
+            out[start + m, WEIGHT] = weight[m]
+            out[start + m, REL] = sqrt(rel2[m])
+            out[start + m, ALIVE] = alive[m]
+
+
+@compiled
+def trace_hits(rows, actions, curvature, conic, z_vertex, n_gap, sensor_z, tilt, px, py, hits):
+    """Trace rays like `trace_nodes` and keep every hit: for drawings and for the size of surfaces.
+
+    Parameters
+    ----------
+    rows ... n_gap
+        As in `trace_nodes`.
+    sensor_z, tilt : float
+    px, py : ndarray, shape (N,)
+    hits : ndarray, shape (N, S + 2, 3)
+        Filled with the start, the hit at every step, and the point on the sensor; NaN from where a ray ends.
+    """
+    for k in range(px.shape[0]):
+        x, y, z = px[k], py[k], 0.0
+        dx, dy, dz = 0.0, np.sin(tilt), np.cos(tilt)
+        hits[k] = np.nan
+        hits[k, 0, 0], hits[k, 0, 1], hits[k, 0, 2] = x, y, z
+        heading = 1.0
+        alive = True
+        for step in range(rows.shape[0]):
+            row = rows[step]
+            vertex = z_vertex[row]
+            if actions[step] == STOP:
+                t = (vertex - z) / dz
+                x, y, z = x + t * dx, y + t * dy, vertex
+            else:
+                mirror = 1.0 if actions[step] == REFLECT else 0.0
+                n_in, n_out = (n_gap[row], n_gap[row + 1]) if heading > 0.0 else (n_gap[row + 1], n_gap[row])
+                t, root, discriminant = intersect_conic(
+                    curvature[row], conic[row], x, y, z - vertex, dx, dy, dz, heading
+                )
+                if discriminant < 0.0:
+                    alive = False
+                    break
+                x, y, z = x + t * dx, y + t * dy, z + t * dz
+                dx, dy, dz, _, _, inside = bend(
+                    curvature[row], conic[row], x, y, z - vertex, dx, dy, dz, root, heading, n_in / n_out, mirror
+                )
+                if mirror > 0.0:
+                    heading = -heading
+                if dz * heading <= 0.0 or (mirror == 0.0 and inside < 0.0):
+                    alive = False
+            hits[k, step + 1, 0], hits[k, step + 1, 1], hits[k, step + 1, 2] = x, y, z
+            if not alive:
+                break
+        if alive:
+            t = (sensor_z - z) / dz
+            last = rows.shape[0] + 1
+            hits[k, last, 0], hits[k, last, 1], hits[k, last, 2] = x + t * dx, y + t * dy, sensor_z

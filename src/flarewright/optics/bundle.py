@@ -1,0 +1,197 @@
+"""The ray bundle of one path: its region in the pupil, its grid, its rays."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import atan, atan2, cos, hypot, radians, sin, sqrt, tan
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..kernels.mesh import build_mesh, find_box
+from ..kernels.trace import STOP_X, trace_nodes
+from .pack import PackedLens
+from .paths import LightPath
+
+Floats = NDArray[np.float64]
+
+# cells of the pre-pass over half the pupil: 64 across the whole
+PREPASS = (32, 64)
+# coarsest cells of a bundle's grid over half its region, and how often each may be halved
+GRID = (8, 16)
+MAX_LEVEL = 5
+
+
+@dataclass(frozen=True)
+class Incidence:
+    """A distant light's direction.
+
+    Attributes
+    ----------
+    tilt : float
+        Angle of the rays in the meridional frame, rad: direction (0, sin tilt, cos tilt); never positive.
+    axes : ndarray, shape (2, 2)
+        Upright (x, y) of the meridional x axis (the mirror axis' normal) and y axis (towards the light).
+    """
+
+    tilt: float
+    axes: Floats
+
+    @property
+    def cosine(self) -> float:
+        """Cosine of the field angle."""
+        return cos(self.tilt)
+
+
+def incidence(field_deg: tuple[float, float]) -> Incidence:
+    """Turn field angles into a direction.
+
+    Parameters
+    ----------
+    field_deg : tuple of float
+        (X, Y): the rays run along (-tan X, -tan Y, 1), so the direct image lies near (+efl tan X, +efl tan Y) in the
+        upright picture.
+
+    Returns
+    -------
+    Incidence
+    """
+    slope_x, slope_y = tan(radians(field_deg[0])), tan(radians(field_deg[1]))
+    azimuth = atan2(slope_y, slope_x)
+    axes = np.array([[-sin(azimuth), cos(azimuth)], [cos(azimuth), sin(azimuth)]])
+    return Incidence(-atan(hypot(slope_x, slope_y)), axes)
+
+
+@dataclass(frozen=True)
+class Bundle:
+    """The grid of one path's rays.
+
+    Attributes
+    ----------
+    path : LightPath
+    pupil : ndarray, shape (N, 2)
+        Nodes on the plane of the first vertex in the meridional frame, mm; x >= 0.
+    triangles : ndarray, shape (T, 3)
+    """
+
+    path: LightPath
+    pupil: Floats
+    triangles: NDArray[np.int64]
+
+
+def _arguments(packed: PackedLens, w: int, path: LightPath, tilt: float) -> tuple[Any, ...]:
+    geometry = (packed.curvature, packed.conic, packed.z_vertex, packed.inv_semi)
+    return (path.rows, path.actions, *geometry, packed.n_gap[w], packed.reflectance[w], packed.sensor_z, tilt)
+
+
+def front_box(packed: PackedLens, tilt: float) -> Floats:
+    """Return the half of the first vertex' plane through which light can reach the first surface: x0, x1, y0, y1."""
+    first = int(np.flatnonzero(packed.inv_semi)[0])
+    semi, c = packed.semi[first], packed.curvature[first]
+    sag = c * semi**2 / (1.0 + sqrt(max(1.0 - (1.0 + packed.conic[first]) * (c * semi) ** 2, 0.0)))
+    # a rim at z = sag is met by rays that cross z = 0 displaced by sag tan(tilt)
+    low, high = -semi - max(0.0, sag * tan(tilt)), semi + max(0.0, -sag * tan(tilt))
+    lead = packed.z_vertex[first] * abs(tan(tilt))
+    return np.array([0.0, semi, low - lead, high + lead]) * (1.0 + 1e-9)
+
+
+def find_region(packed: PackedLens, w: int, path: LightPath, tilt: float, iris_radius: float) -> tuple[Floats | None, float]:
+    """Find the part of the pupil that a path accepts (Hullin 2011, section 4.2, "Ray Bounding").
+
+    Parameters
+    ----------
+    packed : PackedLens
+    w : int
+        Which wavelength.
+    path : LightPath
+    tilt : float
+    iris_radius : float
+        Radius around the iris, mm.
+
+    Returns
+    -------
+    box : ndarray, shape (4,), or None
+        x0, x1, y0, y1 in mm, None when nothing passes.
+    flux : float
+        Rough flux per unit irradiance.
+    """
+    arguments = _arguments(packed, w, path, tilt)
+    box, cells = front_box(packed, tilt), PREPASS
+    flux = 0.0
+    for _ in range(4):
+        found, flux = find_box(*arguments, path.stop_crossings, iris_radius, box, *cells)
+        if found[1] <= found[0]:
+            return None, 0.0
+        shrunk = (found[1] - found[0]) * (found[3] - found[2]) < 0.3 * (box[1] - box[0]) * (box[3] - box[2])
+        box, cells = found, (16, 32)
+        if not shrunk:
+            break
+    return box, float(flux)
+
+
+def trace_grid(
+    packed: PackedLens,
+    w: int,
+    path: LightPath,
+    tilt: float,
+    iris_radius: float,
+    box: Floats,
+    *,
+    tolerance: float,
+    scale: float,
+    view_radius: float = float("inf"),
+    flux_tolerance: float = 1e-3,
+) -> Bundle:
+    """Build the adaptive grid of a path.
+
+    Parameters
+    ----------
+    packed, w, path, tilt, iris_radius
+        As in `find_region`.
+    box : ndarray, shape (4,)
+        Its result.
+    tolerance : float
+        Largest interpolation error, pixels.
+    scale : float
+        Pixels per mm.
+    view_radius : float
+        What lies farther from the axis on the sensor, mm, is not refined.
+    flux_tolerance : float
+        Largest relative error of the bundle's flux from its rim.
+
+    Returns
+    -------
+    Bundle
+    """
+    pupil, triangles = build_mesh(
+        *_arguments(packed, w, path, tilt), path.stop_crossings, iris_radius,
+        box, *GRID, MAX_LEVEL, tolerance, flux_tolerance, scale, view_radius,
+    )  # fmt: skip
+    return Bundle(path, pupil, triangles)
+
+
+def trace_points(packed: PackedLens, w: int, path: LightPath, tilt: float, points: Floats) -> Floats:
+    """Trace rays through given points of the pupil.
+
+    Parameters
+    ----------
+    packed : PackedLens
+    w : int
+        Which of its wavelengths.
+    path : LightPath
+    tilt : float
+        From `incidence`.
+    points : ndarray, shape (N, 2)
+        Meridional frame, mm, on the plane of the first vertex.
+
+    Returns
+    -------
+    ndarray, shape (N, 5 + 2 C)
+        x, y on the sensor (meridional frame), product of R and T, largest r / semi-diameter, alive, and x, y at each of
+        the C crossings of the stop.
+    """
+    data = np.empty((len(points), STOP_X + 2 * path.stop_crossings))
+    x, y = np.ascontiguousarray(points[:, 0]), np.ascontiguousarray(points[:, 1])
+    trace_nodes(*_arguments(packed, w, path, tilt), x, y, data)
+    return data

@@ -1,0 +1,206 @@
+"""The ghost analysis: what every two-reflection path carries, where it lands, how large and how bright it is."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from math import ceil, sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..kernels.bundle import draw_bundle, measure_bundle, node_densities
+from ..model import AsLens, CoatingChoice, Iris, Lens
+from .bundle import Bundle, Incidence, find_region, incidence, trace_grid, trace_points
+from .iris import blade_edges
+from .pack import PackedLens, pack_lens, resolve_coatings
+from .paraxial import D_LINE_NM, first_order, path_matrices
+from .paths import LightPath, direct_path, ghost_paths
+
+Floats = NDArray[np.float64]
+
+# pixels per rms radius for tracing, and the side of the grid on which a peak is looked for
+RESOLUTION = 100.0
+PEAK_GRID = 256
+
+
+@dataclass(frozen=True)
+class GhostRow:
+    """One path of the analysis; positions in the upright picture.
+
+    Attributes
+    ----------
+    first_reflection, second_reflection : int or None
+        Rows j, then i < j; None for the direct image.
+    throughput_mm2 : float
+        Flux on the unbounded sensor plane when the light gives irradiance 1 on a plane facing it.
+    centroid_mm : tuple of float
+    rms_radius_mm : float
+        Root mean square distance from the centroid, weighted by flux.
+    peak_irradiance : float
+        Largest irradiance, averaged over a square of side `peak_patch_mm`, per flux of the direct image, 1/mm^2.
+    peak_patch_mm : float
+    bounded_by : {"stop", "entrance"}
+        Which edge shapes the ghost: the smaller of the two as projected to the entrance (physics.md).
+    focus_distance_mm : float or None
+        Where the path focuses a distant light, mm behind the sensor (negative: in front); None for an afocal path.
+    """
+
+    first_reflection: int | None
+    second_reflection: int | None
+    throughput_mm2: float
+    centroid_mm: tuple[float, float]
+    rms_radius_mm: float
+    peak_irradiance: float
+    peak_patch_mm: float
+    bounded_by: str
+    focus_distance_mm: float | None
+
+
+@dataclass(frozen=True)
+class GhostTable:
+    """The analysis of a lens for one light at one wavelength.
+
+    Attributes
+    ----------
+    efl, bfl, f_number, entrance_pupil_diameter, stop_semi_diameter, sensor_distance : float
+        First-order data at the wavelength, mm.
+    wavelength_nm : float
+    direct : GhostRow
+    ghosts : tuple of GhostRow
+        Every path, brightest (by throughput) first; paths that pass no light have throughput 0.
+    """
+
+    efl: float
+    bfl: float
+    f_number: float
+    entrance_pupil_diameter: float
+    stop_semi_diameter: float
+    sensor_distance: float
+    wavelength_nm: float
+    direct: GhostRow
+    ghosts: tuple[GhostRow, ...]
+
+
+def ghost_table(
+    lens: Lens,
+    field_deg: tuple[float, float],
+    *,
+    f_number: float | None = None,
+    coating: CoatingChoice | None = None,
+    wavelength_nm: float = D_LINE_NM,
+    paths: str = "all",
+    threads: int | None = None,
+) -> GhostTable:
+    """Analyse every ghost of a lens for one distant light.
+
+    Parameters
+    ----------
+    lens : Lens
+        Complete (`render.prepare.load_lens`).
+    field_deg : tuple of float
+        (X, Y) of the light.
+    f_number : float, optional
+        None: wide open.
+    coating : CoatingChoice, optional
+        None: as the lens file says.
+    wavelength_nm : float
+    paths : {"all", "same-side"}
+    threads : int, optional
+        None: all cores; the numbers do not depend on it.
+
+    Returns
+    -------
+    GhostTable
+
+    Notes
+    -----
+    Traced on the unbounded sensor plane. A ray counts when it passes every surface's semi-diameter and the round stop
+    at each crossing; R and T are the means of s and p, multiplied along the path. Judged by a plain Monte Carlo tracer in
+    `tests/physics`. The stop and the sensor are placed at the d line whatever the wavelength.
+    """
+    order = first_order(lens, f_number)
+    coatings = resolve_coatings(lens, AsLens() if coating is None else coating)
+    packed = pack_lens(lens, order, coatings, np.array([wavelength_nm]))
+    light = incidence(field_deg)
+    todo = (direct_path(lens), *ghost_paths(lens, paths))
+    with ThreadPoolExecutor(threads) as pool:
+        measured = list(pool.map(lambda path: _measure(lens, packed, path, light), todo))
+    direct = measured[0]
+    # a peak is told relative to the direct image's flux
+    unit = direct.throughput_mm2 if direct.throughput_mm2 > 0.0 else 1.0
+    rows = [_relative(row, unit) for row in measured]
+    ghosts = sorted(rows[1:], key=lambda row: -row.throughput_mm2)
+    return GhostTable(
+        efl=order.efl,
+        bfl=order.bfl,
+        f_number=order.f_number,
+        entrance_pupil_diameter=order.entrance_pupil_diameter,
+        stop_semi_diameter=order.stop_semi_diameter,
+        sensor_distance=order.sensor_distance,
+        wavelength_nm=wavelength_nm,
+        direct=rows[0],
+        ghosts=tuple(ghosts),
+    )
+
+
+def _relative(row: GhostRow, unit: float) -> GhostRow:
+    return GhostRow(**{**row.__dict__, "peak_irradiance": row.peak_irradiance / unit})
+
+
+def _measure(lens: Lens, packed: PackedLens, path: LightPath, light: Incidence) -> GhostRow:
+    bounded_by, focus = _paraxial_facts(lens, packed, path)
+    blades = blade_edges(Iris(), packed.stop_semi)
+    box, rough = find_region(packed, 0, path, light.tilt, packed.stop_semi)
+    j, i = path.first_reflection, path.second_reflection
+    nothing = GhostRow(j, i, 0.0, (0.0, 0.0), 0.0, 0.0, 0.0, bounded_by, focus)
+    if box is None or rough == 0.0:
+        return nothing
+    scale = 1e-6
+    # first only the rim, to learn the size; then fine enough for that size
+    for _ in range(2):
+        bundle = trace_grid(packed, 0, path, light.tilt, packed.stop_semi, box, tolerance=0.25, scale=scale)
+        data = trace_points(packed, 0, path, light.tilt, bundle.pupil)
+        sums = measure_bundle(data, bundle.pupil, bundle.triangles, path.stop_crossings, blades, light.axes)
+        if sums[0] <= 0.0:
+            return nothing
+        x, y = sums[1] / sums[0], sums[2] / sums[0]
+        rms = sqrt(max(sums[3] / sums[0] - x * x - y * y, 0.0))
+        scale = RESOLUTION / max(rms, 1e-4)
+    peak, patch = _peak(bundle, data, blades, light, (x, y), min(4.0 * rms, _extent(sums)))
+    flux = float(sums[0] * light.cosine)
+    return GhostRow(j, i, flux, (float(x), float(y)), rms, peak, patch, bounded_by, focus)
+
+
+def _extent(sums: Floats) -> float:
+    """Half the larger side of a bundle's bounds on the sensor."""
+    return float(max(sums[5], 0.5 * (sums[7] - sums[6])))
+
+
+def _peak(
+    bundle: Bundle, data: Floats, blades: Floats, light: Incidence, centre: tuple[float, float], reach: float
+) -> tuple[float, float]:
+    """Draw the bundle around its centroid and take the brightest pixel: irradiance per unit light, and the pixel's side."""
+    patch = max(2.0 * reach / PEAK_GRID, 0.01)
+    side = min(PEAK_GRID, max(4, ceil(2.0 * reach / patch) + 2))
+    plane = np.zeros((3, side, side), dtype=np.float32)
+    cover = np.zeros((side + 1, side + 3))
+    low, high = np.zeros((2, side + 1), dtype=np.int64), np.zeros((2, side + 1), dtype=np.int64)
+    to_pixels = np.array([side / 2 - centre[0] / patch, side / 2 + centre[1] / patch, 1.0 / patch, 1.0 / patch])
+    densities = node_densities(data, bundle.pupil, bundle.triangles)
+    draw_bundle(
+        data, bundle.pupil, bundle.triangles, densities, bundle.path.stop_crossings, blades, light.axes,
+        to_pixels, light.cosine, np.array([1.0, 0.0, 0.0]), plane, cover, low, high,
+    )  # fmt: skip
+    return float(plane[0].max()) / patch**2, patch
+
+
+def _paraxial_facts(lens: Lens, packed: PackedLens, path: LightPath) -> tuple[str, float | None]:
+    """Tell which edge bounds a ghost, and where the path focuses (physics.md, "Ray transfer matrices")."""
+    to_stop, total = path_matrices(lens, path, float(packed.wavelengths_nm[0]), packed.sensor_z)
+    entrance = packed.semi[0] if packed.inv_semi[0] > 0.0 else packed.semi[1]
+    stop_height = min((packed.stop_semi / max(abs(Ma[0, 0]), 1e-12)) for Ma in to_stop)
+    bounded_by = "stop" if stop_height < entrance else "entrance"
+    if abs(total[1, 0]) < 1e-12:
+        return bounded_by, None
+    return bounded_by, float(-total[0, 0] / total[1, 0])

@@ -1,0 +1,159 @@
+"""The bridge from the frozen model to the arrays that kernels read."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import LensError, ProjectError
+from ..model import AsLens, Coating, CoatingChoice, Everywhere, Lens, PerRow, Preset, Stop
+from .coatings import film_stack, reflectance_table
+from .paraxial import D_LINE_NM, FirstOrder, gap_indices, vertex_positions
+
+REFLECTANCE_SAMPLES = 1025
+
+
+@dataclass(frozen=True)
+class PackedLens:
+    """A lens at one opening and a few wavelengths, as arrays.
+
+    Attributes
+    ----------
+    curvature, conic, z_vertex, semi, inv_semi : ndarray, shape (K,), float64
+        Geometry of the rows in mm; `inv_semi` is 0 for the stop, whose opening is the iris' business.
+    n_gap : ndarray, shape (W, K + 1), float64
+        Index before row 0 and behind each row, per wavelength.
+    reflectance : ndarray, shape (W, K, M), float64
+        R against the cosine on the lower-index side, uniform over [0, 1].
+    wavelengths_nm : ndarray, shape (W,)
+    sensor_z : float
+    stop_semi : float
+    first_order : FirstOrder
+    """
+
+    curvature: NDArray[np.float64]
+    conic: NDArray[np.float64]
+    z_vertex: NDArray[np.float64]
+    semi: NDArray[np.float64]
+    inv_semi: NDArray[np.float64]
+    n_gap: NDArray[np.float64]
+    reflectance: NDArray[np.float64]
+    wavelengths_nm: NDArray[np.float64]
+    sensor_z: float
+    stop_semi: float
+    first_order: FirstOrder
+
+
+def resolve_coatings(lens: Lens, choice: CoatingChoice) -> tuple[Coating | None, ...]:
+    """Decide the coating of every row.
+
+    Parameters
+    ----------
+    lens : Lens
+    choice : CoatingChoice
+        As the lens file says, a preset of it, one coating on every surface between glass and air, or one a row.
+
+    Returns
+    -------
+    tuple of Coating or None
+        One entry a row; None is bare.
+
+    Raises
+    ------
+    ProjectError
+        For an unknown preset or a list of the wrong length.
+    """
+    if isinstance(choice, AsLens):
+        return tuple(None if isinstance(row, Stop) else row.coating for row in lens.rows)
+    if isinstance(choice, Preset):
+        if choice.name not in lens.coating_presets:
+            known = ", ".join(lens.coating_presets) or "none"
+            raise ProjectError(f"{lens.name} has no coating preset {choice.name!r}; it has: {known}")
+        return lens.coating_presets[choice.name]
+    if isinstance(choice, PerRow):
+        if len(choice.coatings) != len(lens.rows):
+            raise ProjectError(
+                f"the coating list has {len(choice.coatings)} entries but {lens.name} has {len(lens.rows)} rows; "
+                "give one entry a row, the stop's included"
+            )
+        return choice.coatings
+    assert isinstance(choice, Everywhere)
+    n = gap_indices(lens, D_LINE_NM)
+    in_air = [min(n[k], n[k + 1]) == 1.0 and n[k] != n[k + 1] for k in range(len(lens.rows))]
+    return tuple(choice.coating if air else None for air in in_air)
+
+
+def pack_lens(
+    lens: Lens,
+    first_order: FirstOrder,
+    coatings: tuple[Coating | None, ...],
+    wavelengths_nm: NDArray[np.float64],
+) -> PackedLens:
+    """Turn a complete lens into arrays.
+
+    Parameters
+    ----------
+    lens : Lens
+        Every semi-diameter known (`optics.semi_diameters.complete`).
+    first_order : FirstOrder
+        At the opening and focus to be used.
+    coatings : tuple of Coating or None
+        One a row (`resolve_coatings`).
+    wavelengths_nm : ndarray, shape (W,)
+
+    Returns
+    -------
+    PackedLens
+
+    Raises
+    ------
+    LensError
+        When a semi-diameter is missing.
+    """
+    z = vertex_positions(lens)
+    semi = np.full(len(lens.rows), first_order.stop_semi_diameter)
+    inv_semi = np.zeros(len(lens.rows))
+    curvature, conic = np.zeros(len(lens.rows)), np.zeros(len(lens.rows))
+    for k, row in enumerate(lens.rows):
+        if isinstance(row, Stop):
+            continue
+        if row.semi_diameter is None:
+            raise LensError(f"{lens.name}, row {k}: the semi-diameter is missing; estimate it before tracing")
+        semi[k], inv_semi[k] = row.semi_diameter, 1.0 / row.semi_diameter
+        curvature[k], conic[k] = row.curvature, row.conic
+    n_gap = np.array([gap_indices(lens, float(w)) for w in wavelengths_nm])
+    return PackedLens(
+        curvature=curvature,
+        conic=conic,
+        z_vertex=z,
+        semi=semi,
+        inv_semi=inv_semi,
+        n_gap=n_gap,
+        reflectance=_reflectance(lens, coatings, n_gap, wavelengths_nm),
+        wavelengths_nm=np.asarray(wavelengths_nm, dtype=np.float64),
+        sensor_z=float(z[-1] + first_order.sensor_distance),
+        stop_semi=first_order.stop_semi_diameter,
+        first_order=first_order,
+    )
+
+
+def _reflectance(
+    lens: Lens,
+    coatings: tuple[Coating | None, ...],
+    n_gap: NDArray[np.float64],
+    wavelengths_nm: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    n_d = gap_indices(lens, D_LINE_NM)
+    table = np.zeros((len(wavelengths_nm), len(lens.rows), REFLECTANCE_SAMPLES))
+    for k, row in enumerate(lens.rows):
+        if isinstance(row, Stop):
+            continue
+        # films are designed at the d line and keep their index
+        indices, thicknesses_nm = film_stack(coatings[k], n_d[k], n_d[k + 1])
+        for w, wavelength_nm in enumerate(wavelengths_nm):
+            table[w, k] = reflectance_table(
+                n_gap[w, k], n_gap[w, k + 1], indices, thicknesses_nm, float(wavelength_nm), REFLECTANCE_SAMPLES
+            )
+    return table

@@ -1,0 +1,197 @@
+"""First-order optics by ray transfer matrices: system, pupils, flare matrices Ma and Ms.
+
+Rays are (y, u), the path is unfolded so that distances run forward (physics.md, "Ray transfer matrices").
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import LensError
+from ..kernels.trace import REFLECT, STOP
+from ..model import Lens, Stop, Surface
+from .dispersion import refractive_index
+from .paths import LightPath, direct_path
+
+Matrix = NDArray[np.float64]
+
+D_LINE_NM = 587.56
+
+
+@dataclass(frozen=True)
+class FirstOrder:
+    """What a lens is to first order, at one wavelength. Lengths in mm, z from the first vertex.
+
+    Attributes
+    ----------
+    efl, bfl : float
+        Focal length; last vertex to rear focus.
+    f_number : float
+    entrance_pupil_diameter, entrance_pupil_z, exit_pupil_diameter, exit_pupil_z : float
+        The stop as seen from the front and from behind; `exit_pupil_z` is infinite for a telecentric lens.
+    stop_semi_diameter : float
+        The opening that gives the f-number.
+    sensor_distance : float
+        Last vertex to sensor.
+    """
+
+    efl: float
+    bfl: float
+    f_number: float
+    entrance_pupil_diameter: float
+    entrance_pupil_z: float
+    exit_pupil_diameter: float
+    exit_pupil_z: float
+    stop_semi_diameter: float
+    sensor_distance: float
+
+
+def vertex_positions(lens: Lens) -> NDArray[np.float64]:
+    """Return the z of every row's vertex, mm from the first, shape (K,)."""
+    return np.concatenate([[0.0], np.cumsum([row.thickness for row in lens.rows[:-1]])])
+
+
+def gap_indices(lens: Lens, wavelength_nm: float) -> NDArray[np.float64]:
+    """Return the index before row 0 and behind every row, shape (K + 1,)."""
+    at = np.array([wavelength_nm])
+    indices = [1.0]
+    for row in lens.rows:
+        # the stop is a plane in a gap: it has the medium of the gap it stands in
+        indices.append(indices[-1] if isinstance(row, Stop) else float(refractive_index(row.medium, at)[0]))
+    return np.array(indices)
+
+
+def path_matrices(lens: Lens, path: LightPath, wavelength_nm: float, sensor_z: float) -> tuple[list[Matrix], Matrix]:
+    """Multiply the matrices along a path.
+
+    Parameters
+    ----------
+    lens : Lens
+    path : LightPath
+    wavelength_nm : float
+    sensor_z : float
+        Sensor plane, mm from the first vertex.
+
+    Returns
+    -------
+    to_stop : list of ndarray, shape (2, 2)
+        Ma for every crossing of the stop, from the plane of the first vertex.
+    total : ndarray, shape (2, 2)
+        First vertex to sensor: Ms Ma.
+
+    Notes
+    -----
+    Refraction [[1, 0], [(n1 - n2) / (n2 Re), n1 / n2]], reflection [[1, 0], [2 / Re, 1]], Re = +R on forward and -R on
+    backward legs (physics.md; Lee and Eisemann 2013 with the sign of the second mirror corrected).
+    """
+    n = gap_indices(lens, wavelength_nm)
+    z = vertex_positions(lens)
+    total = np.eye(2)
+    to_stop: list[Matrix] = []
+    heading, here = 1.0, 0.0
+    for row, action in zip(path.rows, path.actions, strict=True):
+        total = np.array([[1.0, heading * (z[row] - here)], [0.0, 1.0]]) @ total
+        here = z[row]
+        surface = lens.rows[row]
+        if action == STOP or not isinstance(surface, Surface):
+            to_stop.append(total)
+            continue
+        power = surface.curvature * heading
+        if action == REFLECT:
+            total = np.array([[1.0, 0.0], [2.0 * power, 1.0]]) @ total
+            heading = -heading
+        else:
+            n1, n2 = (n[row], n[row + 1]) if heading > 0 else (n[row + 1], n[row])
+            total = np.array([[1.0, 0.0], [(n1 - n2) / n2 * power, n1 / n2]]) @ total
+    return to_stop, np.array([[1.0, sensor_z - here], [0.0, 1.0]]) @ total
+
+
+def first_order(
+    lens: Lens,
+    f_number: float | None = None,
+    *,
+    sensor_distance: float | None = None,
+    focus_distance: float | None = None,
+    wavelength_nm: float = D_LINE_NM,
+) -> FirstOrder:
+    """Compute focal length, pupils, stop and sensor position of a lens.
+
+    Parameters
+    ----------
+    lens : Lens
+    f_number : float, optional
+        None: wide open.
+    sensor_distance, focus_distance : float, optional
+        Override the lens file's, mm.
+    wavelength_nm : float
+
+    Returns
+    -------
+    FirstOrder
+
+    Raises
+    ------
+    LensError
+        When the lens has no power, makes no real image, or the plane in focus lies inside the front focus.
+    """
+    last = float(vertex_positions(lens)[-1])
+    (to_stop,), system = path_matrices(lens, direct_path(lens), wavelength_nm, last)
+    (a, _), (c, _) = system
+    if abs(c) < 1e-9:
+        raise LensError(f"{lens.name}: the lens is afocal (no focal length); give a lens that makes an image by itself")
+    efl, bfl = -1.0 / c, -a / c
+    if efl <= 0.0:
+        raise LensError(f"{lens.name}: the focal length is negative ({efl:.2f} mm), so it makes no image by itself")
+    number = lens.f_number if f_number is None else f_number
+    pupil = efl / number
+    (sa, sb), _ = to_stop
+    rear = system @ np.linalg.inv(to_stop)
+    exit_diameter, exit_z = _exit_pupil(rear, abs(sa) * pupil)
+    return FirstOrder(
+        efl=float(efl),
+        bfl=float(bfl),
+        f_number=float(number),
+        entrance_pupil_diameter=float(pupil),
+        entrance_pupil_z=float(sb / sa),
+        exit_pupil_diameter=exit_diameter,
+        exit_pupil_z=last + exit_z,
+        stop_semi_diameter=float(abs(sa) * pupil / 2.0),
+        sensor_distance=_sensor(lens, system, sensor_distance, focus_distance),
+    )
+
+
+def _exit_pupil(rear: Matrix, stop_diameter: float) -> tuple[float, float]:
+    """Image the stop through the rows behind it: diameter, and z from the last vertex."""
+    if abs(rear[1, 1]) < 1e-12:
+        return float("inf"), float("inf")
+    z = -rear[0, 1] / rear[1, 1]
+    return float(abs(rear[0, 0] + z * rear[1, 0]) * stop_diameter), float(z)
+
+
+def _sensor(lens: Lens, system: Matrix, sensor_distance: float | None, focus_distance: float | None) -> float:
+    """Choose the sensor's place: stated, else where the plane in focus images, else the paraxial focus."""
+    distance = sensor_distance
+    focus = focus_distance
+    if distance is None and focus is None:
+        distance, focus = lens.sensor_distance, lens.focus_distance
+    if distance is not None:
+        return float(distance)
+    (a, b), (c, d) = system
+    if focus is None:
+        found = -a / c
+    else:
+        y, u = a * focus + b, c * focus + d
+        if u >= 0.0:
+            raise LensError(
+                f"{lens.name}: nothing at {focus:g} mm can be focused, that is inside the front focus; focus farther away"
+            )
+        found = -y / u
+    if found <= 0.0:
+        raise LensError(
+            f"{lens.name}: the image lies {-found:.2f} mm in front of the last surface, so no sensor fits there; "
+            "give a lens that makes a real image behind itself"
+        )
+    return float(found)

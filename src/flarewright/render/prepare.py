@@ -1,0 +1,155 @@
+"""Load a lens by name or path and settle everything that a render or an analysis needs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from ..errors import LensError, ProjectError
+from ..io.dotlens import read_dotlens
+from ..io.lens_file import read_lens
+from ..io.library import lens_path
+from ..model import Iris, Lens, Project, Surface
+from ..optics.paraxial import FirstOrder
+from ..optics.paraxial import first_order as _first_order
+from ..optics.repair import repair
+from ..optics.semi_diameters import complete
+
+
+def load_lens(name_or_path: str | Path, *, remarks: list[str] | None = None) -> Lens:
+    """Load a shipped lens or a lens file, repaired and complete.
+
+    Parameters
+    ----------
+    name_or_path : str or Path
+        A shipped lens' name (`flarewright lenses`), a TOML lens file, or a `.lens` file.
+    remarks : list of str, optional
+        Every repair, estimate and assumption is appended to it, a sentence each.
+
+    Returns
+    -------
+    Lens
+        All semi-diameters known.
+
+    Raises
+    ------
+    LensError
+        When there is no such lens, or it is no camera lens; the message says why.
+    GlassError
+        For a glass that no catalogue knows.
+    """
+    told: list[str] = [] if remarks is None else remarks
+    path = lens_path(str(name_or_path))
+    if path.suffix.lower() == ".lens":
+        lens, repairs = repair(read_dotlens(path))
+        told.extend(repairs)
+    else:
+        reading = read_lens(path)
+        lens = reading.lens
+        told.extend(reading.remarks)
+    return complete_lens(lens, remarks=told)
+
+
+def complete_lens(lens: Lens, *, remarks: list[str] | None = None) -> Lens:
+    """Fill in what a prescription leaves out and check that it makes an image.
+
+    Parameters
+    ----------
+    lens : Lens
+    remarks : list of str, optional
+        Estimates are told here.
+
+    Returns
+    -------
+    Lens
+
+    Raises
+    ------
+    LensError
+        When the lens makes no image by itself.
+    """
+    order = first_order(lens)
+    full = complete(lens)
+    estimated = [
+        str(k) for k, row in enumerate(full.rows) if isinstance(row, Surface) and row is not lens.rows[k]
+    ]
+    if remarks is not None:
+        if estimated:
+            remarks.append(
+                f"semi-diameters of rows {', '.join(estimated)} are estimated from f/{lens.f_number:g} and the field of view"
+            )
+        stated = lens.stated_focal_length
+        if stated is not None and abs(order.efl / stated - 1.0) > 0.02:
+            remarks.append(f"the focal length is {order.efl:.2f} mm, the file says {stated:g} mm")
+    return full
+
+
+def first_order(lens: Lens, f_number: float | None = None, **where: float | None) -> FirstOrder:
+    """Compute focal length, pupils, stop and sensor position of a lens.
+
+    Parameters
+    ----------
+    lens : Lens
+    f_number : float, optional
+        None: wide open.
+    **where
+        `sensor_distance` or `focus_distance` in mm, overriding the lens file's.
+
+    Returns
+    -------
+    FirstOrder
+
+    Raises
+    ------
+    LensError
+        When the lens makes no image by itself.
+    ProjectError
+        When the f-number is faster than the lens.
+    """
+    if f_number is not None and f_number < lens.f_number * (1.0 - 1e-6):
+        raise ProjectError(
+            f"f/{f_number:g} is faster than {lens.name} opens (f/{lens.f_number:g}); choose f/{lens.f_number:g} or a larger number"
+        )
+    return _first_order(lens, f_number, **where)
+
+
+@dataclass(frozen=True)
+class Settled:
+    """A project with its lens loaded and its opening computed."""
+
+    project: Project
+    lens: Lens
+    iris: Iris
+    order: FirstOrder
+    remarks: tuple[str, ...]
+
+
+def settle(project: Project) -> Settled:
+    """Load the lens of a project and compute its opening and focus.
+
+    Parameters
+    ----------
+    project : Project
+
+    Returns
+    -------
+    Settled
+
+    Raises
+    ------
+    FlarewrightError
+        As `load_lens` and `first_order`.
+    """
+    remarks: list[str] = []
+    if isinstance(project.lens, Lens):
+        lens = complete_lens(project.lens, remarks=remarks)
+    else:
+        lens = load_lens(project.lens, remarks=remarks)
+    camera = project.camera
+    order = first_order(
+        lens, project.f_number, sensor_distance=camera.sensor_distance, focus_distance=camera.focus_distance
+    )
+    if order.sensor_distance > 1e5:
+        raise LensError(f"{lens.name}: the sensor would stand {order.sensor_distance / 1000:.0f} m behind the lens; check the focus")
+    iris = project.iris if project.iris is not None else lens.iris
+    return Settled(project, lens, iris, order, tuple(remarks))
