@@ -173,7 +173,7 @@ def _quarter_wave(match: re.Match[str], text: str) -> QuarterWave:
         raise ProjectError(f"coating {text!r} has two thickness offsets: keep one")
     return QuarterWave(
         center_wavelength_nm=float(match["center"]),
-        index=index if index in ("real", "ideal") else float(index),  # type: ignore[arg-type]
+        index=index if index in ("real", "ideal") else float(index),
         thickness_offset_nm=float(early or late or 0.0),
     )
 

@@ -1,8 +1,8 @@
 """Reader of the `.lens` text table that several flare tools share.
 
-The header's comment holds title, patent and f-number; then `name:`, `focal_length:` and, after `surfaces:`, one row a line:
-radius (0 or inf is flat, `stop` is the stop), thickness, n_d and V_d of what follows (1 and 0 for air), aperture, number
-of coating layers. This reader takes the table as it stands; `optics.repair` judges it.
+The header's comment holds title, patent and f-number; then `name:`, `focal_length:` and, after `surfaces:`, one row a
+line: radius (0 or inf is flat, `stop` is the stop), thickness, n_d and V_d of what follows (1 and 0 for air), aperture,
+number of coating layers. This reader takes the table as it stands; `optics.repair` judges it.
 """
 
 from __future__ import annotations
