@@ -1,0 +1,164 @@
+"""Writing a project as TOML: exact for the machine, and with comments that teach for a person."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+from typing import Any, cast
+
+from ..errors import ProjectError
+from ..model import project as choices
+from ..model.project import CoatingChoice, Project
+from .coating_text import UNCOATED, format_coating
+from .spectrum_text import spectrum_text
+
+LENS_SUFFIXES = (".toml", ".lens", ".json", ".zmx", ".seq")
+"""What ends like this is a lens file; any other word without a slash is a shipped lens' name."""
+
+ABOUT = {
+    "lens": "a shipped lens (`flarewright lenses`), or a lens file beside this project",
+    "f_number": "2.8   # left out: wide open",
+    "coating": '"lens", "none", "preset:NAME", "quarter-wave:NM" or a file, on every glass-air surface',
+    "iris": "left out: the lens file's blades",
+    "iris.blades": "0 is round",
+    "iris.mask": '"iris.png"   # an image instead of blades, white transmits',
+    "lights.field_deg": "degrees right and up in the picture",
+    "lights.intensity": "irradiance on a plane that faces the light",
+    "lights.spectrum": '"d65", "equal-energy", "black-body:3200", "lines:589.0,589.6" or "lamp.csv"',
+    "camera.sensor_mm": "[36.0, 20.25]   # left out: 36 mm wide, square pixels",
+    "camera.sensor_distance": "80.0   # last vertex to sensor, mm; left out: the paraxial focus",
+    "camera.focus_distance": "2000.0   # mm in front of the first vertex; left out: infinity",
+    "quality.mode": '"draft": paraxial matrices, "final": traced ray bundles',
+    "quality.wavelengths": "3 for a draft of the colours, 7 to 31 for final pictures",
+    "quality.paths": '"all" or "same-side" of the stop',
+    "output.layers": '"beauty", "passes" or "ghosts" (one layer a ghost)',
+    "output.brightest": "20   # of the single ghosts only so many",
+    "output.colorspace": '"rec709" or "acescg", linear',
+    "output.pixel_type": '"half" or "float"',
+}
+
+
+def project_text(project: Project, *, folder: Path | None = None, comments: bool = False) -> str:
+    """Return a project as TOML that `read_project` reads back to the same project.
+
+    Parameters
+    ----------
+    project : Project
+    folder : path, optional
+        The folder that the text will lie in: files are named relative to it. None keeps paths as they are.
+    comments : bool
+        Teach: a comment beside the keys, and the keys that are left out as comments.
+
+    Returns
+    -------
+    str
+    """
+    data = cast(dict[str, Any], _without_none(project.model_dump(mode="json")))
+    if folder is not None:
+        _make_relative(data, folder)
+    data["coating"] = _short_coating(project.coating)
+    for written, light in zip(data["lights"], project.lights, strict=True):
+        written["spectrum"] = spectrum_text(light.spectrum) or written["spectrum"]
+    nothing = _left_out(project) if comments else {}
+    out: list[str] = []
+    _emit_table(out, data, (), nothing, ABOUT if comments else {})
+    return "\n".join(out).strip() + "\n"
+
+
+def _make_relative(data: dict[str, Any], folder: Path) -> None:
+    def relative(name: str) -> str:
+        return Path(os.path.relpath(name, folder)).as_posix() if not Path(name).is_absolute() else name
+
+    if isinstance(data["lens"], str) and lens_location(data["lens"], Path("x")) != data["lens"]:
+        data["lens"] = relative(data["lens"])
+        if "/" not in data["lens"] and not data["lens"].lower().endswith(LENS_SUFFIXES):
+            data["lens"] = f"./{data['lens']}"
+    if data.get("iris", {}).get("mask"):
+        data["iris"]["mask"] = relative(data["iris"]["mask"])
+
+
+def _short_coating(choice: CoatingChoice) -> str | dict[str, Any]:
+    match choice:
+        case choices.AsLens():
+            return "lens"
+        case choices.Preset():
+            return f"preset:{choice.name}"
+        case choices.Everywhere():
+            return format_coating(choice.coating)
+        case choices.PerRow():
+            texts = [UNCOATED if item is None else format_coating(item) for item in choice.coatings]
+            return {"kind": "per-row", "coatings": texts}
+
+
+def _without_none(value: Any) -> Any:
+    """TOML has no null: leave such keys out; inside a list of coatings, "-" stands for it."""
+    if isinstance(value, dict):
+        return {key: _without_none(item) for key, item in value.items() if item is not None}
+    if isinstance(value, list):
+        return [UNCOATED if item is None else _without_none(item) for item in value]
+    return value
+
+
+def _left_out(project: Project) -> dict[tuple[str, ...], list[str]]:
+    """Return by section the keys whose value is None and which are worth a commented line."""
+    found: dict[tuple[str, ...], list[str]] = {}
+    for section, record in (("", project), ("camera", project.camera), ("output", project.output)):
+        for name in type(record).model_fields:
+            if getattr(record, name) is None and f"{section}.{name}".strip(".") in ABOUT:
+                found.setdefault((section,) if section else (), []).append(name)
+    return found
+
+
+def _emit_table(
+    out: list[str],
+    table: dict[str, Any],
+    path: tuple[str, ...],
+    left_out: dict[tuple[str, ...], list[str]],
+    about: dict[str, str],
+) -> None:
+    """Append a table's own keys, then its sub-tables under their headings."""
+    below: list[tuple[str, Any]] = []
+    for key, value in table.items():
+        if isinstance(value, dict) or (
+            isinstance(value, list) and value and all(isinstance(item, dict) for item in value)
+        ):
+            below.append((key, value))
+            continue
+        note = about.get(".".join((*path, key)))
+        out.append(f"{_key(key)} = {_value(value)}" + (f"   # {note}" if note else ""))
+    for key in left_out.get(path, ()):
+        if key != "iris":
+            out.append(f"# {key} = {about['.'.join((*path, key))]}")
+    for key, value in below:
+        heading = ".".join(_key(part) for part in (*path, key))
+        for item in value if isinstance(value, list) else [value]:
+            out.extend(["", f"[[{heading}]]" if isinstance(value, list) else f"[{heading}]"])
+            _emit_table(out, item, (*path, key), left_out, about)
+
+
+def _key(key: str) -> str:
+    plain = key.replace("-", "").replace("_", "")
+    return key if plain.isalnum() and plain.isascii() else _value(key)
+
+
+def _value(value: Any) -> str:
+    match value:
+        case bool():
+            return "true" if value else "false"
+        case str():
+            # JSON's string escapes are TOML's, except for DEL, which TOML wants escaped.
+            return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+        case int() | float():
+            return repr(value)
+        case list():
+            return "[" + ", ".join(_value(item) for item in value) + "]"
+        case dict():
+            return "{ " + ", ".join(f"{_key(key)} = {_value(item)}" for key, item in value.items()) + " }"
+    raise ProjectError(f"a project cannot hold {value!r}")
+
+
+def lens_location(name: str, folder: Path) -> str:
+    """Return a shipped lens' name as it is, and a file's name as a path from the working folder."""
+    is_file = name.lower().endswith(LENS_SUFFIXES) or "/" in name or "\\" in name
+    return str(folder / name) if is_file else name
