@@ -224,6 +224,7 @@ def reflectance_table(
     table serves both directions; from the denser side a ray beyond the critical angle has R = 1. R is smooth in
     this cosine: linear interpolation in 1025 entries errs by less than 1e-5 of R without or with one film on steps of
     index above 0.2, 5e-5 with two films; it stays below 1e-5 absolute where films bring R near 0.
+    Cemented steps rise steeply towards grazing only: 1e-4 absolute at a step of 0.02.
     """
     if samples < 2:
         raise ValueError(f"a reflectance table needs at least 2 samples, not {samples}")

@@ -1,0 +1,184 @@
+"""The opening at the stop: blades as implicit curves, its outline, and its antialiased transmission.
+
+Coordinates are those of the stop plane seen from behind the camera: x to the right, y up. Every opening made of blades
+has the area of the round one, pi h^2, h the semi-diameter of the stop.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from flarewright.model.iris import Iris
+
+Floats = NDArray[np.float64]
+
+__all__ = ["blade_edges", "outline", "transmission"]
+
+
+def blade_edges(iris: Iris, semi_diameter: float) -> Floats:
+    """Borders of the opening as implicit functions.
+
+    Parameters
+    ----------
+    iris : Iris
+        A mask image is not looked at: its blades are what this lists.
+    semi_diameter : float
+        Semi-diameter h of the round opening of the same area, mm.
+
+    Returns
+    -------
+    ndarray of float64, shape (B, 4)
+        Rows (nx, ny, offset, curvature), one a blade, one for a round opening. With q = p - offset n, the point p is
+        inside where f = n.q + curvature/2 |q|^2 <= 0 for every row. |grad f| = 1 on the border, so f is the signed
+        distance near it. Curvature 0 is a straight blade.
+
+    Raises
+    ------
+    ValueError
+        When the semi-diameter is not positive.
+
+    Notes
+    -----
+    The first edge faces up (+y), the others follow counter-clockwise. `rounding` r bends every blade to the radius
+    offset / r, so r = 1 is exactly the circle. The scale follows from the closed area of the polygon of arcs.
+    """
+    if not semi_diameter > 0.0:
+        raise ValueError(f"the stop's semi-diameter must be positive, not {semi_diameter}")
+    if iris.blades == 0 or iris.rounding == 1.0:
+        return np.array([[0.0, 1.0, semi_diameter, 1.0 / semi_diameter]])
+    offset = semi_diameter * math.sqrt(math.pi / _area_of_unit_apothem(iris.blades, iris.rounding))
+    angle = math.pi / 2 + math.radians(iris.rotation_deg) + 2.0 * math.pi * np.arange(iris.blades) / iris.blades
+    edges = np.empty((iris.blades, 4))
+    edges[:, 0], edges[:, 1] = np.cos(angle), np.sin(angle)
+    edges[:, 2] = offset
+    edges[:, 3] = iris.rounding / offset
+    return edges
+
+
+def outline(iris: Iris, semi_diameter: float, points: int = 180) -> Floats:
+    """Border of the opening as a closed polyline, counter-clockwise.
+
+    Parameters
+    ----------
+    iris : Iris
+    semi_diameter : float
+        As in `blade_edges`, mm.
+    points : int
+        Number of points wanted; each blade gets an equal share, corners included, so there may be a few more.
+
+    Returns
+    -------
+    ndarray of float64, shape (P, 2)
+        Points on the border; the last one joins the first.
+
+    Raises
+    ------
+    ValueError
+        When fewer than 3 points are asked for.
+    """
+    if points < 3:
+        raise ValueError(f"an outline needs at least 3 points, not {points}")
+    edges = blade_edges(iris, semi_diameter)
+    if len(edges) == 1:
+        turn = 2.0 * np.pi * np.arange(points) / points
+        circle: Floats = semi_diameter * np.stack([np.cos(turn), np.sin(turn)], axis=1)
+        return circle
+    B = len(edges)
+    each = -(-points // B)
+    half = math.pi / B
+    # Equal steps of the polar angle, from one corner to just before the next.
+    theta = half * (2.0 * np.arange(each) / each - 1.0)
+    radius = edges[0, 2] * _ray_length(np.cos(theta), float(edges[0, 3] * edges[0, 2]))
+    turn = np.arctan2(edges[:, 1], edges[:, 0])[:, None] + theta
+    line: Floats = (radius[:, None] * np.stack([np.cos(turn), np.sin(turn)], axis=-1)).reshape(-1, 2)
+    return line
+
+
+def transmission(
+    iris: Iris,
+    semi_diameter: float,
+    x: ArrayLike,
+    y: ArrayLike,
+    *,
+    footprint: float = 0.0,
+    mask: NDArray[np.floating] | None = None,
+) -> Floats:
+    """Share of the light that passes the stop at some points, antialiased.
+
+    Parameters
+    ----------
+    iris : Iris
+    semi_diameter : float
+        Semi-diameter of the round opening, mm.
+    x, y : array_like
+        Points in the stop plane, mm; they broadcast.
+    footprint : float
+        Width of the area that a point stands for, mm: borders are ramps of this width along their normal. 0 is a hard
+        border. Not used with a mask, whose own pixels are interpolated linearly.
+    mask : ndarray, shape (rows, columns), or None
+        Grey image, 1 transmits, row 0 at the top; it spans the square around the round opening and is dark outside.
+        `rotation_deg` turns it as it turns blades.
+
+    Returns
+    -------
+    ndarray of float64
+        Transmitted share, 0 to 1 for a mask within 0 to 1.
+    """
+    px, py = np.broadcast_arrays(np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64))
+    if mask is not None:
+        return _look_up(mask, iris.rotation_deg, px / semi_diameter, py / semi_diameter)
+    worst = np.full(px.shape, -np.inf)
+    for nx, ny, offset, curvature in blade_edges(iris, semi_diameter):
+        qx, qy = px - offset * nx, py - offset * ny
+        worst = np.maximum(worst, nx * qx + ny * qy + 0.5 * curvature * (qx * qx + qy * qy))
+    if footprint <= 0.0:
+        return np.where(worst <= 0.0, 1.0, 0.0)
+    return np.clip(0.5 - worst / footprint, 0.0, 1.0)
+
+
+def _ray_length(cosine: Floats | float, k: float) -> Floats:
+    """Distance from the centre to the border of an arc of curvature k at apothem 1, `cosine` away from its normal.
+
+    The positive root of k/2 rho^2 + (1 - k) cos rho - (1 - k/2) = 0, written so that k = 0 is no special case.
+    """
+    b = (1.0 - k) * np.asarray(cosine, dtype=np.float64)
+    length: Floats = (2.0 - k) / (b + np.sqrt(b * b + k * (2.0 - k)))
+    return length
+
+
+def _area_of_unit_apothem(blades: int, k: float) -> float:
+    """Area of a regular polygon of arcs of curvature k whose edges are 1 from the centre."""
+    alpha = math.pi / blades
+    rho = float(_ray_length(math.cos(alpha), k))
+    chord = rho * math.sin(alpha)  # half of it
+    beta = math.asin(k * chord)
+    triangle = chord * rho * math.cos(alpha)
+    x = 2.0 * beta
+    # Circular segment over the squared half chord, (x - sin x) / (2 sin^2 beta); a series where that cancels.
+    if x < 0.1:
+        share = x / 3 * (1 - x**2 / 20 * (1 - x**2 / 42 * (1 - x**2 / 72))) / float(np.sinc(beta / math.pi)) ** 2
+    else:
+        share = (x - math.sin(x)) / (2.0 * math.sin(beta) ** 2)
+    segment = chord**2 * share
+    return blades * (triangle + segment)
+
+
+def _look_up(mask: NDArray[np.floating], rotation_deg: float, x: Floats, y: Floats) -> Floats:
+    """Bilinear value of an image that spans [-1, 1]^2, row 0 at y = 1; dark outside."""
+    turn = math.radians(rotation_deg)
+    c, s = math.cos(turn), math.sin(turn)
+    rows, columns = mask.shape
+    # One dark pixel all around lets the interpolation fade at the image's border.
+    padded = np.pad(np.asarray(mask, dtype=np.float64), 1)
+    u = np.clip(0.5 * ((c * x + s * y) + 1.0) * columns + 0.5, 0.0, columns + 1.0)
+    v = np.clip(0.5 * (1.0 - (c * y - s * x)) * rows + 0.5, 0.0, rows + 1.0)
+    i = np.minimum(v.astype(np.intp), rows)
+    j = np.minimum(u.astype(np.intp), columns)
+    fv, fu = v - i, u - j
+    top = (1.0 - fu) * padded[i, j] + fu * padded[i, j + 1]
+    bottom = (1.0 - fu) * padded[i + 1, j] + fu * padded[i + 1, j + 1]
+    value: Floats = (1.0 - fv) * top + fv * bottom
+    return value
