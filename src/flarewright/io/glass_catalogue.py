@@ -114,7 +114,7 @@ def nearest(n_d: float, v_d: float | None = None) -> tuple[CatalogueGlass, float
     n_d : float
         Index at 587.56 nm.
     v_d : float or None
-        Abbe number; None searches by index alone.
+        Abbe number; None takes the middle one of all glasses of that index.
 
     Returns
     -------
@@ -124,6 +124,9 @@ def nearest(n_d: float, v_d: float | None = None) -> tuple[CatalogueGlass, float
     """
     catalogue = _catalogue()
     by_index = np.abs(catalogue.n_d - n_d) / N_D_TOLERANCE
+    if v_d is None and np.any(by_index <= 1.0):
+        # by index alone an exotic glass may come nearest; the middle one errs least
+        v_d = float(np.median(catalogue.v_d[by_index <= 1.0]))
     by_abbe = np.zeros_like(by_index) if v_d is None else np.abs(catalogue.v_d / v_d - 1.0) / V_D_TOLERANCE
     distance = np.maximum(by_index, by_abbe)
     best = int(np.argmin(distance))

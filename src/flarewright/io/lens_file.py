@@ -301,7 +301,8 @@ def _presets(table: object, row_count: int, problems: list[str]) -> dict[str, tu
             continue
         if row_count and len(entries) != row_count:
             problems.append(
-                f"{where} has {count(len(entries), 'entry', 'entries')}, the lens {count(row_count, 'row')}: give one each"
+                f"{where} has {count(len(entries), 'entry', 'entries')}, the lens {count(row_count, 'row')}: "
+                "give one each"
             )
         presets[name] = tuple(_coating(entry, f"{where}, row {k}", problems) for k, entry in enumerate(entries))
     return presets

@@ -129,9 +129,13 @@ def remarks(findings: list[tuple[int, Finding]], place: str = "row") -> tuple[st
     Returns
     -------
     tuple of str
-        All stand-ins in one sentence, one more for each row with something of its own to tell.
+        All stand-ins in one sentence, one more for each thing to tell.
     """
-    told = tuple(f"{place} {number}: {finding.text}" for number, finding in findings if finding.kind == "told")
+    same: dict[str, list[str]] = {}
+    for number, finding in findings:
+        if finding.kind == "told":
+            same.setdefault(finding.text, []).append(str(number))
+    told = tuple(f"{place}{'s' * (len(at) > 1)} {', '.join(at)}: {text}" for text, at in same.items())
     nearest = [f"{place} {number} {finding.text}" for number, finding in findings if finding.kind == "nearest"]
     if not nearest:
         return told
@@ -142,9 +146,7 @@ def _by_numbers(glass: str | None, n_d: float, v_d: float | None) -> tuple[Mediu
     near, distance = glass_catalogue.nearest(n_d, v_d)
     if v_d is None:
         medium = Medium(glass=glass, n_d=n_d, v_d=None, dispersion=near.dispersion)
-        guess = (
-            f"no V_d is given for n_d = {n_d:g}: its dispersion is guessed as that of {near.full_name}, nearest in n_d"
-        )
+        guess = f"no V_d is given for n_d = {n_d:g}: its dispersion is guessed as that of {near.full_name}"
         return medium, Finding("told", guess)
     if distance <= 1.0:
         return Medium(glass=glass, n_d=n_d, v_d=v_d, dispersion=near.dispersion), Finding("nearest", near.full_name)

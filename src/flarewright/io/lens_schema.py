@@ -1,0 +1,154 @@
+"""JSON Schema of our lens file, for editors that complete and check while a person types."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from flarewright.model import Iris
+
+from .coating_text import HELP
+from .lens_fields import CURVATURE, RADIUS, ROW_NUMBERS, TOP_NUMBERS, TOP_TEXTS
+
+_NUMBER = r"([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?"
+_COATING_TEXT = (
+    rf"^(none|bare|-|"
+    rf"quarter-wave:{_NUMBER}([+-]{_NUMBER})?(:(ideal|real|{_NUMBER}))?([+-]{_NUMBER})?|"
+    rf"film:{_NUMBER}:{_NUMBER}|"
+    rf"stack:{_NUMBER}:{_NUMBER}(,{_NUMBER}:{_NUMBER})*)?$"
+)
+
+
+def lens_json_schema() -> dict[str, Any]:
+    """Return the JSON Schema (draft 2020-12) of the TOML lens file.
+
+    Returns
+    -------
+    dict
+        It knows structure, types and limits; what rows must make together (one stop, glass that is known, air behind
+        the last row) only `read_lens` checks.
+    """
+    top: dict[str, Any] = {
+        "schema_version": {"const": 1, "description": "version of this format"},
+        **{key: {"type": "string", "description": about} for key, about in TOP_TEXTS.items()},
+        **{key: field.schema() for key, field in TOP_NUMBERS.items()},
+        "iris": _iris(),
+        "rows": {
+            "type": "array",
+            "minItems": 2,
+            "maxItems": 500,
+            "items": {"anyOf": [{"$ref": "#/$defs/surface"}, {"$ref": "#/$defs/stop"}]},
+            # Exactly one row is the stop.
+            "contains": {"$ref": "#/$defs/stop"},
+            "minContains": 1,
+            "maxContains": 1,
+            "description": "the prescription from front to back",
+        },
+        "coating_presets": {
+            "type": "object",
+            "additionalProperties": {"type": "array", "items": {"$ref": "#/$defs/coating"}},
+            "description": 'named sets of coatings, one entry for each row ("-" for none, the stop for example)',
+        },
+    }
+    top["name"]["minLength"] = 1
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "Flarewright lens file",
+        "type": "object",
+        "required": ["schema_version", "name", "f_number", "rows"],
+        "additionalProperties": False,
+        "properties": top,
+        "$defs": {"surface": _surface(), "stop": _stop(), "coating": _coating()},
+    }
+
+
+def _surface() -> dict[str, Any]:
+    radius = RADIUS.schema()
+    return {
+        "type": "object",
+        "description": "a refracting surface and the gap behind it; without glass and n_d the gap is air",
+        "additionalProperties": False,
+        "properties": {
+            "radius": {
+                "description": radius.pop("description"),
+                "anyOf": [{**radius, "not": {"const": 0}}, {"const": "flat"}],
+            },
+            "curvature": CURVATURE.schema(),
+            **{key: field.schema() for key, field in ROW_NUMBERS.items()},
+            "glass": {"type": "string", "minLength": 1, "description": 'catalogue name, "N-BK7" or "SCHOTT N-BK7"'},
+            "semi_diameter_estimated": {"type": "boolean", "description": "true: not from the prescription"},
+            "coating": {"$ref": "#/$defs/coating"},
+            "stop": {"const": False},
+        },
+        "oneOf": [{"required": ["radius"]}, {"required": ["curvature"]}],
+        # An Abbe number alone is no glass.
+        "if": {"required": ["v_d"]},
+        "then": {"anyOf": [{"required": ["n_d"]}, {"required": ["glass"]}]},
+    }
+
+
+def _stop() -> dict[str, Any]:
+    return {
+        "type": "object",
+        "description": "the stop: a plane that bends nothing; its opening follows from f_number",
+        "additionalProperties": False,
+        "required": ["stop"],
+        "properties": {"stop": {"const": True}, "thickness": ROW_NUMBERS["thickness"].schema()},
+    }
+
+
+def _coating() -> dict[str, Any]:
+    index = {"type": "number", "minimum": 1, "maximum": 4}
+    thickness = {"type": "number", "minimum": 0, "maximum": 20000}
+    film = {"kind": {"const": "film"}, "index": index, "thickness_nm": thickness}
+    return {
+        "description": HELP,
+        "anyOf": [
+            {"type": "string", "pattern": _COATING_TEXT},
+            {
+                "type": "object",
+                "additionalProperties": False,
+                "required": ["kind"],
+                "properties": {"kind": {"const": "none"}},
+            },
+            {
+                "type": "object",
+                "additionalProperties": False,
+                "required": ["kind", "center_wavelength_nm"],
+                "properties": {
+                    "kind": {"const": "quarter-wave"},
+                    "center_wavelength_nm": {"type": "number", "minimum": 100, "maximum": 3000},
+                    "index": {"anyOf": [{"enum": ["real", "ideal"]}, index]},
+                    "thickness_offset_nm": {"type": "number", "minimum": -1000, "maximum": 5000},
+                },
+            },
+            _table(film, ["kind", "index", "thickness_nm"]),
+            _table(
+                {
+                    "kind": {"const": "stack"},
+                    "layers": {
+                        "type": "array",
+                        "minItems": 1,
+                        "maxItems": 200,
+                        "items": _table(film, ["index", "thickness_nm"]),
+                    },
+                },
+                ["kind", "layers"],
+            ),
+        ],
+    }
+
+
+def _table(properties: dict[str, Any], required: list[str]) -> dict[str, Any]:
+    return {"type": "object", "additionalProperties": False, "required": required, "properties": properties}
+
+
+def _iris() -> dict[str, Any]:
+    schema = Iris.model_json_schema()
+    properties = {
+        key: {name: value for name, value in field.items() if name not in ("title", "default")}
+        for key, field in schema["properties"].items()
+    }
+    # TOML has no null: a key that is not wanted is left out.
+    properties["mask"] = {"type": "string"}
+    properties["blades"]["not"] = {"enum": [1, 2]}
+    return {"type": "object", "additionalProperties": False, "properties": properties, "description": "default blades"}

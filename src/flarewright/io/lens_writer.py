@@ -1,0 +1,120 @@
+"""Write a lens in our own TOML format, as a person would: one row a line, radii as they were meant."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from flarewright.model import Coating, Lens, Row, Stop
+from flarewright.model.iris import Iris
+
+from .atomic import write_atomically
+from .coating_text import UNCOATED, format_coating
+from .lens_fields import TOP_NUMBERS, TOP_TEXTS
+
+
+def write_lens(lens: Lens, path: str | Path) -> None:
+    """Write a lens file that `read_lens` reads back as the same lens.
+
+    Parameters
+    ----------
+    lens : Lens
+    path : str or Path
+
+    Raises
+    ------
+    OutputError
+        The file cannot be written; nothing is left half-written.
+    """
+    text = format_lens(lens)
+    write_atomically(path, lambda temporary: _write(temporary, text))
+
+
+def format_lens(lens: Lens) -> str:
+    """Return the text of a lens file.
+
+    Parameters
+    ----------
+    lens : Lens
+
+    Returns
+    -------
+    str
+        TOML. The dispersion of a medium is not written: it follows from glass, n_d and V_d when the file is read.
+    """
+    lines = [f"schema_version = {lens.schema_version}"]
+    lines += [f"{key} = {_text(getattr(lens, key))}" for key in TOP_TEXTS if getattr(lens, key) or key == "name"]
+    lines += [f"{key} = {_number(getattr(lens, key))}" for key in TOP_NUMBERS if getattr(lens, key) is not None]
+    lines += ["", "rows = [", *(f"  {{ {_row(row)} }}," for row in lens.rows), "]"]
+    if lens.iris != Iris():
+        lines += ["", "[iris]", *(f"{key} = {_value(value)}" for key, value in lens.iris if value is not None)]
+    if lens.coating_presets:
+        lines += ["", "[coating_presets]"]
+        lines += [f"{_quoted(name)} = [{', '.join(map(_coating, c))}]" for name, c in lens.coating_presets.items()]
+    return "\n".join(lines) + "\n"
+
+
+def _row(row: Row) -> str:
+    if isinstance(row, Stop):
+        return f"stop = true, thickness = {_number(row.thickness)}"
+    parts = [_radius(row.curvature)]
+    if row.conic:
+        parts.append(f"conic = {_number(row.conic)}")
+    parts.append(f"thickness = {_number(row.thickness)}")
+    if row.medium is not None:
+        if row.medium.glass is not None:
+            parts.append(f"glass = {_quoted(row.medium.glass)}")
+        parts.append(f"n_d = {_number(row.medium.n_d)}")
+        if row.medium.v_d is not None:
+            parts.append(f"v_d = {_number(row.medium.v_d)}")
+    if row.semi_diameter is not None:
+        parts.append(f"semi_diameter = {_number(row.semi_diameter)}")
+    if row.semi_diameter_estimated:
+        parts.append("semi_diameter_estimated = true")
+    if row.coating is not None:
+        parts.append(f"coating = {_coating(row.coating)}")
+    return ", ".join(parts)
+
+
+def _radius(curvature: float) -> str:
+    """Write the shortest radius that gives exactly this curvature again, or the curvature itself where none does."""
+    if curvature == 0.0:
+        return 'radius = "flat"'
+    radius = 1.0 / curvature
+    for digits in range(1, 18):
+        text = f"{radius:.{digits}g}"
+        if abs(radius) < 1e9 and 1.0 / float(text) == curvature:
+            return f"radius = {_number(float(text))}"
+    return f"curvature = {_number(curvature)}"
+
+
+def _coating(coating: Coating | None) -> str:
+    return f'"{UNCOATED if coating is None else format_coating(coating)}"'
+
+
+def _value(value: object) -> str:
+    return _quoted(value) if isinstance(value, str) else _number(value)  # type: ignore[arg-type]
+
+
+def _number(value: float) -> str:
+    if isinstance(value, int):
+        return str(value)
+    # Whole numbers are easier to read without a point, small and large ones with an exponent.
+    return str(int(value)) if value == int(value) and 0.0 < abs(value) < 1e6 else repr(value)
+
+
+def _text(text: str) -> str:
+    """Quote a text; several lines stay several lines."""
+    if "\n" not in text:
+        return _quoted(text)
+    inner = "\n".join(_quoted(line)[1:-1] for line in text.split("\n"))
+    return f'"""\n{inner}"""'
+
+
+def _quoted(text: str) -> str:
+    # JSON's escapes are TOML's, but for the delete character.
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
+
+
+def _write(path: Path, text: str) -> None:
+    path.write_text(text, encoding="utf-8", newline="\n")

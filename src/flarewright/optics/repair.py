@@ -1,0 +1,377 @@
+"""Judge a foreign prescription: repair what can be repaired, tell every repair, refuse what is no camera lens.
+
+The faults are those that a large public collection of `.lens` tables is known for: apertures as diameters, missing
+stops, wrong focal lengths and image planes, inverted coating marks, dropped aspheric terms, and converters and mirrors
+among the lenses.
+"""
+
+from __future__ import annotations
+
+import re
+from math import isfinite, sqrt
+from typing import Literal
+
+import numpy as np
+
+from ..errors import LensError
+from ..model import Coating, Lens, QuarterWave, Row, Stop, Surface
+from ..model.raw_lens import LensReading, RawLens, RawRow
+from .paraxial import FirstOrder, first_order, path_matrices
+from .paths import direct_path
+from .trace import trace_polylines
+
+Apertures = Literal["auto", "diameters", "semi-diameters"]
+
+# where a mark says "coated" and nothing else, the middle of the visible
+COATED_NM = 550.0
+# what is worth telling: relative error of the focal length, distance of the stated image from the focus in mm
+FOCAL_LENGTH_OFF = 0.02
+IMAGE_OFF = 1.0
+# how far the f-number from the stop column may be off before it is told (headers round to one decimal)
+STOP_OFF = 0.15
+# rms radius of the axial image at its best focus that spheres alone do not exceed in a photographic lens (Biotar
+# f/1.4: 0.027 mm, Tessar 100 mm f/4.5: 0.021 mm), mm
+AXIAL_BLUR = 0.03
+# thickest resin layer of a moulded asphere, mm, and the indices of such resins
+RESIN = 0.3
+RESIN_INDEX = (1.48, 1.57)
+# part of the axial beam's radius that a rim may cut unnoticed
+RIM_CUT = 0.02
+# a focal length this many times the length of the glass is none
+AFOCAL = 200.0
+
+
+def repair(raw: RawLens, apertures: Apertures = "auto") -> LensReading:
+    """Make a lens of a raw table, or refuse it with the reason.
+
+    Parameters
+    ----------
+    raw : RawLens
+    apertures : {"auto", "diameters", "semi-diameters"}
+        What the aperture column holds; "auto" decides by which reading of the stop gives the stated f-number.
+
+    Returns
+    -------
+    LensReading
+        The lens and a remark for every repair, assumption and contradiction.
+
+    Raises
+    ------
+    LensError
+        The table is no camera lens by itself, or is damaged beyond repair.
+    """
+    _refuse(raw)
+    remarks: list[str] = []
+    rows = _without_idle_rows(raw, remarks)
+    name = _full_name(raw, remarks)
+    draft = _draft(raw, rows, name)
+    order = _first_order(raw, draft)
+    per_mm, order, draft = _read_apertures(raw, rows, draft, order, apertures, remarks)
+    faults = _contradictions(raw, rows, order, remarks)
+    if faults > 1 or (faults and abs(_stop_ratio(rows, order) * 2.0 * per_mm - 1.0) > STOP_OFF):
+        remarks.append(
+            "the table contradicts itself in more than one way, so a radius or gap is probably wrong: "
+            "its ghosts are not those of the real lens; compare with the patent"
+        )
+    finished = _finish(rows, draft, per_mm, remarks)
+    _tell_aspheres(raw, rows, finished, order, remarks)
+    _tell_rims(rows, finished, order, remarks)
+    remarks += raw.remarks
+    return LensReading(finished.replace(notes="\n".join((f"Imported from {raw.file}.", *remarks))), tuple(remarks))
+
+
+def _refuse(raw: RawLens) -> None:
+    """Refuse what is no camera lens, with the true reason."""
+    rows = raw.rows
+    stops = [k for k, row in enumerate(rows) if row.stop]
+    if raw.stated_surfaces not in (None, len(rows)):
+        raise LensError(
+            f"{raw.file}: the header counts {raw.stated_surfaces} surfaces, the table has {len(rows)}: rows are missing"
+        )
+
+    # Between surfaces light only runs backwards after a mirror; around a stop a negative gap just moves its plane.
+    for k, row in enumerate(rows[:-1]):
+        if row.thickness < 0.0 and not row.stop and not rows[k + 1].stop:
+            raise LensError(
+                f"{raw.file}: light runs backwards behind line {row.line} (thickness {row.thickness:g}), "
+                "as in a mirror lens: reflecting surfaces are not supported"
+            )
+    if len(rows) - len(stops) < 2 or _index_behind(rows) > 1.0:
+        raise LensError(
+            f"{raw.file}: the table has {len(rows)} row{'s' * (len(rows) != 1)} and ends "
+            f"{'inside glass' if _index_behind(rows) > 1.0 else 'there'}: surfaces are missing, so it is no lens"
+        )
+    _refuse_converters(raw)
+    if len(stops) > 1:
+        lines = ", ".join(str(rows[k].line) for k in stops)
+        raise LensError(f"{raw.file}: lines {lines} are all stops: a lens has one, remove the others")
+    if not stops and raw.f_number is None:
+        raise LensError(
+            f"{raw.file}: it has neither a stop nor an f-number: an attachment (a close-up lens), "
+            "no camera lens by itself"
+        )
+    if not stops:
+        raise LensError(
+            f"{raw.file}: no row is the stop, and where it sits cannot be known: add a row that begins with `stop`"
+        )
+    if stops[0] > 0 and _index_behind(rows[: stops[0]]) > 1.0:
+        raise LensError(
+            f"{raw.file}: line {rows[stops[0]].line}: the stop stands inside glass: move it into an air gap"
+        )
+
+
+def _refuse_converters(raw: RawLens) -> None:
+    """Refuse what has no positive focal length by itself: tele-converters and afocal attachments."""
+    surfaces = [_surface(row) for row in raw.rows if not row.stop]
+    probe = Lens(name="probe", f_number=8.0, rows=(Stop(), *surfaces))
+    _, system = path_matrices(probe, direct_path(probe), 587.56, sum(row.thickness for row in surfaces[:-1]))
+    power = -system[1, 0]
+    length = sum(abs(row.thickness) for row in surfaces[:-1])
+    if abs(power) * AFOCAL * length < 1.0:
+        raise LensError(
+            f"{raw.file}: it is afocal (a conversion lens in front of another lens), no camera lens by itself"
+        )
+    if power < 0.0:
+        raise LensError(
+            f"{raw.file}: its focal length is negative ({1.0 / power:.2f} mm): a tele-converter that works only "
+            "behind another lens"
+        )
+
+
+def _first_order(raw: RawLens, draft: Lens) -> FirstOrder:
+    try:
+        return first_order(draft)
+    except LensError as error:
+        raise LensError(f"{raw.file}: {str(error).removeprefix(f'{draft.name}: ')}") from None
+
+
+def _without_idle_rows(raw: RawLens, remarks: list[str]) -> list[RawRow]:
+    """Drop surfaces with the same medium on both sides and give their gap to the row before."""
+    kept: list[RawRow] = []
+    before = (1.0, 0.0)
+    for row in raw.rows:
+        behind = before if row.stop else (row.n_d, row.v_d if row.n_d > 1.0 else 0.0)
+        if row.stop or behind != before:
+            kept.append(row)
+        else:
+            plane = row.n_d == 1.0 and row.curvature == 0.0
+            what = "a plane in air" if plane else "a surface with the same medium on both sides"
+            remarks.append(f"line {row.line}: {what} neither refracts nor reflects; left out, and its rim with it")
+            if kept:
+                kept[-1] = kept[-1].replace(thickness=kept[-1].thickness + row.thickness)
+        before = behind
+    return kept
+
+
+def _full_name(raw: RawLens, remarks: list[str]) -> str:
+    """Choose the fullest of the name line, the header's title and the file name's parenthesis."""
+    inner = re.search(r"\((.*)\)", raw.file)
+    in_file = inner[1].lstrip("(").replace("_", " ") if inner else ""
+    name = raw.name or raw.title or in_file or raw.file.removesuffix(".lens").replace("_", " ")
+    for candidate in (raw.title, in_file):
+        if len(_letters(candidate)) > len(_letters(name)) and _letters(candidate).startswith(_letters(name)):
+            remarks.append(f"the name {name!r} is cut short; taken as {candidate!r}")
+            name = candidate
+    stated = re.search(r"_[Ff](\d+(?:\.\d+)?)", re.sub(r"\(.*", "", raw.file))
+    if stated and raw.f_number and abs(float(stated[1]) / raw.f_number - 1.0) > 0.06:
+        remarks.append(f"the file name says f/{stated[1]}, the header f/{raw.f_number:g}; the header holds")
+    return name
+
+
+def _letters(text: str) -> str:
+    return re.sub(r"\W+", "", text).lower()
+
+
+def _draft(raw: RawLens, rows: list[RawRow], name: str) -> Lens:
+    """Make the lens without apertures, enough for its first-order properties."""
+    lens_rows: list[Row] = [Stop(thickness=row.thickness) if row.stop else _surface(row) for row in rows]
+    patent = f"patent {raw.patent}; " if raw.patent else ""
+    return Lens(
+        name=name,
+        source=f"{patent}from a .lens table",
+        f_number=raw.f_number or 8.0,
+        stated_focal_length=raw.focal_length if raw.focal_length and raw.focal_length > 0.0 else None,
+        rows=tuple(lens_rows),
+    )
+
+
+def _surface(row: RawRow) -> Surface:
+    return Surface(curvature=row.curvature, thickness=row.thickness, medium=row.medium)
+
+
+def _index_behind(rows: tuple[RawRow, ...]) -> float:
+    return next((row.n_d for row in reversed(rows) if not row.stop), 1.0)
+
+
+def _stop_ratio(rows: list[RawRow], order: FirstOrder) -> float:
+    """Stop column over the stop's diameter at the f-number: 1 for diameters, 0.5 for semi-diameters, 0 unknown."""
+    return next(row.aperture for row in rows if row.stop) / order.stop_semi_diameter / 2.0
+
+
+def _read_apertures(
+    raw: RawLens, rows: list[RawRow], draft: Lens, order: FirstOrder, apertures: Apertures, remarks: list[str]
+) -> tuple[float, FirstOrder, Lens]:
+    """Decide what the aperture column holds; return semi-diameter per column value, and the lens with its f-number."""
+    ratio = _stop_ratio(rows, order)
+    if raw.f_number is None:
+        per_mm = 1.0 if apertures == "semi-diameters" else 0.5
+        if ratio <= 0.0:
+            raise LensError(
+                f"{raw.file}: neither the header nor the stop's aperture tells the f-number: add f/... to it"
+            )
+        number = draft.f_number / (2.0 * ratio * per_mm)
+        draft = draft.replace(f_number=number)
+        column = ratio * 2.0 * order.stop_semi_diameter
+        remarks.append(f"no f-number is stated; the stop of {column:g} mm gives f/{number:.2f}")
+        order = first_order(draft)
+        if apertures == "auto":
+            remarks.append("the aperture column is read as diameters, as in nearly all files of this kind")
+        return per_mm, order, draft
+    if apertures != "auto":
+        remarks.append(f"the aperture column is read as {apertures}, as asked")
+        return (0.5 if apertures == "diameters" else 1.0), order, draft
+    if ratio <= 0.0:
+        remarks.append("the stop has no aperture; the column is read as diameters, as in nearly all files of this kind")
+        return 0.5, order, draft
+    as_diameter, as_radius = raw.f_number / ratio, raw.f_number / (2.0 * ratio)
+    diameters = abs(np.log(as_diameter / raw.f_number)) <= abs(np.log(as_radius / raw.f_number))
+    kind, per_mm, best = ("diameters", 0.5, as_diameter) if diameters else ("semi-diameters", 1.0, as_radius)
+    why = f"the stop then gives f/{best:.2f}, the header says f/{raw.f_number:g}"
+    if abs(best / raw.f_number - 1.0) > STOP_OFF:
+        why += ", so neither reading fits; the stop follows the header"
+    remarks.append(f"the aperture column is read as {kind}: {why}")
+    return per_mm, order, draft
+
+
+def _contradictions(raw: RawLens, rows: list[RawRow], order: FirstOrder, remarks: list[str]) -> int:
+    """Tell where the header and the last gap disagree with the traced lens; return how many do."""
+    found = 0
+    if raw.focal_length and abs(order.efl / raw.focal_length - 1.0) > FOCAL_LENGTH_OFF:
+        off = 100.0 * (order.efl / raw.focal_length - 1.0)
+        remarks.append(f"the focal length is {order.efl:.2f} mm, not {raw.focal_length:g} as stated ({off:+.1f} %)")
+        found += 1
+    image = rows[-1].thickness
+    if abs(image - order.bfl) > IMAGE_OFF:
+        remarks.append(
+            f"the stated image plane ({image:.2f} mm behind the last row) is {image - order.bfl:+.2f} mm from the "
+            f"paraxial focus ({order.bfl:.2f}); the sensor is placed at the focus"
+        )
+        found += 1
+    return found
+
+
+def _finish(rows: list[RawRow], draft: Lens, per_mm: float, remarks: list[str]) -> Lens:
+    """Give every surface its rim and coating."""
+    coatings = _coatings(rows, remarks)
+    finished: list[Row] = []
+    for row, drafted, coating in zip(rows, draft.rows, coatings, strict=True):
+        if not isinstance(drafted, Surface):
+            finished.append(drafted)
+            continue
+        semi: float | None = row.aperture * per_mm
+        if not semi:
+            remarks.append(f"line {row.line}: no aperture is given; it will be estimated")
+            semi = None
+        elif semi * abs(row.curvature) > 1.0:
+            remarks.append(
+                f"line {row.line}: a rim of {semi:g} mm does not fit a radius of {1 / row.curvature:g}; "
+                "it will be estimated"
+            )
+            semi = None
+        finished.append(drafted.replace(semi_diameter=semi, coating=coating))
+    return Lens.model_validate({**dict(draft), "rows": tuple(finished)})
+
+
+def _coatings(rows: list[RawRow], remarks: list[str]) -> list[Coating | None]:
+    """Turn marks of coating layers into coatings, unless they were made by a rule that knows nothing of coatings."""
+    surfaces = [row for row in rows if not row.stop]
+    marked = [row.coating_layers > 0 for row in surfaces]
+    none: list[Coating | None] = [None] * len(rows)
+    if not any(marked):
+        remarks.append("no surface is marked as coated; all are bare")
+        return none
+    if marked == [row.n_d > 1.0 for row in surfaces]:
+        remarks.append(
+            "coating marks dropped: they repeat the index column (every glass-to-air surface uncoated, "
+            "every cemented one coated); all surfaces are bare until a coating is chosen"
+        )
+        return none
+    coatings: list[Coating | None] = []
+    before = 1.0
+    for row in rows:
+        outer = not row.stop and (before == 1.0) != (row.n_d == 1.0)
+        coatings.append(QuarterWave(center_wavelength_nm=COATED_NM) if outer and row.coating_layers else None)
+        before = before if row.stop else row.n_d
+    remarks.append(
+        f"coating layers are only counted, not described; a quarter wave at {COATED_NM:g} nm stands for them"
+    )
+    return coatings
+
+
+def _tell_aspheres(raw: RawLens, rows: list[RawRow], lens: Lens, order: FirstOrder, remarks: list[str]) -> None:
+    """Tell when the real lens has aspheres that the table, which holds only spheres, has lost."""
+    signs: list[str] = []
+    if re.search(r"\basph", f"{lens.name} {raw.title} {raw.file}".replace("_", " "), re.IGNORECASE):
+        signs.append("the name says aspherical")
+    if resins := [str(row.line) for row in _resin_layers(rows)]:
+        lines = f"line{'s' * (len(resins) > 1)} {', '.join(resins)}"
+        signs.append(f"{lines}: a thin resin layer against air is a moulded asphere")
+    blur = _axial_blur(lens, order)
+    if not isfinite(blur):
+        signs.append("with spheres alone, rays of the axial beam do not reach the sensor")
+    elif blur > AXIAL_BLUR:
+        signs.append(
+            f"with spheres alone the axial spot wide open is {blur:.2g} mm rms at best focus, "
+            f"a finished lens stays below {AXIAL_BLUR:g}"
+        )
+    if signs:
+        remarks.append(
+            f"aspheric (or diffractive) terms were dropped from the table ({'; '.join(signs)}): "
+            "every surface is traced as a sphere, so image and ghosts only approximate the real lens"
+        )
+
+
+def _resin_layers(rows: list[RawRow]) -> list[RawRow]:
+    """Find layers on glass, thin and of plastic index, that have air on one side."""
+    low, high = RESIN_INDEX
+    found = []
+    for k, row in enumerate(rows[:-1]):
+        front = 1.0 if k == 0 or rows[k - 1].stop else rows[k - 1].n_d
+        against_air = (front == 1.0) != (rows[k + 1].n_d == 1.0)
+        if not row.stop and low <= row.n_d <= high and row.thickness <= RESIN and against_air:
+            found.append(row)
+    return found
+
+
+def _axial_blur(lens: Lens, order: FirstOrder, rays: int = 64) -> float:
+    """Return the rms radius of the axial image at best focus, mm, wide open without rims; infinite if rays end."""
+    y = (np.arange(rays) + 0.5) / rays * order.entrance_pupil_diameter / 2.0
+    hits = trace_polylines(lens, None, np.zeros_like(y), y, 0.0, sensor_distance=order.bfl)
+    at_sensor, leaving = hits[:, -1], hits[:, -2]
+    if not np.all(np.isfinite(at_sensor)):
+        return float("inf")
+    slope = (at_sensor[:, 1] - leaving[:, 1]) / (at_sensor[:, 2] - leaving[:, 2])
+
+    # Rings of equal width carry flux in proportion to their radius; the best focus is a weighted line fit.
+    weight = y / y.sum()
+    shift = -float((weight * at_sensor[:, 1] * slope).sum() / (weight * slope * slope).sum())
+    return sqrt(float((weight * (at_sensor[:, 1] + shift * slope) ** 2).sum()))
+
+
+def _tell_rims(rows: list[RawRow], lens: Lens, order: FirstOrder, remarks: list[str]) -> None:
+    """Tell when a rim cuts the axial beam, so that the lens is slower than stated."""
+    y = np.linspace(0.02, 1.0, 50) * order.entrance_pupil_diameter / 2.0
+    hits = trace_polylines(lens, None, np.zeros_like(y), y, 0.0, sensor_distance=order.bfl)
+    tightest, where = 1.0, 0
+    for k, row in enumerate(lens.rows):
+        if not isinstance(row, Surface) or row.semi_diameter is None:
+            continue
+        through = np.abs(hits[:, 1 + k, 1]) <= row.semi_diameter
+        free = float(y[through].max(initial=0.0) / y[-1]) if not through.all() else 1.0
+        if free < tightest:
+            tightest, where = free, rows[k].line
+    if tightest < 1.0 - RIM_CUT:
+        remarks.append(
+            f"line {where}: its rim cuts the axial beam: the lens passes f/{lens.f_number / tightest:.2f}, "
+            f"not f/{lens.f_number:g}"
+        )
