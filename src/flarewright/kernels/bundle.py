@@ -15,6 +15,7 @@ from .clip import (
     cut_to_rectangle,
     polygon_area,
 )
+from .mask import fill_through_mask, mask_value
 from .raster import fill_polygon, splat_line
 from .trace import ALIVE, WEIGHT, X, Y
 
@@ -62,7 +63,10 @@ def node_densities(data, pupil, triangles):
 
 
 @compiled
-def draw_bundle(data, pupil, triangles, densities, crossings, blades, axes, to_pixels, gain, rgb, plane, cover, low, high):
+def draw_bundle(
+    data, pupil, triangles, densities, crossings, blades, mask, mask_half, axes, to_pixels, gain, rgb,
+    plane, cover, low, high,
+):  # fmt: skip
     """Add a bundle and its mirror image to a picture, flux for flux.
 
     Parameters
@@ -73,6 +77,8 @@ def draw_bundle(data, pupil, triangles, densities, crossings, blades, axes, to_p
         From `node_densities`.
     crossings, blades, axes
         As in `clip_triangle`.
+    mask, mask_half
+        As in `fill_through_mask`; a mask of one texel is no mask.
     to_pixels : ndarray, shape (4,)
         Column of the axis, row of the axis, pixels per mm across and down.
     gain : float
@@ -125,12 +131,20 @@ def draw_bundle(data, pupil, triangles, densities, crossings, blades, axes, to_p
                 whole = (pupil[triangle[1], 0] - pupil[triangle[0], 0]) * (pupil[triangle[2], 1] - pupil[triangle[0], 1])
                 whole -= (pupil[triangle[1], 1] - pupil[triangle[0], 1]) * (pupil[triangle[2], 0] - pupil[triangle[0], 0])
                 part = abs(polygon_area(polygon, count, PP, PQ)) / abs(0.5 * whole)
+                for c in range(crossings if mask.size > 1 else 0):
+                    part *= mask_value(mask, mask_half, polygon[0, PSTOP + 2 * c], polygon[0, PSTOP + 2 * c + 1])
                 _splat_polygon(polygon, count, flux * part, rgb, plane)
+                continue
+            base, gx, gy, dense_low, dense_high = _plane_through(corner, flux / drawn, gain / pixel_area, drawn)
+            if mask.size > 1:
+                fill_through_mask(
+                    polygon, count, crossings, mask, mask_half, base, gx, gy, dense_low, dense_high, rgb,
+                    plane, cover, low, high,
+                )  # fmt: skip
                 continue
             count = cut_to_rectangle(polygon, count, other, values, float(width), float(height))
             if count < 3:
                 continue
-            base, gx, gy, dense_low, dense_high = _plane_through(corner, flux / drawn, gain / pixel_area, drawn)
             fill_polygon(polygon, count, base, gx, gy, dense_low, dense_high, rgb, plane, cover, low, high)
 
 

@@ -7,7 +7,7 @@ from .trace import REL, STOP_X, WEIGHT, X, Y
 
 # columns of a polygon's vertex; then u, v for each crossing of the stop
 PX, PY, PREL, PP, PQ, PW, PSTOP = 0, 1, 2, 3, 4, 5, 6
-MAX_VERTICES = 64
+MAX_VERTICES = 256
 
 
 @compiled
@@ -38,6 +38,20 @@ def blade_value(blade, u, v):
     """Evaluate a blade's edge: <= 0 on the open side, its gradient 1 on the border (`optics.iris.blade_edges`)."""
     qx, qy = u - blade[2] * blade[0], v - blade[2] * blade[1]
     return blade[0] * qx + blade[1] * qy + 0.5 * blade[3] * (qx * qx + qy * qy)
+
+
+@compiled
+def cut_by_blades(polygon, count, crossings, blades, other, values):
+    """Cut a polygon by every blade at every crossing of the stop; return its vertices, 0 when nothing passes."""
+    for c in range(crossings):
+        for b in range(blades.shape[0]):
+            high = -np.inf
+            for m in range(count):
+                values[m] = blade_value(blades[b], polygon[m, PSTOP + 2 * c], polygon[m, PSTOP + 2 * c + 1])
+                high = max(high, values[m])
+            if high > 0.0:
+                count = _cut(polygon, count, values, other)
+    return count if count >= 3 else 0
 
 
 @compiled
@@ -90,15 +104,7 @@ def clip_triangle(data, pupil, triangle, mirror, crossings, blades, axes, polygo
         for m in range(count):
             values[m] = polygon[m, PREL] - 1.0
         count = _cut(polygon, count, values, other)
-    for c in range(crossings):
-        for b in range(blades.shape[0]):
-            high = -np.inf
-            for m in range(count):
-                values[m] = blade_value(blades[b], polygon[m, PSTOP + 2 * c], polygon[m, PSTOP + 2 * c + 1])
-                high = max(high, values[m])
-            if high > 0.0:
-                count = _cut(polygon, count, values, other)
-    return count if count >= 3 else 0
+    return cut_by_blades(polygon, count, crossings, blades, other, values)
 
 
 @compiled

@@ -106,6 +106,11 @@ def find_box(
             for k in nodes:
                 if data[k, ALIVE] > 0.0:
                     flux += data[k, WEIGHT] * 0.25
+    # the pre-pass sees one wavelength and straight cells: leave a cell of room around
+    for m in range(2):
+        step = hx if m == 0 else hy
+        found[2 * m] = max(found[2 * m] - step, box[2 * m])
+        found[2 * m + 1] = min(found[2 * m + 1] + step, box[2 * m + 1])
     return found, 2.0 * flux * hx * hy * np.cos(tilt)
 
 
@@ -205,7 +210,8 @@ def build_mesh(
     Parameters
     ----------
     rows ... iris_radius
-        As in `find_box`.
+        As in `find_box`, but `n_gap` (V, K + 1) and `reflectance` (V, K, M) at the few wavelengths that the grid shall fit:
+        a cell is left out when none of them passes and refined when one of them asks for it.
     box : ndarray, shape (4,)
         Pupil region, mm.
     nx, ny : int
@@ -235,7 +241,7 @@ def build_mesh(
     state = np.zeros(offsets[max_level + 1], dtype=np.int8)
     columns = STOP_X + 2 * crossings
     pupil = np.empty((2048, 2))
-    data = np.empty((2048, columns))
+    data = np.empty((n_gap.shape[0], 2048, columns))
     n_nodes = 0
     nodes = np.empty(9, dtype=np.int64)
     cells = np.empty(nx * ny, dtype=np.int64)
@@ -244,10 +250,11 @@ def build_mesh(
     for level in range(max_level + 1):
         first = n_nodes
         pupil, data, n_nodes = _add_nodes(lattice, pupil, data, n_nodes, cells, level, max_level, ny, da, db, box)
-        trace_nodes(
-            rows, actions, curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, tilt,
-            pupil[first:n_nodes, 0].copy(), pupil[first:n_nodes, 1].copy(), data[first:n_nodes],
-        )  # fmt: skip
+        for v in range(n_gap.shape[0]):
+            trace_nodes(
+                rows, actions, curvature, conic, z_vertex, inv_semi, n_gap[v], reflectance[v], sensor_z, tilt,
+                pupil[first:n_nodes, 0].copy(), pupil[first:n_nodes, 1].copy(), data[v, first:n_nodes],
+            )  # fmt: skip
         children = np.empty(4 * cells.size, dtype=np.int64)
         n_children = 0
         height = ny << level
@@ -255,9 +262,17 @@ def build_mesh(
         for cell in cells:
             a, b = cell // height, cell % height
             _cell_nodes(lattice, a, b, level, max_level, nodes)
-            verdict = _judge(
-                data, nodes, crossings, iris_radius, level, max_level, h, tolerance, flux_tolerance, scale, view_radius
-            )
+            verdict = EMPTY
+            for v in range(n_gap.shape[0]):
+                found = _judge(
+                    data[v], nodes, crossings, iris_radius, level, max_level, h,
+                    tolerance, flux_tolerance, scale, view_radius,
+                )  # fmt: skip
+                if found == SPLIT:
+                    verdict = SPLIT
+                    break
+                if found == LEAF:
+                    verdict = LEAF
             state[offsets[level] + cell] = verdict
             if verdict == SPLIT:
                 for m in range(4):
@@ -292,8 +307,8 @@ def _add_nodes(lattice, pupil, data, n_nodes, cells, level, max_level, ny, da, d
             grown = np.empty((2 * pupil.shape[0], 2))
             grown[:n_nodes] = pupil[:n_nodes]
             pupil = grown
-            more = np.empty((2 * data.shape[0], data.shape[1]))
-            more[:n_nodes] = data[:n_nodes]
+            more = np.empty((data.shape[0], 2 * data.shape[1], data.shape[2]))
+            more[:, :n_nodes] = data[:, :n_nodes]
             data = more
         for m in range(9):
             i, j = (2 * a + m // 3) * half, (2 * b + m % 3) * half

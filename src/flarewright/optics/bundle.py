@@ -80,7 +80,7 @@ class Bundle:
     triangles: NDArray[np.int64]
 
 
-def _arguments(packed: PackedLens, w: int, path: LightPath, tilt: float) -> tuple[Any, ...]:
+def _arguments(packed: PackedLens, w: int | slice | list[int], path: LightPath, tilt: float) -> tuple[Any, ...]:
     geometry = (packed.curvature, packed.conic, packed.z_vertex, packed.inv_semi)
     return (path.rows, path.actions, *geometry, packed.n_gap[w], packed.reflectance[w], packed.sensor_z, tilt)
 
@@ -132,7 +132,6 @@ def find_region(packed: PackedLens, w: int, path: LightPath, tilt: float, iris_r
 
 def trace_grid(
     packed: PackedLens,
-    w: int,
     path: LightPath,
     tilt: float,
     iris_radius: float,
@@ -147,8 +146,8 @@ def trace_grid(
 
     Parameters
     ----------
-    packed, w, path, tilt, iris_radius
-        As in `find_region`.
+    packed, path, tilt, iris_radius
+        As in `find_region`; the grid fits the first, middle and last wavelength.
     box : ndarray, shape (4,)
         Its result.
     tolerance : float
@@ -164,8 +163,9 @@ def trace_grid(
     -------
     Bundle
     """
+    last = len(packed.wavelengths_nm) - 1
     pupil, triangles = build_mesh(
-        *_arguments(packed, w, path, tilt), path.stop_crossings, iris_radius,
+        *_arguments(packed, sorted({0, last // 2, last}), path, tilt), path.stop_crossings, iris_radius,
         box, *GRID, MAX_LEVEL, tolerance, flux_tolerance, scale, view_radius,
     )  # fmt: skip
     return Bundle(path, pupil, triangles)

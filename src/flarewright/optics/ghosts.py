@@ -23,6 +23,9 @@ Floats = NDArray[np.float64]
 RESOLUTION = 100.0
 PEAK_GRID = 256
 
+# the kernels take a mask of one texel for none
+NO_MASK = np.ones((1, 1))
+
 
 @dataclass(frozen=True)
 class GhostRow:
@@ -159,7 +162,7 @@ def _measure(lens: Lens, packed: PackedLens, path: LightPath, light: Incidence) 
     scale = 1e-6
     # first only the rim, to learn the size; then fine enough for that size
     for _ in range(2):
-        bundle = trace_grid(packed, 0, path, light.tilt, packed.stop_semi, box, tolerance=0.25, scale=scale)
+        bundle = trace_grid(packed, path, light.tilt, packed.stop_semi, box, tolerance=0.25, scale=scale)
         data = trace_points(packed, 0, path, light.tilt, bundle.pupil)
         sums = measure_bundle(data, bundle.pupil, bundle.triangles, path.stop_crossings, blades, light.axes)
         if sums[0] <= 0.0:
@@ -189,7 +192,7 @@ def _peak(
     to_pixels = np.array([side / 2 - centre[0] / patch, side / 2 + centre[1] / patch, 1.0 / patch, 1.0 / patch])
     densities = node_densities(data, bundle.pupil, bundle.triangles)
     draw_bundle(
-        data, bundle.pupil, bundle.triangles, densities, bundle.path.stop_crossings, blades, light.axes,
+        data, bundle.pupil, bundle.triangles, densities, bundle.path.stop_crossings, blades, NO_MASK, 1.0, light.axes,
         to_pixels, light.cosine, np.array([1.0, 0.0, 0.0]), plane, cover, low, high,
     )  # fmt: skip
     return float(plane[0].max()) / patch**2, patch

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import LensError
-from ..kernels.trace import REFLECT, STOP
+from ..kernels.matrix import path_matrices as _path_matrices
 from ..model import Lens, Stop, Surface
 from .dispersion import refractive_index
 from .paths import LightPath, direct_path
@@ -81,32 +81,12 @@ def path_matrices(lens: Lens, path: LightPath, wavelength_nm: float, sensor_z: f
         Ma for every crossing of the stop, from the plane of the first vertex.
     total : ndarray, shape (2, 2)
         First vertex to sensor: Ms Ma.
-
-    Notes
-    -----
-    Refraction [[1, 0], [(n1 - n2) / (n2 Re), n1 / n2]], reflection [[1, 0], [2 / Re, 1]], Re = +R on forward and -R on
-    backward legs (physics.md; Lee and Eisemann 2013 with the sign of the second mirror corrected).
     """
-    n = gap_indices(lens, wavelength_nm)
-    z = vertex_positions(lens)
-    total = np.eye(2)
-    to_stop: list[Matrix] = []
-    heading, here = 1.0, 0.0
-    for row, action in zip(path.rows, path.actions, strict=True):
-        total = np.array([[1.0, heading * (z[row] - here)], [0.0, 1.0]]) @ total
-        here = z[row]
-        surface = lens.rows[row]
-        if action == STOP or not isinstance(surface, Surface):
-            to_stop.append(total)
-            continue
-        power = surface.curvature * heading
-        if action == REFLECT:
-            total = np.array([[1.0, 0.0], [2.0 * power, 1.0]]) @ total
-            heading = -heading
-        else:
-            n1, n2 = (n[row], n[row + 1]) if heading > 0 else (n[row + 1], n[row])
-            total = np.array([[1.0, 0.0], [(n1 - n2) / n2 * power, n1 / n2]]) @ total
-    return to_stop, np.array([[1.0, sensor_z - here], [0.0, 1.0]]) @ total
+    curvature = np.array([row.curvature if isinstance(row, Surface) else 0.0 for row in lens.rows])
+    to_stop = np.empty((path.stop_crossings, 2, 2))
+    n, z = gap_indices(lens, wavelength_nm), vertex_positions(lens)
+    total = _path_matrices(path.rows, path.actions, curvature, z, n, sensor_z, to_stop)
+    return list(to_stop), np.array(total).reshape(2, 2)
 
 
 def first_order(

@@ -1,0 +1,142 @@
+"""The command line: `flarewright COMMAND`. Commands import what they need when they run, so that help is instant."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Sequence
+from typing import Annotated, Any
+
+import typer
+
+from .. import __version__
+from ..errors import FlarewrightError
+from . import (
+    ghosts,
+    lens_check,
+    lens_convert,
+    lens_schema,
+    lens_show,
+    lenses,
+    project_check,
+    project_init,
+    project_schema,
+    render,
+)
+
+app = typer.Typer(
+    name="flarewright",
+    help="Lens flare as physics: choose a lens, say where the light is, get a layered linear picture.",
+    epilog="Begin with: flarewright lenses · then: flarewright render heliar-tronnier --light 10,5 -o flare.exr",
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode="rich",
+)
+lens_app = typer.Typer(help="Look at, check and convert lens files.")
+project_app = typer.Typer(help="Project files: everything a render needs, in one TOML file.")
+
+app.command("render", epilog=render.EPILOG)(render.render)
+app.command("ghosts", epilog=ghosts.EPILOG)(ghosts.ghosts)
+app.command("lenses", epilog=lenses.EPILOG)(lenses.lenses)
+app.add_typer(lens_app, name="lens")
+app.add_typer(project_app, name="project")
+lens_app.command("show", epilog=lens_show.EPILOG)(lens_show.show)
+lens_app.command("check", epilog=lens_check.EPILOG)(lens_check.check)
+lens_app.command("convert", epilog=lens_convert.EPILOG)(lens_convert.convert)
+lens_app.command("schema")(lens_schema.schema)
+project_app.command("init", epilog=project_init.EPILOG)(project_init.init)
+project_app.command("check")(project_check.check)
+project_app.command("schema")(project_schema.schema)
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"flarewright {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _root(
+    version: Annotated[bool, typer.Option("--version", callback=_version, is_eager=True, help="Tell it and end.")] = False,
+) -> None:
+    del version  # The callback has told it.
+
+
+def main() -> None:
+    """Run the program with the arguments of the process, and end it."""
+    sys.exit(run(sys.argv[1:]))
+
+
+def run(arguments: Sequence[str]) -> int:
+    """Run one command.
+
+    Parameters
+    ----------
+    arguments : sequence of str
+        Without the program's name.
+
+    Returns
+    -------
+    int
+        Exit code: 0 done, 2 a mistake that was told in one sentence on stderr, 130 interrupted.
+    """
+    for stream in (sys.stdout, sys.stderr):
+        # A terminal without UTF-8 shows a question mark; it is no reason to fail.
+        if hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="replace")
+    words = list(arguments)
+    if words in ([], ["lens"], ["project"]):
+        words.append("--help")
+    try:
+        code = _call(words)
+        sys.stdout.flush()
+        return code
+    except BrokenPipeError:
+        # Whoever read our output went away (`| head`); the interpreter's last flush must not complain again.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 1
+
+
+def _call(words: list[str]) -> int:
+    """Turn every expected end of a command into an exit code, with its one sentence."""
+    try:
+        code: Any = app(args=words, prog_name="flarewright", standalone_mode=False)
+    except FlarewrightError as error:
+        return _fail(str(error), getattr(error, "problems", ()))
+    except (KeyboardInterrupt, typer.Abort):
+        code = 130
+    except MemoryError:
+        return _fail("there is not enough memory for this picture; choose a smaller --size or fewer layers")
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        where = f"{error.filename}: " if error.filename else ""
+        return _fail(f"{where}{error.strerror or error}")
+    except SystemExit as end:
+        # Typer's own answer to a broken pipe.
+        if end.code == 1:
+            raise BrokenPipeError from end
+        raise
+    except Exception as error:
+        # Usage errors come from Typer's copy of click or from click itself, by version; both can tell their message.
+        if not hasattr(error, "format_message"):
+            raise
+        return _fail(_usage(error))
+    if code == 130:
+        print("flarewright: interrupted; nothing was left half-written", file=sys.stderr)
+    return code if isinstance(code, int) else 0
+
+
+def _usage(error: Any) -> str:
+    message = " ".join(str(error.format_message()).split()).rstrip(".")
+    message = message[:1].lower() + message[1:]
+    context = getattr(error, "ctx", None)
+    return f"{message}; see {context.command_path if context else 'flarewright'} --help"
+
+
+def _fail(message: str, problems: Sequence[str] = ()) -> int:
+    print(f"flarewright: error: {' '.join(message.split())}", file=sys.stderr)
+    if len(problems) > 1:
+        for problem in problems:
+            print(f"  - {problem}", file=sys.stderr)
+    return 2

@@ -1,0 +1,109 @@
+"""What several commands share: reading their short texts, telling things, printing JSON."""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ..errors import FlarewrightError, OutputError, ProjectError
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+
+def pair(text: str, flag: str, example: str, separator: str = ",") -> tuple[float, float]:
+    """Return the two numbers of a text like "10,5" or "36x24".
+
+    Parameters
+    ----------
+    text : str
+    flag, example : str
+        For the message.
+    separator : str
+
+    Returns
+    -------
+    tuple of float
+
+    Raises
+    ------
+    ProjectError
+        When it is not two finite numbers.
+    """
+    parts = text.lower().replace("×", "x").split(separator)
+    try:
+        numbers = [float(part) for part in parts]
+    except ValueError:
+        numbers = []
+    if len(numbers) != 2 or not all(math.isfinite(number) for number in numbers):
+        raise ProjectError(f"{flag} {text!r} is not two numbers; write {flag} {example}")
+    return numbers[0], numbers[1]
+
+
+def field_angles(text: str) -> tuple[float, float]:
+    """Return the field angles of `--light X,Y` in degrees."""
+    angles = pair(text, "--light", "10,5 (degrees right and up)")
+    if max(abs(angle) for angle in angles) >= 90.0:
+        raise ProjectError(f"--light {text!r} is behind the camera; field angles lie between -90 and 90 degrees")
+    return angles
+
+
+def tell(remarks: Iterable[str]) -> None:
+    """Print remarks to stderr, one a line."""
+    for remark in remarks:
+        print(f"flarewright: {remark}", file=sys.stderr)
+
+
+def print_json(data: dict[str, Any]) -> None:
+    """Print one JSON object to stdout; numbers that JSON cannot hold become null."""
+    print(json.dumps(_finite(data), indent=2, allow_nan=False))
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _finite(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(item) for item in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
+
+
+def check_place(path: Path, suffix: str) -> None:
+    """Refuse an output that could not be written before the work is done, not after.
+
+    Raises
+    ------
+    OutputError
+        When the name ends otherwise than in `suffix`, its folder does not exist, or it is a folder itself.
+    """
+    if path.suffix.lower() != suffix:
+        raise OutputError(f"the output {str(path)!r} must be named *{suffix}")
+    if not path.parent.is_dir():
+        raise OutputError(f"cannot write {path}: the folder {path.parent} does not exist; create it first")
+    if path.is_dir():
+        raise OutputError(f"cannot write {path}: it is a folder; give a file name")
+
+
+def console() -> Console:
+    """Return where tables go: the terminal's width, or 140 columns in a file or pipe."""
+    from rich.console import Console
+
+    return Console(markup=False, highlight=False, width=None if sys.stdout.isatty() else 140)
+
+
+def chosen_fstop(f_number: float | None) -> float | None:
+    """Return the f-number of `--fstop`, checked.
+
+    Raises
+    ------
+    FlarewrightError
+        When it is no possible f-number.
+    """
+    if f_number is not None and not 0.3 < f_number <= 256.0:
+        raise FlarewrightError(f"--fstop {f_number:g} is no f-number of a lens; choose one between 0.3 and 256")
+    return f_number

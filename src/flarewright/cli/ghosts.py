@@ -1,0 +1,125 @@
+"""`flarewright ghosts`: the ghost analysis of a lens."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from ..errors import ProjectError
+from .common import chosen_fstop, console, field_angles, print_json, tell
+
+if TYPE_CHECKING:
+    from ..optics.ghosts import GhostRow, GhostTable
+
+EPILOG = (
+    "Examples: flarewright ghosts heliar-tronnier --light 10,0 · "
+    "flarewright ghosts my.toml --light 0,0 --coating quarter-wave:550 --fstop 8 --json"
+)
+
+
+def ghosts(
+    lens: Annotated[str, typer.Argument(metavar="LENS", help="A shipped lens (flarewright lenses) or a lens file.")],
+    light: Annotated[str, typer.Option(metavar="X,Y", help="Field angles in degrees, right and up in the picture.")],
+    wavelength_nm: Annotated[float, typer.Option(help="One wavelength, 380 to 780.")] = 587.56,
+    coating: Annotated[
+        str, typer.Option(help="lens, none, quarter-wave:NM, preset:NAME, film:N:NM, stack:N:NM,... or a file.")
+    ] = "lens",
+    fstop: Annotated[float | None, typer.Option(help="f-number; wide open when left out.")] = None,
+    paths: Annotated[str, typer.Option(help="all, or same-side of the stop.")] = "all",
+    brightest: Annotated[int | None, typer.Option(min=1, help="List only so many.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+) -> None:
+    """Tell for every two-reflection path what it carries and where it lands.
+
+    Rays are traced, not paraxial, to the unbounded sensor plane. The throughput is the flux on it when the light gives
+    an irradiance of 1 on a plane facing it; the peak irradiance is relative to the direct image's flux.
+    """
+    from ..io.project_file import parse_coating_choice
+
+    angles = field_angles(light)
+    if not (math.isfinite(wavelength_nm) and 380.0 <= wavelength_nm <= 780.0):
+        raise ProjectError(f"--wavelength-nm {wavelength_nm:g} is not visible light; choose one between 380 and 780 nm")
+    if paths not in ("all", "same-side"):
+        raise ProjectError(f"--paths {paths!r} is unknown; choose all or same-side")
+    choice = parse_coating_choice(coating)
+    f_number = chosen_fstop(fstop)
+
+    from ..optics.ghosts import ghost_table
+    from ..render.prepare import first_order, load_lens
+
+    remarks: list[str] = []
+    prescription = load_lens(lens, remarks=remarks)
+    first_order(prescription, f_number)  # Refuses an f-number that the lens does not open to.
+    table = ghost_table(
+        prescription, angles, f_number=f_number, coating=choice, wavelength_nm=wavelength_nm, paths=paths
+    )
+    tell(remarks)
+    if as_json:
+        print_json(as_data(table, brightest))
+    else:
+        _print_table(table, prescription.name, angles, brightest)
+
+
+def as_data(table: GhostTable, brightest: int | None = None) -> dict[str, Any]:
+    """Return the analysis as the JSON that `--json` prints."""
+    return {
+        "efl_mm": table.efl,
+        "bfl_mm": table.bfl,
+        "f_number": table.f_number,
+        "entrance_pupil_diameter_mm": table.entrance_pupil_diameter,
+        "stop_semi_diameter_mm": table.stop_semi_diameter,
+        "sensor_distance_mm": table.sensor_distance,
+        "direct": {
+            "throughput_mm2": table.direct.throughput_mm2,
+            "centroid_mm": list(table.direct.centroid_mm),
+            "rms_radius_mm": table.direct.rms_radius_mm,
+        },
+        "ghosts": [
+            {
+                "first_reflection": row.first_reflection,
+                "second_reflection": row.second_reflection,
+                "throughput_mm2": row.throughput_mm2,
+                "centroid_mm": list(row.centroid_mm),
+                "rms_radius_mm": row.rms_radius_mm,
+                "peak_irradiance": row.peak_irradiance,
+                "bounded_by": row.bounded_by,
+                "focus_distance_mm": row.focus_distance_mm,
+            }
+            for row in table.ghosts[:brightest]
+        ],
+    }
+
+
+def _print_table(table: GhostTable, name: str, angles: tuple[float, float], brightest: int | None) -> None:
+    from rich.table import Table
+
+    out = Table(
+        title=f"{name} · f/{table.f_number:g} · efl {table.efl:.2f} mm · light at {angles[0]:g}, {angles[1]:g} degrees",
+        caption="Peak: brightest irradiance over the direct image's flux, 1/mm². Focus: mm behind the sensor.",
+    )
+    columns = ("path", "throughput mm²", "of direct", "centroid mm", "rms radius mm", "peak 1/mm²", "bounded by", "focus mm")
+    for column in columns:
+        out.add_column(column, justify="left" if column in ("path", "bounded by") else "right", no_wrap=True)
+    direct = table.direct
+    out.add_row("direct", *_cells(direct, direct), end_section=True)
+    for row in table.ghosts[:brightest]:
+        out.add_row(f"{row.first_reflection}-{row.second_reflection}", *_cells(row, direct))
+    console().print(out)
+
+
+def _cells(row: GhostRow, direct: GhostRow) -> tuple[str, ...]:
+    of_direct = row.throughput_mm2 / direct.throughput_mm2 if direct.throughput_mm2 > 0.0 else math.nan
+    if row.throughput_mm2 == 0.0:
+        return ("0", "-", "-", "-", "-", row.bounded_by, "-")
+    ghost = row.first_reflection is not None
+    return (
+        f"{row.throughput_mm2:.4g}",
+        f"{of_direct:.2e}" if ghost else "1",
+        f"{row.centroid_mm[0]:.2f}, {row.centroid_mm[1]:.2f}",
+        f"{row.rms_radius_mm:.3g}",
+        f"{row.peak_irradiance:.3g}" if ghost else "-",
+        row.bounded_by if ghost else "-",
+        "-" if row.focus_distance_mm is None or not ghost else f"{row.focus_distance_mm:.1f}",
+    )

@@ -1,0 +1,63 @@
+"""`flarewright lens check`: whether lens files can be used."""
+
+from __future__ import annotations
+
+import sys
+from typing import Annotated, Any
+
+import typer
+
+from ..errors import FlarewrightError
+from .common import print_json
+
+EPILOG = "Example: flarewright lens check my-lenses/*.lens"
+
+
+def check(
+    files: Annotated[list[str], typer.Argument(metavar="FILE...", help="Lens files or shipped names.")],
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+) -> None:
+    """Tell which lens files are usable and what had to be repaired; exit code 2 when any is refused."""
+    from ..render.prepare import first_order, load_lens
+
+    results: list[dict[str, Any]] = []
+    for file in files:
+        remarks: list[str] = []
+        try:
+            lens = load_lens(file, remarks=remarks)
+            order = first_order(lens)
+        except FlarewrightError as error:
+            problems = list(getattr(error, "problems", ())) or [str(error)]
+            results.append({"file": file, "usable": False, "reason": str(error), "problems": problems})
+            continue
+        results.append(
+            {
+                "file": file,
+                "usable": True,
+                "name": lens.name,
+                "efl_mm": order.efl,
+                "f_number": lens.f_number,
+                "remarks": remarks,
+            }
+        )
+    if as_json:
+        print_json({"files": results})
+    else:
+        _print(results)
+    refused = sum(not result["usable"] for result in results)
+    if refused:
+        what = results[0]["reason"] if len(results) == 1 else f"{refused} of {len(results)} lens files were refused"
+        print(f"flarewright: error: {what}", file=sys.stderr)
+        raise typer.Exit(2)
+
+
+def _print(results: list[dict[str, Any]]) -> None:
+    for result in results:
+        if result["usable"]:
+            print(f"{result['file']}: usable, {result['name']}, efl {result['efl_mm']:.2f} mm, f/{result['f_number']:g}")
+            findings = result["remarks"]
+        else:
+            print(f"{result['file']}: refused, {result['reason']}")
+            findings = result["problems"] if len(result["problems"]) > 1 else []
+        for finding in findings:
+            print(f"  - {finding}")

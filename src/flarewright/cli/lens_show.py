@@ -1,0 +1,162 @@
+"""`flarewright lens show`: a prescription as a table, as JSON and as a drawing."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from ..errors import ProjectError
+from .common import check_place, chosen_fstop, console, field_angles, print_json, tell
+
+if TYPE_CHECKING:
+    from ..model import Lens
+    from ..optics.paraxial import FirstOrder
+
+EPILOG = (
+    "Examples: flarewright lens show tessar-brendel · "
+    "flarewright lens show canon-28-80 --plot canon.svg --light 0,12 --ghost 7-2"
+)
+
+
+def show(
+    lens: Annotated[str, typer.Argument(metavar="NAME|FILE", help="A shipped lens or a lens file.")],
+    plot: Annotated[Path | None, typer.Option(metavar="OUT.svg", help="Draw the cross-section.")] = None,
+    light: Annotated[
+        str | None, typer.Option(metavar="X,Y", help="Draw the rays of this light beside those of the axis.")
+    ] = None,
+    ghost: Annotated[str | None, typer.Option(metavar="J-I", help="Draw the rays of this ghost path.")] = None,
+    fstop: Annotated[float | None, typer.Option(help="f-number; wide open when left out.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+) -> None:
+    """Show a lens: its rows, focal length, pupils and sensor; with --plot as a drawing too."""
+    angles = field_angles(light) if light is not None else None
+    mirrors = _mirrors(ghost) if ghost is not None else None
+    f_number = chosen_fstop(fstop)
+    if plot is not None:
+        check_place(plot, ".svg")
+
+    from ..render.prepare import first_order, load_lens
+
+    remarks: list[str] = []
+    prescription = load_lens(lens, remarks=remarks)
+    order = first_order(prescription, f_number)
+    if plot is not None:
+        from ..io.atomic import write_atomically
+        from ..render.cross_section import cross_section
+
+        picture = cross_section(prescription, order, field_deg=angles, ghost=mirrors)
+        remarks += picture.remarks
+        write_atomically(plot, lambda temporary: _write_text(temporary, picture.svg))
+    tell(remarks)
+    data = as_data(prescription, order)
+    if as_json:
+        print_json({**data, "remarks": remarks})
+    else:
+        _print(data)
+
+
+def _write_text(path: Path, text: str) -> None:
+    path.write_text(text, "utf-8")
+
+
+def _mirrors(text: str) -> tuple[int, int]:
+    match = re.fullmatch(r"\s*(\d+)\s*-\s*(\d+)\s*", text)
+    if not match:
+        raise ProjectError(f"--ghost {text!r} is no ghost path; write J-I, the rows of its two reflections, 4-1 say")
+    return int(match[1]), int(match[2])
+
+
+def as_data(lens: Lens, order: FirstOrder) -> dict[str, Any]:
+    """Return a lens as the JSON that `--json` prints."""
+    from ..io.coating_text import format_coating
+    from ..model import Surface
+
+    rows: list[dict[str, Any]] = []
+    for k, row in enumerate(lens.rows):
+        if not isinstance(row, Surface):
+            rows.append(
+                {"row": k, "stop": True, "radius_mm": None, "curvature": 0.0, "conic": 0.0, "thickness": row.thickness}
+                | {"n_d": None, "v_d": None, "glass": None, "semi_diameter": order.stop_semi_diameter}
+                | {"semi_diameter_estimated": False, "coating": None}
+            )
+            continue
+        medium = row.medium
+        rows.append(
+            {
+                "row": k,
+                "stop": False,
+                "radius_mm": 1.0 / row.curvature if row.curvature else None,
+                "curvature": row.curvature,
+                "conic": row.conic,
+                "thickness": row.thickness,
+                "n_d": medium.n_d if medium else None,
+                "v_d": medium.v_d if medium else None,
+                "glass": medium.glass if medium else None,
+                "semi_diameter": row.semi_diameter,
+                "semi_diameter_estimated": row.semi_diameter_estimated,
+                "coating": format_coating(row.coating) if row.coating else None,
+            }
+        )
+    return {
+        "name": lens.name,
+        "source": lens.source,
+        "notes": lens.notes,
+        "efl_mm": order.efl,
+        "bfl_mm": order.bfl,
+        "f_number": order.f_number,
+        "field_deg": lens.field_deg,
+        "entrance_pupil_diameter_mm": order.entrance_pupil_diameter,
+        "entrance_pupil_z_mm": order.entrance_pupil_z,
+        "exit_pupil_diameter_mm": order.exit_pupil_diameter,
+        "exit_pupil_z_mm": order.exit_pupil_z,
+        "stop_semi_diameter_mm": order.stop_semi_diameter,
+        "sensor_distance_mm": order.sensor_distance,
+        "blades": lens.iris.blades,
+        "coating_presets": sorted(lens.coating_presets),
+        "rows": rows,
+    }
+
+
+def _print(data: dict[str, Any]) -> None:
+    from rich.table import Table
+
+    out = Table(
+        title=f"{data['name']} · f/{data['f_number']:g}",
+        caption="Lengths in mm; glass is what follows the row; ~ marks an estimated semi-diameter.",
+    )
+    out.add_column("row", justify="right")
+    for column in ("radius", "conic", "thickness", "n_d", "v_d", "semi-diameter"):
+        out.add_column(column, justify="right", no_wrap=True)
+    out.add_column("glass", no_wrap=True)
+    out.add_column("coating")
+    for row in data["rows"]:
+        radius = "stop" if row["stop"] else "flat" if row["radius_mm"] is None else f"{row['radius_mm']:.3f}"
+        semi = "-" if row["semi_diameter"] is None else f"{row['semi_diameter']:.2f}"
+        out.add_row(
+            str(row["row"]),
+            radius,
+            f"{row['conic']:g}" if row["conic"] else "",
+            f"{row['thickness']:.3f}",
+            "" if row["n_d"] is None else f"{row['n_d']:.5f}",
+            "" if row["v_d"] is None else f"{row['v_d']:.2f}",
+            f"~{semi}" if row["semi_diameter_estimated"] else semi,
+            row["glass"] or "",
+            row["coating"] or "",
+        )
+    terminal = console()
+    terminal.print(out)
+    terminal.print(
+        f"focal length {data['efl_mm']:.3f}, back focus {data['bfl_mm']:.3f}, "
+        f"sensor {data['sensor_distance_mm']:.3f} behind the last vertex\n"
+        f"entrance pupil {data['entrance_pupil_diameter_mm']:.3f} wide at z = {data['entrance_pupil_z_mm']:.3f}, "
+        f"exit pupil {data['exit_pupil_diameter_mm']:.3f} wide at z = {data['exit_pupil_z_mm']:.3f} "
+        "(z from the first vertex)"
+    )
+    for key in ("source", "notes"):
+        if data[key]:
+            terminal.print(f"{key}: {data[key]}")
+    if data["coating_presets"]:
+        terminal.print(f"coating presets: {', '.join(data['coating_presets'])}")

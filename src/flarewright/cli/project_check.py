@@ -1,0 +1,41 @@
+"""`flarewright project check`: whether a project file can be rendered."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .common import print_json, tell
+
+
+def check(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="A project file.")],
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+) -> None:
+    """Check a project and its lens, and tell every mistake at once; exit code 2 when it cannot be rendered."""
+    from ..io.project_file import read_project
+    from ..optics.pack import resolve_coatings
+    from ..render.prepare import settle
+
+    settled = settle(read_project(file))
+    resolve_coatings(settled.lens, settled.project.coating)
+    if as_json:
+        print_json(
+            {
+                "file": str(file),
+                "usable": True,
+                "lens": settled.lens.name,
+                "efl_mm": settled.order.efl,
+                "f_number": settled.order.f_number,
+                "remarks": list(settled.remarks),
+            }
+        )
+        return
+    tell(settled.remarks)
+    count = len(settled.project.lights)
+    print(
+        f"{file}: usable, {settled.lens.name} at f/{settled.order.f_number:g}, {count} light{'s' if count > 1 else ''}, "
+        f"{settled.project.camera.size_px[0]}x{settled.project.camera.size_px[1]} pixels, {settled.project.quality.mode}"
+    )

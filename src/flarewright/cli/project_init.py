@@ -1,0 +1,51 @@
+"""`flarewright project init`: a project file to begin with."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ..errors import OutputError
+from .common import check_place, field_angles, tell
+
+EPILOG = "Example: flarewright project init heliar-tronnier -o shot.toml · then: flarewright render --project shot.toml -o shot.exr"
+
+
+def init(
+    lens: Annotated[str, typer.Argument(metavar="LENS", help="A shipped lens or a lens file.")],
+    output: Annotated[Path | None, typer.Option("-o", "--output", help="The project file, *.toml; left out: stdout.")] = None,
+    light: Annotated[str, typer.Option(metavar="X,Y", help="The first light, degrees right and up.")] = "10,5",
+    force: Annotated[bool, typer.Option("--force", help="Replace a file that is there already.")] = False,
+) -> None:
+    """Write a project file with every setting, its default and a few words about it."""
+    angles = field_angles(light)
+    if output is not None:
+        check_place(output, ".toml")
+        if output.exists() and not force:
+            raise OutputError(f"{output} exists already; choose another name, or replace it with --force")
+    from ..io.atomic import write_atomically
+    from ..io.library import lens_path, shipped
+    from ..io.project_file import project_text
+    from ..model import Light, Project
+    from ..render.prepare import load_lens
+
+    remarks: list[str] = []
+    loaded = load_lens(lens, remarks=remarks)
+    found = lens_path(lens)
+    # A shipped lens keeps its name; a file is named as the project's folder sees it.
+    ships = found.stem in shipped() and not Path(lens).exists()
+    name = found.stem if ships else os.fspath(found)
+    project = Project(lens=name, lights=(Light(field_deg=angles),), iris=loaded.iris)
+    text = project_text(project, folder=output.parent if output else None, comments=True)
+    if output is None:
+        print(text, end="")
+        return
+    write_atomically(output, lambda temporary: _write_text(temporary, text))
+    tell([*remarks, f"wrote {output}"])
+
+
+def _write_text(path: Path, text: str) -> None:
+    path.write_text(text, "utf-8")

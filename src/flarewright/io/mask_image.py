@@ -1,0 +1,64 @@
+"""Read an image that stands for the iris."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import ProjectError
+from .exr import read_exr
+
+# a finer mask only costs time: its edges are antialiased
+LARGEST = 4096
+
+
+def read_mask(path: str | Path) -> NDArray[np.float64]:
+    """Read a grey image as transmittance.
+
+    Parameters
+    ----------
+    path : str or Path
+        PNG, TIFF, JPEG (by Pillow) or EXR; colour is averaged, white transmits.
+
+    Returns
+    -------
+    ndarray, shape (A, B), float64
+        In [0, 1], row 0 up.
+
+    Raises
+    ------
+    ProjectError
+        When the file is missing, no image, too large, or transmits nothing.
+    """
+    place = Path(path)
+    if not place.is_file():
+        raise ProjectError(f"{place}: there is no such iris image; give the path of a PNG or EXR file")
+    try:
+        grey = _read_exr(place) if place.suffix.lower() == ".exr" else _read_picture(place)
+    except (OSError, ValueError, SyntaxError) as error:
+        raise ProjectError(f"{place}: this cannot be read as an image ({error}); give a PNG or EXR file") from error
+    if min(grey.shape) < 2 or max(grey.shape) > LARGEST:
+        raise ProjectError(f"{place}: an iris image has 2 to {LARGEST} pixels a side, this one is {grey.shape[1]}x{grey.shape[0]}")
+    grey = np.clip(grey, 0.0, 1.0)
+    if not np.isfinite(grey).all() or grey.max() <= 0.0:
+        raise ProjectError(f"{place}: the iris image is black or not finite, so no light passes; white transmits")
+    return grey
+
+
+def _read_picture(path: Path) -> NDArray[np.float64]:
+    from PIL import Image
+
+    with Image.open(path) as image:
+        deep = image.mode in ("I;16", "I", "F")
+        grey = np.asarray(image if deep else image.convert("L"), dtype=np.float64)
+        top = 1.0 if image.mode == "F" else (65535.0 if deep else 255.0)
+    return grey / top
+
+
+def _read_exr(path: Path) -> NDArray[np.float64]:
+    layers = read_exr(path)
+    first = next(iter(layers))
+    pixels: NDArray[np.float64] = np.asarray(first.pixels, dtype=np.float64).mean(axis=2)
+    return pixels

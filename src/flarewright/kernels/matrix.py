@@ -1,0 +1,197 @@
+"""Paraxial ghosts: ray transfer matrices along a path, and the picture that they make."""
+
+from math import sqrt
+
+import numpy as np
+
+from ._jit import compiled
+from .clip import MAX_VERTICES, PP, PQ, PREL, PSTOP, PW, PX, PY, cut_by_blades, cut_to_rectangle, polygon_area
+from .mask import fill_through_mask
+from .raster import fill_polygon, splat_line
+from .trace import REFLECT, STOP
+
+# straight edges that stand for the round rim of the entrance
+RIM = 64
+
+
+@compiled
+def path_matrices(rows, actions, curvature, z_vertex, n_gap, sensor_z, to_stop):
+    """Multiply the ray transfer matrices along a path.
+
+    Parameters
+    ----------
+    rows, actions : ndarray, shape (S,), int64
+    curvature, z_vertex : ndarray, shape (K,)
+    n_gap : ndarray, shape (K + 1,)
+    sensor_z : float
+    to_stop : ndarray, shape (C, 2, 2)
+        Filled with Ma of each crossing of the stop.
+
+    Returns
+    -------
+    a, b, c, d : float
+        The whole path, from the plane of the first vertex to the sensor.
+
+    Notes
+    -----
+    Rays (y, u); refraction [[1, 0], [(n1 - n2) / (n2 Re), n1 / n2]], reflection [[1, 0], [2 / Re, 1]], Re = +R on
+    forward and -R on backward legs (physics.md; Lee and Eisemann 2013 with the sign of the second mirror corrected).
+    """
+    a, b, c, d = 1.0, 0.0, 0.0, 1.0
+    heading, here = 1.0, 0.0
+    crossing = 0
+    for step in range(rows.size):
+        row = rows[step]
+        gap = heading * (z_vertex[row] - here)
+        a, b = a + gap * c, b + gap * d
+        here = z_vertex[row]
+        if actions[step] == STOP:
+            to_stop[crossing, 0, 0], to_stop[crossing, 0, 1] = a, b
+            to_stop[crossing, 1, 0], to_stop[crossing, 1, 1] = c, d
+            crossing += 1
+            continue
+        power = curvature[row] * heading
+        if actions[step] == REFLECT:
+            c, d = c + 2.0 * power * a, d + 2.0 * power * b
+            heading = -heading
+        else:
+            n1, n2 = (n_gap[row], n_gap[row + 1]) if heading > 0.0 else (n_gap[row + 1], n_gap[row])
+            bend = (n1 - n2) / n2 * power
+            c, d = bend * a + n1 / n2 * c, bend * b + n1 / n2 * d
+    gap = sensor_z - here
+    return a + gap * c, b + gap * d, c, d
+
+
+@compiled
+def paraxial_weight(rows, actions, curvature, z_vertex, n_gap, reflectance, y, u):
+    """Multiply R and T along one paraxial ray, at its angles of incidence.
+
+    Parameters
+    ----------
+    rows, actions, curvature, z_vertex, n_gap
+        As in `path_matrices`.
+    reflectance : ndarray, shape (K, M)
+        As in `kernels.trace.trace_nodes`.
+    y, u : float
+        Height on the plane of the first vertex and slope.
+
+    Returns
+    -------
+    float
+    """
+    weight, heading, here = 1.0, 1.0, 0.0
+    samples = reflectance.shape[1]
+    for step in range(rows.size):
+        row = rows[step]
+        y += heading * (z_vertex[row] - here) * u
+        here = z_vertex[row]
+        if actions[step] == STOP:
+            continue
+        power = curvature[row] * heading
+        n1, n2 = (n_gap[row], n_gap[row + 1]) if heading > 0.0 else (n_gap[row + 1], n_gap[row])
+        slope = u + power * y
+        sine = slope / sqrt(1.0 + slope * slope) * (1.0 if n1 <= n2 else n1 / n2)
+        place = sqrt(max(1.0 - sine * sine, 0.0)) * (samples - 1)
+        cell = min(int(place), samples - 2)
+        r = reflectance[row, cell] + (place - cell) * (reflectance[row, cell + 1] - reflectance[row, cell])
+        if actions[step] == REFLECT:
+            weight *= r
+            u += 2.0 * power * y
+            heading = -heading
+        else:
+            weight *= 1.0 - r
+            u = (n1 - n2) / n2 * power * y + n1 / n2 * u
+    return weight
+
+
+@compiled
+def draw_matrix_ghosts(
+    rows, actions, starts, crossings, curvature, z_vertex, n_gap, reflectance, sensor_z,
+    entrance, slope, edges, iris_radius, mask, mask_half, axes, to_pixels, gain, rgb, plane, cover, low, high,
+):  # fmt: skip
+    """Draw many paths at many wavelengths with matrices (Lee and Eisemann 2013; Van Acoleyen 2025, chapter 4).
+
+    Parameters
+    ----------
+    rows, actions : ndarray, int64
+        The steps of all paths, one after another.
+    starts : ndarray, shape (P + 1,), int64
+        Where each path starts.
+    crossings : ndarray, shape (P,), int64
+    curvature, z_vertex : ndarray, shape (K,)
+    n_gap : ndarray, shape (W, K + 1)
+    reflectance : ndarray, shape (W, K, M)
+    sensor_z : float
+    entrance : float
+        Semi-diameter of the first surface, mm.
+    slope : float
+        Slope of the rays in the meridional plane.
+    edges : ndarray, shape (B, 4)
+        The iris as straight blades.
+    iris_radius : float
+    mask, mask_half, axes, to_pixels, gain, plane, cover, low, high
+        As in `draw_bundle`.
+    rgb : ndarray, shape (W, 3)
+
+    Notes
+    -----
+    A ghost is the image of the entrance cut by the iris: a polygon of even irradiance. Its colour comes from one ray,
+    through the middle of the iris or, where the entrance bounds the ghost, of the entrance.
+    """
+    height, width = plane.shape[1], plane.shape[2]
+    polygon, other = np.empty((MAX_VERTICES, PSTOP + 6)), np.empty((MAX_VERTICES, PSTOP + 6))
+    values = np.empty(MAX_VERTICES)
+    to_stop = np.empty((3, 2, 2))
+    for p in range(starts.size - 1):
+        path_rows, path_actions = rows[starts[p] : starts[p + 1]], actions[starts[p] : starts[p + 1]]
+        for w in range(n_gap.shape[0]):
+            a, b, _, _ = path_matrices(path_rows, path_actions, curvature, z_vertex, n_gap[w], sensor_z, to_stop)
+            count = _project_entrance(polygon, entrance, slope, a, b, to_stop, crossings[p], axes)
+            count = cut_by_blades(polygon, count, crossings[p], edges, other, values)
+            if count == 0:
+                continue
+            centre = 0.0
+            ma, mb = to_stop[0, 0, 0], to_stop[0, 0, 1]
+            if iris_radius < entrance * abs(ma):
+                centre = -mb * slope / ma
+            weight = paraxial_weight(
+                path_rows, path_actions, curvature, z_vertex, n_gap[w], reflectance[w], centre, slope
+            )
+            flux = gain * weight * abs(polygon_area(polygon, count, PP, PQ))
+            for k in range(count):
+                x, y = polygon[k, PX], polygon[k, PY]
+                polygon[k, PX] = to_pixels[0] - to_pixels[2] * (x * axes[0, 0] + y * axes[1, 0])
+                polygon[k, PY] = to_pixels[1] + to_pixels[3] * (x * axes[0, 1] + y * axes[1, 1])
+            area = abs(polygon_area(polygon, count, PX, PY))
+            if area < 1e-4:
+                splat_line(polygon[0, PX], polygon[0, PY], polygon[0, PX], polygon[0, PY], flux, rgb[w], plane)
+                continue
+            even = flux / area
+            if mask.size > 1:
+                fill_through_mask(
+                    polygon, count, crossings[p], mask, mask_half, even, 0.0, 0.0, even, even, rgb[w],
+                    plane, cover, low, high,
+                )  # fmt: skip
+                continue
+            count = cut_to_rectangle(polygon, count, other, values, float(width), float(height))
+            if count >= 3:
+                fill_polygon(polygon, count, even, 0.0, 0.0, even, even, rgb[w], plane, cover, low, high)
+
+
+@compiled
+def _project_entrance(polygon, entrance, slope, a, b, to_stop, crossings, axes):
+    """Fill a polygon with the rim of the entrance: its images on the sensor and at each crossing of the stop."""
+    # circumscribed a little, so that the polygon has the area of the circle
+    radius = entrance * sqrt(2.0 * np.pi / (RIM * np.sin(2.0 * np.pi / RIM)))
+    for k in range(RIM):
+        angle = 2.0 * np.pi * k / RIM
+        x, y = radius * np.cos(angle), radius * np.sin(angle)
+        polygon[k, PX], polygon[k, PY] = a * x, a * y + b * slope
+        polygon[k, PREL], polygon[k, PW] = 0.0, 1.0
+        polygon[k, PP], polygon[k, PQ] = x, y
+        for c in range(3):
+            m = min(c, crossings - 1)
+            u, v = to_stop[m, 0, 0] * x, to_stop[m, 0, 0] * y + to_stop[m, 0, 1] * slope
+            polygon[k, PSTOP + 2 * c] = u * axes[0, 0] + v * axes[1, 0]
+            polygon[k, PSTOP + 2 * c + 1] = u * axes[0, 1] + v * axes[1, 1]
+    return RIM

@@ -1,0 +1,198 @@
+"""The ghost pass: distributes paths over workers and collects their light, in an order that threads cannot change."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..model import Layer, Quality
+from ..optics.paths import LightPath
+from .canvas import Canvas, blank, to_layer
+from .ghosts_draft import draw_draft
+from .ghosts_final import FinalPass, draw_final, find_final
+from .shot import Shot
+
+Progress = Callable[[float, str], None]
+
+# pictures drawn side by side before they are added: fixed by size, never by threads, so sums round alike everywhere
+_CHUNKS = ((1_100_000, 8), (2_500_000, 4))
+
+
+@dataclass(frozen=True)
+class GhostPass:
+    """What the ghost pass made.
+
+    Attributes
+    ----------
+    total : Layer
+        All ghosts.
+    singles : tuple of Layer
+        One layer a path, brightest first, when asked for.
+    drawn, dark : int
+        Paths drawn, and paths that pass no light.
+    culled : int
+        Paths left out on purpose.
+    culled_share : float
+        Their part of the flux, by the pre-pass.
+    """
+
+    total: Layer
+    singles: tuple[Layer, ...]
+    drawn: int
+    dark: int
+    culled: int
+    culled_share: float
+
+
+class _Meter:
+    """Counts finished paths over threads, reports them, and carries the wish to stop."""
+
+    def __init__(self, steps: int, progress: Progress | None) -> None:
+        self._steps, self._done, self._progress = max(steps, 1), 0, progress
+        self._lock = threading.Lock()
+        self.cancelled = threading.Event()
+
+    def step(self, what: str) -> None:
+        with self._lock:
+            self._done += 1
+            if self._progress is not None:
+                self._progress(self._done / self._steps, what)
+
+
+def render_ghosts(
+    shots: Sequence[Shot],
+    paths: Sequence[LightPath],
+    quality: Quality,
+    *,
+    singles: int | None = 0,
+    threads: int | None = None,
+    progress: Progress | None = None,
+) -> GhostPass:
+    """Draw every path of every light.
+
+    Parameters
+    ----------
+    shots : sequence of Shot
+    paths : sequence of LightPath
+    quality : Quality
+    singles : int or None
+        How many of the brightest paths also get a layer of their own; None: all.
+    threads : int, optional
+        None: all cores. The pixels do not depend on it.
+    progress : callable, optional
+        Called with the finished part and what was finished.
+
+    Returns
+    -------
+    GhostPass
+    """
+    meter = _Meter(len(paths) * (2 if quality.mode == "final" else 1), progress)
+    with ThreadPoolExecutor(threads) as pool:
+        try:
+            if quality.mode == "draft":
+                return _draft(shots, paths, singles, pool, meter)
+            return _final(shots, paths, quality, singles, pool, meter)
+        except BaseException:
+            # Ctrl-C arrives here: let the workers end at their next path
+            meter.cancelled.set()
+            pool.shutdown(wait=True, cancel_futures=True)
+            raise
+
+
+def _final(
+    shots: Sequence[Shot],
+    paths: Sequence[LightPath],
+    quality: Quality,
+    singles: int | None,
+    pool: ThreadPoolExecutor,
+    meter: _Meter,
+) -> GhostPass:
+    def find(path: LightPath) -> list[FinalPass]:
+        if meter.cancelled.is_set():
+            return []
+        found = [item for item in (find_final(shot, path) for shot in shots) if item is not None]
+        meter.step("looking for ghosts")
+        return found
+
+    found = [items for items in pool.map(find, paths) if items]
+    flux = np.array([sum(item.rough_flux for item in items) for items in found])
+    keep = _worth_drawing(flux, quality.cull)
+    order = [int(k) for k in np.argsort(-flux, kind="stable") if keep[k]]
+
+    def draw(group: list[int]) -> NDArray[np.float32]:
+        canvas = blank(shots[0].size_px)
+        for k in group:
+            if meter.cancelled.is_set():
+                break
+            for item in found[k]:
+                draw_final(item, quality, canvas)
+            meter.step(f"ghost {found[k][0].path.name}")
+        return canvas.plane
+
+    named = [found[k][0].path for k in order]
+    total, layers = _collect(shots, [[k] for k in order], named, singles, draw, pool)
+    share = float(flux[~keep].sum() / flux.sum()) if flux.sum() > 0.0 else 0.0
+    return GhostPass(total, layers, len(order), len(paths) - len(found), int((~keep).sum()), share)
+
+
+def _draft(
+    shots: Sequence[Shot],
+    paths: Sequence[LightPath],
+    singles: int | None,
+    pool: ThreadPoolExecutor,
+    meter: _Meter,
+) -> GhostPass:
+    def draw(group: list[int]) -> NDArray[np.float32]:
+        canvas = blank(shots[0].size_px)
+        for shot in shots:
+            draw_draft(shot, [paths[k] for k in group], canvas)
+        for k in group:
+            meter.step(f"ghost {paths[k].name}")
+        return canvas.plane
+
+    order = list(range(len(paths)))
+    total, layers = _collect(shots, [[k] for k in order], paths, singles, draw, pool)
+    return GhostPass(total, layers, len(paths), 0, 0, 0.0)
+
+
+def _worth_drawing(flux: NDArray[np.float64], cull: float) -> NDArray[np.bool_]:
+    """Keep the brightest paths so that those left out carry no more than `cull` of all flux."""
+    keep = np.ones(len(flux), dtype=np.bool_)
+    order = np.argsort(flux, kind="stable")
+    keep[order[np.cumsum(flux[order]) <= cull * flux.sum()]] = False
+    return keep if cull > 0.0 else np.ones(len(flux), dtype=np.bool_)
+
+
+def _collect(
+    shots: Sequence[Shot],
+    items: list[list[int]],
+    named: Sequence[LightPath],
+    singles: int | None,
+    draw: Callable[[list[int]], NDArray[np.float32]],
+    pool: ThreadPoolExecutor,
+) -> tuple[Layer, tuple[Layer, ...]]:
+    """Draw the first `singles` items by themselves and the others in a fixed number of groups; add all in order."""
+    shot = shots[0]
+    width, height = shot.size_px
+    pixel_area = 1.0 / float(shot.to_pixels[2] * shot.to_pixels[3])
+    alone = len(items) if singles is None else min(singles, len(items))
+    chunks = next((n for size, n in _CHUNKS if width * height <= size), 2)
+    rest = [[k for item in items[alone + c :: chunks] for k in item] for c in range(chunks)]
+    total = np.zeros((3, height, width), dtype=np.float32)
+    layers = []
+    for k, plane in enumerate(pool.map(draw, items[:alone])):
+        total += plane
+        path = named[k]
+        about: dict[str, str | float] = {"path": path.name, "flux_mm2": float(plane.sum(dtype=np.float64) / 3.0)}
+        layers.append(to_layer(f"ghost.{path.name}", plane, pixel_area, about))
+    for plane in pool.map(draw, [group for group in rest if group]):
+        total += plane
+    return to_layer("ghosts", total, pixel_area, {}), tuple(layers)
+
+
+__all__ = ["Canvas", "GhostPass", "render_ghosts"]

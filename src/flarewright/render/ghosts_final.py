@@ -1,0 +1,133 @@
+"""Ghosts, final quality: traced ray bundles on adaptive grids (Hullin et al. 2011).
+
+For every path a pre-pass bounds the accepted pupil, a grid is refined where the map bends, folds or is cut, and each
+triangle's flux is spread over its image. Between traced wavelengths the bundles are interpolated, so that lateral
+colour runs smoothly instead of in steps.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..kernels.bundle import draw_bundle, node_densities
+from ..kernels.trace import ALIVE, REL, X, Y
+from ..model import Quality
+from ..optics.bundle import Bundle, find_region, trace_grid, trace_points
+from ..optics.paths import LightPath
+from .canvas import Canvas
+from .shot import Shot
+
+Floats = NDArray[np.float64]
+
+# lateral colour wider than this many pixels between two drawn wavelengths would show as steps
+BRIDGE_PX = 1.5
+# never more drawings than this between two traced wavelengths
+MOST_BRIDGES = 32
+
+
+@dataclass(frozen=True)
+class FinalPass:
+    """A path as one light makes it, found worth drawing.
+
+    Attributes
+    ----------
+    shot : Shot
+    path : LightPath
+    box : ndarray, shape (4,)
+        Accepted pupil region, mm.
+    rough_flux : float
+        Flux per unit irradiance from the pre-pass, mm^2.
+    """
+
+    shot: Shot
+    path: LightPath
+    box: Floats
+    rough_flux: float
+
+
+def find_final(shot: Shot, path: LightPath) -> FinalPass | None:
+    """Look where a path accepts light; None when it passes nothing.
+
+    Parameters
+    ----------
+    shot : Shot
+    path : LightPath
+
+    Returns
+    -------
+    FinalPass or None
+    """
+    middle = (len(shot.packed.wavelengths_nm) - 1) // 2
+    box, flux = find_region(shot.packed, middle, path, shot.incidence.tilt, shot.opening.radius)
+    if box is None or flux <= 0.0:
+        return None
+    return FinalPass(shot, path, box, flux * shot.light.intensity)
+
+
+def draw_final(item: FinalPass, quality: Quality, canvas: Canvas) -> None:
+    """Trace one path of one light and add it to a canvas.
+
+    Parameters
+    ----------
+    item : FinalPass
+    quality : Quality
+    canvas : Canvas
+        Its plane is added to.
+    """
+    shot, path = item.shot, item.path
+    tilt, opening = shot.incidence.tilt, shot.opening
+    scale = float(max(shot.to_pixels[2], shot.to_pixels[3]))
+    bundle = trace_grid(
+        shot.packed, path, tilt, opening.radius, item.box,
+        tolerance=quality.tolerance_px, scale=scale, view_radius=shot.view_radius,
+    )  # fmt: skip
+    count = len(shot.packed.wavelengths_nm)
+    traced = [trace_points(shot.packed, w, path, tilt, bundle.pupil) for w in range(count)]
+    pieces = _bridges(traced, shot, scale) if quality.bridge else 1
+    fine_nm = _refine(shot.packed.wavelengths_nm, pieces)
+    for m, rgb in enumerate(shot.weights(fine_nm)):
+        if rgb.any():
+            w, part = divmod(m, pieces)
+            data = traced[w] if part == 0 else _between(traced[w], traced[w + 1], part / pieces)
+            _draw(bundle, data, rgb, shot, canvas)
+
+
+def _draw(bundle: Bundle, data: Floats, rgb: Floats, shot: Shot, canvas: Canvas) -> None:
+    opening = shot.opening
+    draw_bundle(
+        data, bundle.pupil, bundle.triangles, node_densities(data, bundle.pupil, bundle.triangles),
+        bundle.path.stop_crossings, opening.blades, opening.mask, opening.half, shot.incidence.axes,
+        shot.to_pixels, shot.gain, rgb, *canvas.scratch,
+    )  # fmt: skip
+
+
+def _bridges(traced: list[Floats], shot: Shot, scale: float) -> int:
+    """Into how many pieces to divide the gap between traced wavelengths: a power of two."""
+    widest = 0.0
+    for short, long in zip(traced, traced[1:], strict=False):
+        passing = (short[:, ALIVE] * long[:, ALIVE] > 0.0) & (np.minimum(short[:, REL], long[:, REL]) <= 1.0)
+        seen = passing & (np.hypot(short[:, X], short[:, Y]) <= shot.view_radius)
+        if seen.any():
+            shift = np.hypot(long[seen, X] - short[seen, X], long[seen, Y] - short[seen, Y])
+            widest = max(widest, float(shift.max()) * scale)
+    pieces = 1
+    while widest / pieces > BRIDGE_PX and pieces < MOST_BRIDGES:
+        pieces *= 2
+    return pieces
+
+
+def _refine(wavelengths_nm: Floats, pieces: int) -> Floats:
+    """Divide every gap between wavelengths into equal pieces."""
+    count = len(wavelengths_nm)
+    at = np.arange((count - 1) * pieces + 1) / pieces
+    return np.interp(at, np.arange(count), wavelengths_nm)
+
+
+def _between(short: Floats, long: Floats, part: float) -> Floats:
+    """Interpolate a bundle between two wavelengths; a ray lives where both live."""
+    data = (1.0 - part) * short + part * long
+    data[:, ALIVE] = np.minimum(short[:, ALIVE], long[:, ALIVE])
+    return data

@@ -1,0 +1,130 @@
+"""From a project to layers: the one renderer that the command line, the library and everything else call."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import pi
+from typing import Any
+
+from ..io.mask_image import read_mask
+from ..model import Layer, Project
+from ..optics.paths import ghost_paths
+from .compose import beauty
+from .direct import DirectImage, direct_image
+from .ghosts import GhostPass, render_ghosts
+from .prepare import Settled, settle
+from .shot import Shot, make_opening, make_shots
+
+Progress = Callable[[float, str], None]
+
+
+@dataclass(frozen=True)
+class Rendering:
+    """A finished render.
+
+    Attributes
+    ----------
+    project : Project
+    layers : tuple of Layer
+        "beauty" first, then the passes and single ghosts that were asked for.
+    summary : dict
+        Facts about lens and picture, ready for JSON.
+    remarks : tuple of str
+        What a person should know: repairs, estimates, what was left out.
+    """
+
+    project: Project
+    layers: tuple[Layer, ...]
+    summary: dict[str, Any]
+    remarks: tuple[str, ...]
+
+
+def render(
+    project: Project, *, threads: int | None = None, progress: Progress | None = None
+) -> Rendering:
+    """Render the flare of a project.
+
+    Parameters
+    ----------
+    project : Project
+    threads : int, optional
+        None: all cores. The pixels do not depend on it.
+    progress : callable, optional
+        Called with the finished part (0 to 1) and what was finished.
+
+    Returns
+    -------
+    Rendering
+        Layers of irradiance on the sensor, in units of the irradiance that a light of intensity 1 gives on a plane
+        facing it (physics.md, "Radiometry").
+
+    Raises
+    ------
+    FlarewrightError
+        When the project cannot be rendered; the message says what, where, and the remedy.
+    """
+    settled = settle(project)
+    mask = None if settled.iris.mask is None else read_mask(settled.iris.mask)
+    opening = make_opening(settled, mask)
+    shots = make_shots(settled, opening)
+    paths = ghost_paths(settled.lens, project.quality.paths)
+    singles = project.output.brightest if project.output.layers == "ghosts" else 0
+    ghosts = render_ghosts(shots, paths, project.quality, singles=singles, threads=threads, progress=progress)
+    images = [direct_image(settled.lens, shot) for shot in shots]
+    passes = [ghosts.total]
+    if project.output.starburst:
+        from .starburst import starburst_of
+
+        passes.insert(0, starburst_of(settled, shots, images, mask))
+    whole = beauty(passes, project.camera.size_px)
+    layers = (whole,)
+    if project.output.layers != "beauty":
+        layers = (whole, *passes, *ghosts.singles)
+    return Rendering(project, layers, _summary(settled, shots, images, ghosts), (*settled.remarks, *_remarks(ghosts)))
+
+
+def _remarks(ghosts: GhostPass) -> tuple[str, ...]:
+    if not ghosts.culled:
+        return ()
+    return (f"{ghosts.culled} ghosts that carry {ghosts.culled_share:.2e} of the ghost light were left out",)
+
+
+def _summary(
+    settled: Settled, shots: tuple[Shot, ...], images: list[DirectImage], ghosts: GhostPass
+) -> dict[str, Any]:
+    order, project = settled.order, settled.project
+    # an extended scene of radiance L images as L times this (physics.md, "Radiometry"); divides layers into plate units
+    scene = pi * images[0].transmittance / (4.0 * order.f_number**2)
+    return {
+        "lens": settled.lens.name,
+        "efl_mm": order.efl,
+        "bfl_mm": order.bfl,
+        "f_number": order.f_number,
+        "entrance_pupil_diameter_mm": order.entrance_pupil_diameter,
+        "sensor_distance_mm": order.sensor_distance,
+        "size_px": list(project.camera.size_px),
+        "sensor_mm": list(project.camera.sensor),
+        "quality": project.quality.mode,
+        "wavelengths_nm": [float(w) for w in shots[0].packed.wavelengths_nm],
+        "scene_irradiance_per_radiance": scene,
+        "lights": [
+            {
+                "name": shot.light.name,
+                "field_deg": list(shot.light.field_deg),
+                "direct_position_mm": list(image.position_mm),
+                "direct_throughput_mm2": [float(flux) for flux in image.throughput_mm2],
+                "transmittance": image.transmittance,
+            }
+            for shot, image in zip(shots, images, strict=True)
+        ],
+        "ghosts": {
+            "drawn": ghosts.drawn,
+            "dark": ghosts.dark,
+            "culled": ghosts.culled,
+            "culled_share": ghosts.culled_share,
+        },
+    }
+
+
+__all__ = ["Rendering", "render"]

@@ -1,0 +1,172 @@
+"""One light seen through a settled lens: everything the passes share."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..model import Light, Project
+from ..optics.bundle import Incidence, incidence
+from ..optics.iris import blade_edges, outline
+from ..optics.pack import PackedLens, pack_lens, resolve_coatings
+from ..optics.spectrum import band_weights, traced_wavelengths
+from .prepare import Settled
+
+Floats = NDArray[np.float64]
+
+# straight edges that stand for a rounded iris in draft quality
+DRAFT_EDGES = 48
+
+
+@dataclass(frozen=True)
+class Opening:
+    """The iris as the kernels read it.
+
+    Attributes
+    ----------
+    blades : ndarray, shape (B, 4)
+        Curved edges (`optics.iris.blade_edges`); the border of a mask image.
+    edges : ndarray, shape (E, 4)
+        The same opening by straight edges.
+    radius : float
+        Circle around the opening, mm.
+    mask : ndarray, shape (A, B)
+        Transmittance image; one texel for none.
+    half : float
+        The mask spans [-half, half], mm.
+    """
+
+    blades: Floats
+    edges: Floats
+    radius: float
+    mask: Floats
+    half: float
+
+    @property
+    def mean_transmittance(self) -> float:
+        """Mean of the mask over the square that it spans; 1 without a mask."""
+        return float(self.mask.mean())
+
+
+@dataclass(frozen=True)
+class Shot:
+    """One light, ready to be drawn.
+
+    Attributes
+    ----------
+    light : Light
+    incidence : Incidence
+    packed : PackedLens
+        At the wavelengths traced for this light.
+    opening : Opening
+    to_pixels : ndarray, shape (4,)
+        Column and row of the axis, pixels per mm across and down.
+    size_px : tuple of int
+    colorspace : str
+    """
+
+    light: Light
+    incidence: Incidence
+    packed: PackedLens
+    opening: Opening
+    to_pixels: Floats
+    size_px: tuple[int, int]
+    colorspace: str
+
+    @property
+    def gain(self) -> float:
+        """Irradiance on the plane of the first vertex."""
+        return self.light.intensity * self.incidence.cosine
+
+    @property
+    def view_radius(self) -> float:
+        """Half diagonal of the picture on the sensor, mm."""
+        half_width = 0.5 * self.size_px[0] / self.to_pixels[2]
+        return float(np.hypot(half_width, 0.5 * self.size_px[1] / self.to_pixels[3]))
+
+    def weights(self, wavelengths_nm: Floats) -> Floats:
+        """Return the RGB weights of wavelengths for this light, shape (N, 3)."""
+        return _weights(self.light, tuple(wavelengths_nm), self.colorspace)
+
+
+@lru_cache(maxsize=64)
+def _weights(light: Light, wavelengths_nm: tuple[float, ...], colorspace: str) -> Floats:
+    return band_weights(light.spectrum, np.array(wavelengths_nm), colorspace)  # type: ignore[arg-type]
+
+
+def make_opening(settled: Settled, mask: Floats | None) -> Opening:
+    """Turn an iris, or a mask image, into what the kernels read.
+
+    Parameters
+    ----------
+    settled : Settled
+    mask : ndarray, shape (A, B), or None
+        Transmittance in [0, 1], row 0 up.
+
+    Returns
+    -------
+    Opening
+    """
+    semi = settled.order.stop_semi_diameter
+    if mask is not None:
+        # the mask ends at its own border, so the border cuts as four blades
+        square = np.array([[1.0, 0.0, semi, 0.0], [0.0, 1.0, semi, 0.0], [-1.0, 0.0, semi, 0.0], [0.0, -1.0, semi, 0.0]])
+        return Opening(square, square, float(np.sqrt(2.0) * semi), np.ascontiguousarray(mask, dtype=np.float64), semi)
+    iris = settled.iris
+    curved = iris.blades == 0 or iris.rounding > 0.0
+    border = outline(iris, semi, DRAFT_EDGES if curved else iris.blades)
+    if curved:
+        # chords lose a little of the arc's area; give it back
+        step = 2.0 * np.pi / DRAFT_EDGES
+        border = border * float(np.sqrt(step / np.sin(step)))
+    return Opening(
+        blades=blade_edges(iris, semi),
+        edges=_straight(border),
+        radius=float(np.hypot(border[:, 0], border[:, 1]).max()),
+        mask=np.ones((1, 1)),
+        half=1.0,
+    )
+
+
+def _straight(border: Floats) -> Floats:
+    """Turn a closed counter-clockwise polyline into straight edges (normal, offset, curvature 0)."""
+    along = np.roll(border, -1, axis=0) - border
+    length = np.hypot(along[:, 0], along[:, 1])
+    along, start = along[length > 1e-12] / length[length > 1e-12, None], border[length > 1e-12]
+    normal = np.stack([along[:, 1], -along[:, 0]], axis=1)
+    offset = (normal * start).sum(axis=1)
+    return np.column_stack([normal, offset, np.zeros(len(offset))])
+
+
+def make_shots(settled: Settled, opening: Opening) -> tuple[Shot, ...]:
+    """Prepare every light of a project.
+
+    Parameters
+    ----------
+    settled : Settled
+    opening : Opening
+
+    Returns
+    -------
+    tuple of Shot
+    """
+    project: Project = settled.project
+    width, height = project.camera.size_px
+    sensor = project.camera.sensor
+    to_pixels = np.array([width / 2.0, height / 2.0, width / sensor[0], height / sensor[1]])
+    coatings = resolve_coatings(settled.lens, project.coating)
+    packs: dict[tuple[float, ...], PackedLens] = {}
+    shots = []
+    for light in project.lights:
+        wavelengths_nm = traced_wavelengths(project.quality.wavelengths, light.spectrum)
+        key = tuple(wavelengths_nm)
+        if key not in packs:
+            packs[key] = pack_lens(settled.lens, settled.order, coatings, wavelengths_nm)
+        colorspace = project.output.colorspace
+        shots.append(
+            Shot(light, incidence(light.field_deg), packs[key], opening, to_pixels, (width, height), colorspace)
+        )
+    return tuple(shots)
