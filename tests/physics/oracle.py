@@ -464,7 +464,7 @@ class Estimate:
         go like 1 / d_z with d_z spread evenly: the second moment on an unbounded plane is infinite and the first one
         diverges like a logarithm.
         """
-        return self.least_dz > 0.01
+        return self.least_dz > 1e-3
 
     @property
     def relative_se(self) -> float:

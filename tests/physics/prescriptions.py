@@ -142,15 +142,16 @@ def system(table: Table, f_number: float) -> System:
 
 
 def lens(table: Table, f_number: float, name: str = "typed", coatings: Any = None) -> Any:
-    """Return the program's view of a table: a `flarewright.model.Lens`."""
-    from flarewright.model import Lens, Medium, Stop, Surface
+    """Return the program's view of a table: a `flarewright.model.Lens` whose glasses have no dispersion."""
+    from flarewright.model import Dispersion, Lens, Medium, Stop, Surface
 
     rows: list[Any] = []
     for k, (radius, thickness, n, h) in enumerate(table):
         if radius == "stop":
             rows.append(Stop(thickness=thickness))
             continue
-        medium = None if n == 1.0 else Medium(n_d=n)
+        flat = Dispersion(glass="Cauchy", formula="cauchy", coefficients=(n, 0.0), range_nm=(300.0, 1100.0))
+        medium = None if n == 1.0 else Medium(n_d=n, dispersion=flat)
         coating = None if coatings is None else coatings[k]
         curvature = 0.0 if radius == 0 else 1.0 / radius
         rows.append(Surface(curvature=curvature, thickness=thickness, medium=medium, semi_diameter=h, coating=coating))

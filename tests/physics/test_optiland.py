@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 import pytest
 from oracle import Rays, System, direction, trace
-from prescriptions import HELIAR, TRIPLET, system
+from prescriptions import HELIAR, TRIPLET, lens, system
 
 pytestmark = pytest.mark.oracle
 
@@ -89,3 +89,27 @@ def test_the_oracle_traces_as_optiland_does(name, conic):
     seen = [compare(trace(s, p, x, y, f), t) for (p, f), t in zip(cases, theirs, strict=True)]
     assert sum(seen) > 200
     assert sum(n > 0 for n in seen) > 0.6 * len(seen)
+
+
+@pytest.mark.usefixtures("optiland")
+@pytest.mark.parametrize("name", CASES)
+def test_the_program_traces_as_optiland_does(name):
+    from flarewright.optics.pack import pack_lens
+    from flarewright.optics.paraxial import first_order
+    from flarewright.optics.paths import direct_path, ghost_path
+    from flarewright.optics.trace import trace_rays
+
+    table, f_number, paths = CASES[name]
+    a_lens, s = lens(table, f_number), system(table, f_number)
+    packed = pack_lens(a_lens, first_order(a_lens), (None,) * len(a_lens.rows), np.array([587.56]))
+    cases = [(p, f) for p in paths for f in FIELDS]
+    theirs = ask_optiland([job(s, p, f) for p, f in cases])
+    x, y = points()
+    seen = 0
+    for (path, field), answer in zip(cases, theirs, strict=True):
+        rays = trace_rays(packed, direct_path(a_lens) if path is None else ghost_path(a_lens, *path), x, y, field)
+        near = (rays["status"] > 0) & (rays["rel_radius"] < 1.0)
+        for axis in ("x", "y"):
+            assert np.abs(-rays[axis][near] - np.array(answer[axis])[near]).max(initial=0.0) < 1e-9
+        seen += int(near.sum())
+    assert seen > 200

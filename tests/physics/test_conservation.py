@@ -1,0 +1,153 @@
+"""What must not change: laws that hold whatever the numbers are. Public API only, no oracle."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from prescriptions import CANON, HELIAR, TESSAR, TRIPLET, lens
+
+from flarewright.model import Everywhere, Lens, QuarterWave, Stop
+
+ghosts = pytest.importorskip("flarewright.optics.ghosts", exc_type=ImportError)
+FIELD = (8.0, 5.0)
+
+
+def by_path(table) -> dict:
+    rows = {(g.first_reflection, g.second_reflection): g for g in table.ghosts}
+    return {None: table.direct, **rows}
+
+
+def carrying(table, floor: float = 1e-4) -> dict:
+    """Direct image and ghosts above a part of the strongest, by path."""
+    best = table.ghosts[0].throughput_mm2
+    return {p: g for p, g in by_path(table).items() if g.throughput_mm2 > floor * best}
+
+
+def scaled(a_lens: Lens, factor: float) -> Lens:
+    rows = []
+    for row in a_lens.rows:
+        changes = {"thickness": row.thickness * factor}
+        if not isinstance(row, Stop):
+            changes |= {"curvature": row.curvature / factor, "semi_diameter": row.semi_diameter * factor}
+        rows.append(row.replace(**changes))
+    return a_lens.replace(rows=tuple(rows))
+
+
+@pytest.mark.parametrize(("prescription", "every", "same_side"), [(HELIAR, 28, 13), (TESSAR, 21, 9), (CANON, 351, 171)])
+def test_ghost_counts(prescription, every, same_side):
+    from flarewright.optics.paths import ghost_paths
+
+    a_lens = lens(prescription, 4.0)
+    assert len(ghost_paths(a_lens, "all")) == every
+    assert len(ghost_paths(a_lens, "same-side")) == same_side
+
+
+def test_ghost_table_lists_every_path_brightest_first():
+    table = ghosts.ghost_table(lens(HELIAR, 4.5), FIELD)
+    assert len(table.ghosts) == 28
+    assert len({(g.first_reflection, g.second_reflection) for g in table.ghosts}) == 28
+    flux = [g.throughput_mm2 for g in table.ghosts]
+    assert flux == sorted(flux, reverse=True)
+    same = ghosts.ghost_table(lens(HELIAR, 4.5), FIELD, paths="same-side")
+    assert len(same.ghosts) == 13
+    every = by_path(table)
+    for path, g in by_path(same).items():
+        assert g == every[path]
+
+
+@pytest.mark.parametrize(("at", "part"), [(0, 0.4), (3, 0.5), (7, 0.25)])
+def test_a_surface_that_is_none_changes_nothing(at, part):
+    """A plane within the gap behind row `at`, same index on both sides: old paths keep all, new ones carry 0."""
+    whole = lens(HELIAR, 4.5)
+    row = whole.rows[at]
+    extra = row.replace(curvature=0.0, thickness=row.thickness * (1 - part), semi_diameter=60.0, coating=None)
+    rows = (*whole.rows[:at], row.replace(thickness=row.thickness * part), extra, *whole.rows[at + 1 :])
+    a = by_path(ghosts.ghost_table(whole, FIELD))
+    b = by_path(ghosts.ghost_table(whole.replace(rows=rows), FIELD))
+
+    def renamed(k: int) -> int:
+        return k if k <= at else k + 1
+
+    for path, g in a.items():
+        h = b.pop(path and (renamed(path[0]), renamed(path[1])))
+        assert h.throughput_mm2 == pytest.approx(g.throughput_mm2, rel=1e-9)
+        if g.rms_radius_mm < 100.0:
+            assert h.centroid_mm == pytest.approx(g.centroid_mm, abs=1e-7 * g.rms_radius_mm + 1e-9)
+            assert h.rms_radius_mm == pytest.approx(g.rms_radius_mm, rel=1e-7)
+    assert len(b) == 8
+    assert all(h.throughput_mm2 == pytest.approx(0.0, abs=1e-15) for h in b.values())
+
+
+@pytest.mark.parametrize("prescription", [HELIAR, TRIPLET])
+def test_mirrored_light_mirrors_the_table(prescription):
+    a_lens = lens(prescription, 4.5)
+    a = by_path(ghosts.ghost_table(a_lens, FIELD))
+    for sx, sy in ((-1, 1), (1, -1), (-1, -1)):
+        b = by_path(ghosts.ghost_table(a_lens, (sx * FIELD[0], sy * FIELD[1])))
+        for path, g in carrying(ghosts.ghost_table(a_lens, FIELD)).items():
+            h = b[path]
+            assert h.throughput_mm2 == pytest.approx(a[path].throughput_mm2, rel=1e-6)
+            assert (sx * h.centroid_mm[0], sy * h.centroid_mm[1]) == pytest.approx(
+                g.centroid_mm, abs=1e-5 * g.rms_radius_mm
+            )
+            assert h.rms_radius_mm == pytest.approx(g.rms_radius_mm, rel=1e-5)
+
+
+@pytest.mark.parametrize("azimuth_deg", [30.0, 90.0, 211.0])
+def test_turning_the_light_turns_the_ghosts(azimuth_deg):
+    """A round lens has no azimuth: flux and size stay, centroids turn with the light."""
+    a_lens = lens(HELIAR, 4.5)
+    slope = np.tan(np.radians(9.0))
+    phi = np.radians(azimuth_deg)
+    field = tuple(np.degrees(np.arctan(slope * np.array([np.cos(phi), np.sin(phi)]))).tolist())
+    b = by_path(ghosts.ghost_table(a_lens, field))
+    for path, g in carrying(ghosts.ghost_table(a_lens, (9.0, 0.0))).items():
+        h = b[path]
+        x, y = g.centroid_mm
+        assert y == pytest.approx(0.0, abs=1e-5 * g.rms_radius_mm)
+        turned = (x * np.cos(phi) - y * np.sin(phi), x * np.sin(phi) + y * np.cos(phi))
+        assert h.throughput_mm2 == pytest.approx(g.throughput_mm2, rel=1e-6)
+        assert h.centroid_mm == pytest.approx(turned, abs=1e-5 * g.rms_radius_mm)
+        assert h.rms_radius_mm == pytest.approx(g.rms_radius_mm, rel=1e-5)
+
+
+def test_a_lens_of_twice_the_size():
+    """Four times the area, twice the distances; bare glass knows no wavelength."""
+    one = lens(TRIPLET, 5.0)
+    a = carrying(ghosts.ghost_table(one, FIELD))
+    b = by_path(ghosts.ghost_table(scaled(one, 2.0), FIELD))
+    for path, g in a.items():
+        assert b[path].throughput_mm2 == pytest.approx(4.0 * g.throughput_mm2, rel=2e-3)
+        assert b[path].centroid_mm == pytest.approx([2.0 * v for v in g.centroid_mm], abs=4e-3 * g.rms_radius_mm)
+        assert b[path].rms_radius_mm == pytest.approx(2.0 * g.rms_radius_mm, rel=4e-3)
+
+
+def test_light_on_the_axis_lands_on_the_axis():
+    table = ghosts.ghost_table(lens(HELIAR, 4.5), (0.0, 0.0))
+    for g in carrying(table).values():
+        assert g.centroid_mm == pytest.approx((0.0, 0.0), abs=2e-3 * g.rms_radius_mm)
+
+
+def test_no_more_light_comes_out_than_goes_in():
+    """Direct image and all ghosts together stay below what the front surface takes in."""
+    for field in ((0.0, 0.0), FIELD, (20.0, 10.0)):
+        table = ghosts.ghost_table(lens(HELIAR, 4.5), field)
+        total = table.direct.throughput_mm2 + sum(g.throughput_mm2 for g in table.ghosts)
+        assert 0.0 < total < np.pi * 14.0**2
+
+
+def test_flux_falls_with_the_area_of_the_stop():
+    """Direct image, on the axis: throughput goes like 1 / N^2 and the same T."""
+    a_lens = lens(HELIAR, 4.5)
+    wide, tight = (ghosts.ghost_table(a_lens, (0.0, 0.0), f_number=n).direct.throughput_mm2 for n in (11.0, 22.0))
+    assert wide / tight == pytest.approx(4.0, rel=0.01)
+
+
+def test_a_coating_dims_ghosts_and_brightens_the_image():
+    a_lens = lens(HELIAR, 4.5)
+    bare = ghosts.ghost_table(a_lens, FIELD)
+    coated = ghosts.ghost_table(a_lens, FIELD, coating=Everywhere(coating=QuarterWave(center_wavelength_nm=587.56)))
+    assert coated.direct.throughput_mm2 > bare.direct.throughput_mm2
+    both = [(p, g, by_path(coated)[p]) for p, g in carrying(bare).items() if p is not None]
+    cemented = {1, 7}
+    assert all(h.throughput_mm2 < g.throughput_mm2 for p, g, h in both if not cemented & set(p))
