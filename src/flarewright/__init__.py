@@ -1,3 +1,91 @@
-"""Flarewright: lens flare as physics."""
+"""Flarewright: lens flare as physics.
+
+>>> import flarewright as fw
+>>> project = fw.Project(lens="heliar-tronnier", lights=[fw.Light(field_deg=(10, 5))])
+>>> rendering = fw.render(project)                                      # doctest: +SKIP
+>>> beauty = rendering.layers[0].pixels                                 # doctest: +SKIP
+
+Names are imported when they are first used, so `import flarewright` costs nothing.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
 from ._version import __version__ as __version__
+
+if TYPE_CHECKING:
+    from .errors import FlarewrightError as FlarewrightError
+    from .errors import GlassError as GlassError
+    from .errors import LensError as LensError
+    from .errors import OutputError as OutputError
+    from .errors import ProjectError as ProjectError
+    from .io.exr import write_exr as write_exr
+    from .io.project_file import read_project as read_project
+    from .model import D65 as D65
+    from .model import AsLens as AsLens
+    from .model import Bare as Bare
+    from .model import BlackBody as BlackBody
+    from .model import Camera as Camera
+    from .model import EqualEnergy as EqualEnergy
+    from .model import Everywhere as Everywhere
+    from .model import Film as Film
+    from .model import Iris as Iris
+    from .model import Layer as Layer
+    from .model import Lens as Lens
+    from .model import Light as Light
+    from .model import Lines as Lines
+    from .model import Medium as Medium
+    from .model import Output as Output
+    from .model import PerRow as PerRow
+    from .model import Preset as Preset
+    from .model import Project as Project
+    from .model import Quality as Quality
+    from .model import QuarterWave as QuarterWave
+    from .model import Stack as Stack
+    from .model import Stop as Stop
+    from .model import Surface as Surface
+    from .model import Tabulated as Tabulated
+    from .optics.ghosts import ghost_table
+    from .render.prepare import first_order
+    from .render.prepare import load_lens as load_lens
+    from .render.render import Rendering as Rendering
+    from .render.render import render as render
+
+    ghosts = ghost_table
+    paraxial = first_order
+
+_HOMES = {
+    ".errors": ("FlarewrightError", "GlassError", "LensError", "OutputError", "ProjectError"),
+    ".model": (
+        "D65", "AsLens", "Bare", "BlackBody", "Camera", "EqualEnergy", "Everywhere", "Film", "Iris", "Layer", "Lens",
+        "Light", "Lines", "Medium", "Output", "PerRow", "Preset", "Project", "Quality", "QuarterWave", "Stack", "Stop",
+        "Surface", "Tabulated",
+    ),
+    ".io.exr": ("write_exr",),
+    ".io.project_file": ("read_project",),
+    ".optics.ghosts": ("ghosts",),
+    ".render.prepare": ("load_lens", "paraxial"),
+    ".render.render": ("Rendering",),
+    # The package itself, which may be called: a function of its name could not live beside it.
+    "": ("render",),
+}  # fmt: skip
+_HOME = {name: home for home, names in _HOMES.items() for name in names}
+_NAME_THERE = {"ghosts": "ghost_table", "paraxial": "first_order"}
+
+__all__ = ["__version__", *sorted(_HOME)]  # noqa: PLE0604
+
+
+def __getattr__(name: str) -> Any:
+    home = _HOME.get(name)
+    if home is None:
+        raise AttributeError(f"module 'flarewright' has no attribute {name!r}")
+    module = import_module(home or f".{name}", __name__)
+    value = getattr(module, _NAME_THERE.get(name, name)) if home else module
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -99,9 +99,11 @@ def _print_table(table: GhostTable, name: str, angles: tuple[float, float], brig
         title=f"{name} · f/{table.f_number:g} · efl {table.efl:.2f} mm · light at {angles[0]:g}, {angles[1]:g} degrees",
         caption="Peak: brightest irradiance over the direct image's flux, 1/mm². Focus: mm behind the sensor.",
     )
-    columns = ("path", "throughput mm²", "of direct", "centroid mm", "rms radius mm", "peak 1/mm²", "bounded by", "focus mm")
-    for column in columns:
-        out.add_column(column, justify="left" if column in ("path", "bounded by") else "right", no_wrap=True)
+    out.add_column("path", no_wrap=True)
+    for column in ("throughput mm²", "of direct", "centroid mm", "rms radius mm", "peak 1/mm²"):
+        out.add_column(column, justify="right", no_wrap=True)
+    out.add_column("bounded by", no_wrap=True)
+    out.add_column("focus mm", justify="right", no_wrap=True)
     direct = table.direct
     out.add_row("direct", *_cells(direct, direct), end_section=True)
     for row in table.ghosts[:brightest]:

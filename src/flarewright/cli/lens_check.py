@@ -54,7 +54,9 @@ def check(
 def _print(results: list[dict[str, Any]]) -> None:
     for result in results:
         if result["usable"]:
-            print(f"{result['file']}: usable, {result['name']}, efl {result['efl_mm']:.2f} mm, f/{result['f_number']:g}")
+            print(
+                f"{result['file']}: usable, {result['name']}, efl {result['efl_mm']:.2f} mm, f/{result['f_number']:g}"
+            )
             findings = result["remarks"]
         else:
             print(f"{result['file']}: refused, {result['reason']}")

@@ -21,7 +21,7 @@ def convert(
     check_place(target, ".toml")
     if target.exists() and Path(source).exists() and target.samefile(source):
         raise OutputError(f"{target} is the file to convert; give another name for the output")
-    from ..io.lens_file import write_lens
+    from ..io.lens_writer import write_lens
     from ..render.prepare import load_lens
 
     remarks: list[str] = []

@@ -7,6 +7,6 @@ from .common import print_json
 
 def schema() -> None:
     """Print the JSON Schema of a lens file; TOML editors use it to check while a person types."""
-    from ..io.lens_file import lens_json_schema
+    from ..io.lens_schema import lens_json_schema
 
     print_json(lens_json_schema())

@@ -13,8 +13,8 @@ EPILOG = "Look at one with: flarewright lens show heliar-tronnier --plot heliar.
 
 def lenses(as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False) -> None:
     """List the lenses that ship, with focal length, f-number, field and source."""
-    from ..io.library import lens_path, shipped
     from ..io.lens_file import read_lens_toml
+    from ..io.library import lens_path, shipped
     from ..render.prepare import first_order
 
     found: list[dict[str, Any]] = []

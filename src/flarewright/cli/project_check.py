@@ -34,8 +34,9 @@ def check(
         )
         return
     tell(settled.remarks)
-    count = len(settled.project.lights)
+    project, order = settled.project, settled.order
+    lights = f"{len(project.lights)} light{'s' if len(project.lights) > 1 else ''}"
+    size = "x".join(str(side) for side in project.camera.size_px)
     print(
-        f"{file}: usable, {settled.lens.name} at f/{settled.order.f_number:g}, {count} light{'s' if count > 1 else ''}, "
-        f"{settled.project.camera.size_px[0]}x{settled.project.camera.size_px[1]} pixels, {settled.project.quality.mode}"
+        f"{file}: usable, {settled.lens.name} at f/{order.f_number:g}, {lights}, {size} pixels, {project.quality.mode}"
     )

@@ -11,12 +11,17 @@ import typer
 from ..errors import OutputError
 from .common import check_place, field_angles, tell
 
-EPILOG = "Example: flarewright project init heliar-tronnier -o shot.toml · then: flarewright render --project shot.toml -o shot.exr"
+EPILOG = (
+    "Example: flarewright project init heliar-tronnier -o shot.toml · "
+    "then: flarewright render --project shot.toml -o shot.exr"
+)
 
 
 def init(
     lens: Annotated[str, typer.Argument(metavar="LENS", help="A shipped lens or a lens file.")],
-    output: Annotated[Path | None, typer.Option("-o", "--output", help="The project file, *.toml; left out: stdout.")] = None,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="The project file, *.toml; left out: stdout.")
+    ] = None,
     light: Annotated[str, typer.Option(metavar="X,Y", help="The first light, degrees right and up.")] = "10,5",
     force: Annotated[bool, typer.Option("--force", help="Replace a file that is there already.")] = False,
 ) -> None:

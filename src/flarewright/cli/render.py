@@ -1,0 +1,223 @@
+"""`flarewright render`: from a lens and a light to a layered, linear picture."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from ..errors import ProjectError
+from .common import check_place, print_json, tell
+
+if TYPE_CHECKING:
+    from ..model import Layer, Project
+    from ..render.render import Rendering
+
+EPILOG = (
+    "Examples: flarewright render heliar-tronnier --light 10,5 -o flare.exr · "
+    "flarewright render canon-28-80 --light -8,3 --light 2,6 --intensity 1 --intensity 0.2 --spectrum black-body:3200 "
+    "--fstop 8 --blades 7 --coating quarter-wave:550 --size 1920x1080 --layers ghosts --brightest 30 --half "
+    "-o shot.exr · "
+    "flarewright render --project shot.toml --quality draft -o test.exr"
+)
+
+_LIGHT, _LENS, _CAMERA, _WORK, _OUT = "Light", "Lens", "Camera", "Quality", "Output"
+
+
+def render(
+    output: Annotated[
+        Path, typer.Option("-o", "--output", metavar="OUT.exr", help="The EXR file.", rich_help_panel=_OUT)
+    ],
+    lens: Annotated[str | None, typer.Argument(metavar="[LENS]", help="A shipped lens or a lens file.")] = None,
+    project: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="A project file; flags given beside it win over it.")
+    ] = None,
+    light: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="X,Y", help="Field angles in degrees, right and up; may be repeated.", rich_help_panel=_LIGHT
+        ),
+    ] = None,
+    intensity: Annotated[
+        list[float] | None,
+        typer.Option(help="Irradiance of the light: once for all, or once per light.", rich_help_panel=_LIGHT),
+    ] = None,
+    spectrum: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="d65, equal-energy, black-body:K, lines:NM,NM*POWER or a .csv: once for all, or once per light.",
+            rich_help_panel=_LIGHT,
+        ),
+    ] = None,
+    fstop: Annotated[
+        float | None, typer.Option(help="f-number; wide open when left out.", rich_help_panel=_LENS)
+    ] = None,
+    blades: Annotated[int | None, typer.Option(help="Blades of the iris, 0 is round.", rich_help_panel=_LENS)] = None,
+    rotation: Annotated[
+        float | None, typer.Option(help="Turns the blades, degrees counter-clockwise.", rich_help_panel=_LENS)
+    ] = None,
+    rounding: Annotated[
+        float | None, typer.Option(help="0 straight blades, 1 a full circle.", rich_help_panel=_LENS)
+    ] = None,
+    iris_image: Annotated[
+        Path | None, typer.Option(help="A grey image as the iris; white transmits.", rich_help_panel=_LENS)
+    ] = None,
+    coating: Annotated[
+        str | None,
+        typer.Option(
+            help="none, quarter-wave:NM, preset:NAME, lens, film:N:NM, stack:N:NM,... or a coating file.",
+            rich_help_panel=_LENS,
+        ),
+    ] = None,
+    focus: Annotated[
+        float | None,
+        typer.Option(help="Plane in focus, mm in front of the lens; infinity when left out.", rich_help_panel=_LENS),
+    ] = None,
+    size: Annotated[
+        str | None, typer.Option(metavar="WxH", help="Picture in pixels (1280x720).", rich_help_panel=_CAMERA)
+    ] = None,
+    sensor: Annotated[
+        str | None,
+        typer.Option(metavar="WxH", help="Sensor in mm (36 wide, square pixels).", rich_help_panel=_CAMERA),
+    ] = None,
+    sensor_distance: Annotated[
+        float | None,
+        typer.Option(help="Last vertex to sensor, mm; the paraxial focus when left out.", rich_help_panel=_CAMERA),
+    ] = None,
+    quality: Annotated[
+        str | None,
+        typer.Option(help="draft: matrices, milliseconds; final: traced rays.", rich_help_panel=_WORK),
+    ] = None,
+    wavelengths: Annotated[
+        int | None, typer.Option(help="Traced wavelengths: 3 for a draft, 7 to 31 for final.", rich_help_panel=_WORK)
+    ] = None,
+    paths: Annotated[
+        str | None, typer.Option(help="Ghost paths: all, or same-side of the stop.", rich_help_panel=_WORK)
+    ] = None,
+    threads: Annotated[
+        int | None, typer.Option(min=1, help="All cores when left out; pixels do not change.", rich_help_panel=_WORK)
+    ] = None,
+    layers: Annotated[
+        str | None,
+        typer.Option(help="beauty; passes: also starburst, ghosts; ghosts: also each ghost.", rich_help_panel=_OUT),
+    ] = None,
+    brightest: Annotated[
+        int | None, typer.Option(help="Of single ghosts, write only so many.", rich_help_panel=_OUT)
+    ] = None,
+    no_starburst: Annotated[
+        bool, typer.Option("--no-starburst", help="Leave out the light's direct image.", rich_help_panel=_OUT)
+    ] = False,
+    colorspace: Annotated[str | None, typer.Option(help="rec709 or acescg, linear.", rich_help_panel=_OUT)] = None,
+    half: Annotated[
+        bool | None, typer.Option("--half/--float", help="16 or 32 bits a value.", rich_help_panel=_OUT)
+    ] = None,
+    full_windows: Annotated[
+        bool,
+        typer.Option("--full-windows", help="Single ghosts at full size, for Blender.", rich_help_panel=_OUT),
+    ] = False,
+    exposure: Annotated[
+        float | None, typer.Option(help="Stops, for the PNG only; automatic when left out.", rich_help_panel=_OUT)
+    ] = None,
+    view: Annotated[str, typer.Option(help="srgb or filmic, for the PNG only.", rich_help_panel=_OUT)] = "srgb",
+    no_png: Annotated[
+        bool, typer.Option("--no-png", help="Write no PNG beside the EXR.", rich_help_panel=_OUT)
+    ] = False,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print a summary as one JSON object.", rich_help_panel=_OUT)
+    ] = False,
+) -> None:
+    """Render the flare of a lens into a layered, linear EXR, with a PNG to look at.
+
+    Every value is an irradiance on the sensor relative to a light of irradiance 1, so layers add up to the beauty.
+    """
+    check_place(output, ".exr")
+    if view not in ("srgb", "filmic"):
+        raise ProjectError(f"--view {view!r} is unknown; choose srgb or filmic")
+    if exposure is not None and not -100.0 <= exposure <= 100.0:
+        raise ProjectError(f"--exposure {exposure:g} is out of range; choose between -100 and 100 stops")
+    from .render_flags import Flags, build_project
+
+    flags = Flags(
+        lens=lens, project=project, light=light or [], intensity=intensity or [], spectrum=spectrum or [],
+        fstop=fstop, blades=blades, rotation=rotation, rounding=rounding, iris_image=iris_image, coating=coating,
+        focus=focus, size=size, sensor=sensor, sensor_distance=sensor_distance, quality=quality,
+        wavelengths=wavelengths, paths=paths, layers=layers, brightest=brightest, no_starburst=no_starburst,
+        colorspace=colorspace, half=half,
+    )  # fmt: skip
+    rendering = _render(build_project(flags), threads)
+    files, remarks = _write(rendering, output, full_windows, None if no_png else (exposure, view))
+    remarks = [*rendering.remarks, *remarks]
+    tell(remarks)
+    if as_json:
+        print_json({**rendering.summary, **files, "remarks": remarks})
+    else:
+        tell(f"wrote {name}" for name in (files["output"], files.get("preview")) if name)
+
+
+def _render(project: Project, threads: int | None) -> Rendering:
+    """Render with a progress bar where someone looks at it."""
+    import sys
+
+    from ..render.render import render as render_project
+
+    if not sys.stderr.isatty():
+        return render_project(project, threads=threads)
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("rendering", total=1.0)
+        return render_project(
+            project,
+            threads=threads,
+            progress=lambda done, what: bar.update(task, completed=done, description=what),
+        )
+
+
+def _write(
+    rendering: Rendering, output: Path, full_windows: bool, look: tuple[float | None, str] | None
+) -> tuple[dict[str, Any], list[str]]:
+    """Write the EXR and its preview; return what was written where, and remarks."""
+    from .. import __version__
+    from ..io.exr import write_exr
+    from ..io.project_file import project_text
+
+    project = rendering.project
+    width, height = project.camera.size_px
+    sensor = project.camera.sensor
+    remarks = list(
+        write_exr(
+            output,
+            rendering.layers,
+            (width, height),
+            pixel_type=project.output.pixel_type,
+            metadata={"version": __version__, "project": project_text(project)},
+            pixel_aspect=(sensor[0] / width) / (sensor[1] / height),
+            colorspace=project.output.colorspace,
+            full_windows=full_windows,
+        )
+    )
+    files: dict[str, Any] = {"output": str(output), "layers": [layer.name for layer in rendering.layers]}
+    if look is not None:
+        files |= _write_preview(rendering.layers, project, output.with_suffix(".png"), *look)
+        remarks.append(f"the preview shows {files['view']}")
+    return files, remarks
+
+
+def _write_preview(
+    layers: tuple[Layer, ...], project: Project, path: Path, exposure: float | None, transform: Any
+) -> dict[str, Any]:
+    from .. import __version__
+    from ..io.png import write_png
+    from ..render.display import auto_exposure, view, view_text
+
+    colorspace = project.output.colorspace
+    # The direct image is a million times brighter than the ghosts, which are what a person wants to see.
+    measured = next((layer for layer in layers if layer.name == "ghosts"), layers[0])
+    stops = auto_exposure(measured.pixels, colorspace) if exposure is None else exposure
+    stated = view_text(stops, transform, colorspace, automatic=exposure is None)
+    pixels = view(layers[0].pixels, stops, transform, colorspace)
+    write_png(path, pixels, {"Software": f"Flarewright {__version__}", "Description": stated})
+    return {"preview": str(path), "view": stated, "exposure_stops": stops}

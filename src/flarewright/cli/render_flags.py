@@ -1,0 +1,186 @@
+"""The flags of `flarewright render` as a project: shorthand for what a project file says."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from ..errors import ProjectError
+from ..io.project_file import ProjectFileError, explain, parse_coating_choice, read_project
+from ..io.spectrum_text import parse_spectrum
+from ..model import Iris, Light, Project
+from .common import field_angles, pair
+
+# Where a finding about a project belongs when flags made the project.
+_FLAG_OF = {
+    "f_number": "--fstop",
+    "iris.blades": "--blades",
+    "iris.rotation_deg": "--rotation",
+    "iris.rounding": "--rounding",
+    "camera.size_px": "--size",
+    "camera.sensor_mm": "--sensor",
+    "camera.sensor_distance": "--sensor-distance",
+    "camera.focus_distance": "--focus",
+    "quality.mode": "--quality",
+    "quality.wavelengths": "--wavelengths",
+    "quality.paths": "--paths",
+    "output.layers": "--layers",
+    "output.brightest": "--brightest",
+    "output.colorspace": "--colorspace",
+    "intensity": "--intensity",
+}
+
+
+@dataclass(frozen=True)
+class Flags:
+    """What was given on the command line; None and empty: not given."""
+
+    lens: str | None
+    project: Path | None
+    light: list[str]
+    intensity: list[float]
+    spectrum: list[str]
+    fstop: float | None
+    blades: int | None
+    rotation: float | None
+    rounding: float | None
+    iris_image: Path | None
+    coating: str | None
+    focus: float | None
+    size: str | None
+    sensor: str | None
+    sensor_distance: float | None
+    quality: str | None
+    wavelengths: int | None
+    paths: str | None
+    layers: str | None
+    brightest: int | None
+    no_starburst: bool
+    colorspace: str | None
+    half: bool | None
+
+
+def build_project(flags: Flags) -> Project:
+    """Return the project that the flags mean, on top of the project file if there is one.
+
+    Parameters
+    ----------
+    flags : Flags
+
+    Returns
+    -------
+    Project
+
+    Raises
+    ------
+    ProjectError
+        When a flag cannot be used or something is missing; several findings are all listed.
+    """
+    base = read_project(flags.project) if flags.project is not None else None
+    if base is None and flags.lens is None:
+        raise ProjectError("no lens is given; name one (flarewright lenses lists them) or give a --project file")
+    if base is None and not flags.light:
+        raise ProjectError("no light is given; say where it is with --light X,Y in degrees, --light 10,5 say")
+    fields: dict[str, Any] = {name: getattr(base, name) for name in Project.model_fields} if base else {}
+    if flags.lens is not None:
+        fields["lens"] = flags.lens
+    fields["lights"] = _lights(flags, base.lights if base else ())
+    if flags.fstop is not None:
+        fields["f_number"] = flags.fstop
+    if flags.coating is not None:
+        fields["coating"] = parse_coating_choice(flags.coating)
+    if (iris := _iris(flags, fields["lens"], base)) is not None:
+        fields["iris"] = iris
+    for section, changes in _sections(flags).items():
+        given = {key: value for key, value in changes.items() if value is not None}
+        if given:
+            fields[section] = {**(dict(getattr(base, section)) if base else {}), **given}
+    try:
+        return Project.model_validate(fields)
+    except ValidationError as error:
+        findings = [_in_flags(sentence) for sentence in explain(error, fields)]
+        if len(findings) == 1:
+            raise ProjectError(findings[0]) from None
+        message = f"{len(findings)} settings cannot be used, the first: {findings[0]}"
+        raise ProjectFileError(message, tuple(findings)) from None
+
+
+def _sections(flags: Flags) -> dict[str, dict[str, Any]]:
+    """Return what the flags say of camera, quality and output, by section and key."""
+    size = None
+    if flags.size is not None:
+        width, height = pair(flags.size, "--size", "1280x720", "x")
+        if width != int(width) or height != int(height):
+            raise ProjectError(f"--size {flags.size!r} is not two whole numbers of pixels; write --size 1280x720")
+        size = (int(width), int(height))
+    sensor = None if flags.sensor is None else pair(flags.sensor, "--sensor", "36x24 (mm)", "x")
+    return {
+        "camera": {
+            "size_px": size,
+            "sensor_mm": sensor,
+            "sensor_distance": flags.sensor_distance,
+            "focus_distance": flags.focus,
+        },
+        "quality": {"mode": flags.quality, "wavelengths": flags.wavelengths, "paths": flags.paths},
+        "output": {
+            "layers": flags.layers,
+            "brightest": flags.brightest,
+            "colorspace": flags.colorspace,
+            "pixel_type": None if flags.half is None else "half" if flags.half else "float",
+            "starburst": False if flags.no_starburst else None,
+        },
+    }
+
+
+def _lights(flags: Flags, base: tuple[Light, ...]) -> list[dict[str, Any]]:
+    """Return the lights: those of the flags, else those of the project, with intensities and spectra of the flags."""
+    lights: list[dict[str, Any]]
+    if flags.light:
+        lights = [{"field_deg": field_angles(text)} for text in flags.light]
+    else:
+        lights = [dict(light) for light in base]
+    spectra = [parse_spectrum(text) for text in flags.spectrum]
+    for name, values in (("intensity", flags.intensity), ("spectrum", spectra)):
+        if values and len(values) not in (1, len(lights)):
+            raise ProjectError(
+                f"--{name} is given {len(values)} times for {len(lights)} light{'s' if len(lights) > 1 else ''}; "
+                "give it once for all lights, or once per light in the same order"
+            )
+        for k, light in enumerate(lights):
+            if values:
+                light[name] = values[k % len(values)]
+    return lights
+
+
+def _iris(flags: Flags, lens: Any, base: Project | None) -> dict[str, Any] | None:
+    """Return the iris with the flags' changes, or None when no flag changes it."""
+    mask = None if flags.iris_image is None else str(flags.iris_image)
+    if mask is not None and not Path(mask).is_file():
+        raise ProjectError(f"--iris-image {mask} does not exist; give a grey PNG or EXR image")
+    changes = {"blades": flags.blades, "rotation_deg": flags.rotation, "rounding": flags.rounding, "mask": mask}
+    given = {key: value for key, value in changes.items() if value is not None}
+    if not given:
+        return None
+    if base is not None and base.iris is not None and flags.lens is None:
+        iris = base.iris
+    elif isinstance(lens, str):
+        # Turning the blades must not lose the lens' own number of them.
+        from ..render.prepare import load_lens
+
+        iris = load_lens(lens).iris
+    else:
+        iris = lens.iris if lens is not None else Iris()
+    return {**dict(iris), **given}
+
+
+def _in_flags(sentence: str) -> str:
+    """Name the flag where a finding names the key of a project file."""
+    for key, flag in _FLAG_OF.items():
+        found = re.match(rf"(?:lights\[\d+\]\.)?{re.escape(key)}(?:\[\d\])?(?=[ :])", sentence)
+        if found:
+            return flag + sentence[found.end() :]
+    return sentence

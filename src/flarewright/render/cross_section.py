@@ -1,0 +1,274 @@
+"""The cross-section of a lens as SVG: glass, stop, sensor, rays and, on request, one ghost path."""
+
+from __future__ import annotations
+
+import html
+from dataclasses import dataclass, field
+from math import cos, hypot, radians, sin, tan
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import ProjectError
+from ..model import Lens, Surface
+from ..optics.paraxial import FirstOrder, vertex_positions
+
+Floats = NDArray[np.float64]
+
+WIDTH_PX = 900.0
+_MARGIN_PX = 34.0
+_HEAD_PX = 62.0
+_FOOT_PX = 44.0
+_TALLEST_PX = 460.0
+_RAYS = 7
+_CANDIDATES = 401
+
+_INK, _FAINT, _PAPER = "#22313f", "#8796a5", "#fbfcfd"
+_AXIS_RAYS, _FIELD_RAYS, _GHOST_RAYS = "#2f7fd1", "#e08a1e", "#c8313b"
+_CROWN, _FLINT, _EDGE = "#cfe4f3", "#cbd8c4", "#51718c"
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """An SVG text and what could not be drawn."""
+
+    svg: str
+    remarks: tuple[str, ...]
+
+
+@dataclass
+class _Sheet:
+    """Millimetres to pixels, and the elements drawn so far."""
+
+    scale: float
+    left: float
+    middle: float
+    parts: list[str] = field(default_factory=list)
+
+    def at(self, z: float, y: float) -> tuple[float, float]:
+        return self.left + z * self.scale, self.middle - y * self.scale
+
+    def line(self, points: Floats, style: str) -> None:
+        text = " ".join(f"{px:.2f},{py:.2f}" for px, py in (self.at(z, y) for z, y in points))
+        self.parts.append(f'<polyline points="{text}" fill="none" {style}/>')
+
+    def text(self, px: float, py: float, words: str, style: str) -> None:
+        self.parts.append(f'<text x="{px:.2f}" y="{py:.2f}" {style}>{html.escape(words)}</text>')
+
+
+def cross_section(
+    lens: Lens,
+    order: FirstOrder,
+    *,
+    field_deg: tuple[float, float] | None = None,
+    ghost: tuple[int, int] | None = None,
+) -> Drawing:
+    """Draw a lens from the side, light from the left.
+
+    Parameters
+    ----------
+    lens : Lens
+        With all semi-diameters.
+    order : FirstOrder
+        Gives the stop's opening and the sensor's place.
+    field_deg : tuple of float, optional
+        A light whose rays are drawn beside those of the axis; None: the lens' own field, if it is known.
+    ghost : tuple of int, optional
+        Rows (j, i) of a ghost path whose rays are drawn.
+
+    Returns
+    -------
+    Drawing
+        SVG, 900 px wide.
+
+    Raises
+    ------
+    ProjectError
+        When `ghost` names no two-reflection path of this lens.
+    """
+    if ghost is not None:
+        _check_ghost(lens, ghost)
+    z = vertex_positions(lens)
+    sensor_z = float(z[-1]) + order.sensor_distance
+    semi = [_semi(row, order) for row in lens.rows]
+    angle = hypot(*field_deg) if field_deg is not None else (lens.field_deg or 0.0)
+    angle = min(angle, 85.0)
+    lead = 0.16 * max(sensor_z, 2.0 * max(semi))
+    image = min(order.efl * tan(radians(min(angle, 60.0))), 2.0 * max(semi))
+    half = 1.08 * max(*semi, image, 0.12 * sensor_z)
+    scale = min((WIDTH_PX - 2 * _MARGIN_PX) / (sensor_z + lead), _TALLEST_PX / (2 * half))
+    left = (WIDTH_PX - scale * (sensor_z + lead)) / 2 + scale * lead
+    sheet = _Sheet(scale, left, _HEAD_PX + half * scale)
+    height = _HEAD_PX + 2 * half * scale + _FOOT_PX
+
+    sheet.line(np.array([[-lead, 0.0], [sensor_z, 0.0]]), f'stroke="{_FAINT}" stroke-dasharray="9 3 2 3"')
+    for k in range(len(lens.rows)):
+        _draw_glass(sheet, lens, z, semi, k)
+    # Steep rays come from far above; only what lies between head and foot is shown of them.
+    sheet.parts.append('<g clip-path="url(#sheet)">')
+    remarks = _draw_fans(sheet, lens, order, lead, angle, ghost)
+    sheet.parts.append("</g>")
+    _draw_surfaces(sheet, lens, z, semi)
+    _draw_stop(sheet, float(z[lens.stop_row]), order.stop_semi_diameter, _blade_reach(lens, semi, order))
+    sheet.line(np.array([[sensor_z, -half / 1.08], [sensor_z, half / 1.08]]), f'stroke="{_INK}" stroke-width="2.5"')
+    _label(sheet, lens, order, angle, ghost, height)
+    body = "\n".join(sheet.parts)
+    return Drawing(
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH_PX:.0f} {height:.0f}" '
+        f'width="{WIDTH_PX:.0f}" height="{height:.0f}" font-family="Helvetica, Arial, sans-serif">\n'
+        f"<title>{html.escape(lens.name)}</title>\n"
+        f'<clipPath id="sheet"><rect x="0" y="{_HEAD_PX - 26:.0f}" width="{WIDTH_PX:.0f}" '
+        f'height="{2 * half * scale + 40:.0f}"/></clipPath>\n'
+        f'<rect width="100%" height="100%" fill="{_PAPER}"/>\n{body}\n</svg>\n',
+        tuple(remarks),
+    )
+
+
+def _check_ghost(lens: Lens, ghost: tuple[int, int]) -> None:
+    j, i = ghost
+    last = len(lens.rows) - 1
+    if not 0 <= i < j <= last or lens.stop_row in ghost:
+        raise ProjectError(
+            f"{j}-{i} is no ghost of {lens.name}: a path J-I reflects at row J, then at row I < J, "
+            f"both between 0 and {last} and neither the stop (row {lens.stop_row})"
+        )
+
+
+def _semi(row: object, order: FirstOrder) -> float:
+    if isinstance(row, Surface):
+        return row.semi_diameter or order.entrance_pupil_diameter / 2
+    return order.stop_semi_diameter
+
+
+def _profile(row: object, vertex: float, semi: float) -> Floats:
+    """Return points (z, y) along a surface, from its lower to its upper rim."""
+    curvature, conic = (row.curvature, row.conic) if isinstance(row, Surface) else (0.0, 0.0)
+    y = np.linspace(-semi, semi, 65)
+    # Beyond the equator of a sphere there is no surface to draw.
+    root = np.sqrt(np.maximum(1.0 - (1.0 + conic) * curvature**2 * y**2, 0.0))
+    return np.stack([vertex + curvature * y**2 / (1.0 + root), y], axis=1)
+
+
+def _draw_glass(sheet: _Sheet, lens: Lens, z: Floats, semi: list[float], k: int) -> None:
+    """Fill what lies between a row with glass behind it and the next surface."""
+    row = lens.rows[k]
+    if not isinstance(row, Surface) or row.medium is None:
+        return
+    front, back = _profile(row, float(z[k]), semi[k]), _profile(lens.rows[k + 1], float(z[k + 1]), semi[k + 1])
+    rim = max(semi[k], semi[k + 1])
+    outline = [*front, [front[-1, 0], rim], [back[-1, 0], rim], *back[::-1], [back[0, 0], -rim], [front[0, 0], -rim]]
+    flint = row.medium.v_d is not None and row.medium.v_d < 50.0
+    points = " ".join(f"{px:.2f},{py:.2f}" for px, py in (sheet.at(a, b) for a, b in outline))
+    sheet.parts.append(
+        f'<polygon points="{points}" fill="{_FLINT if flint else _CROWN}" fill-opacity="0.85" '
+        f'stroke="{_EDGE}" stroke-width="0.8" stroke-linejoin="round"/>'
+    )
+
+
+def _draw_surfaces(sheet: _Sheet, lens: Lens, z: Floats, semi: list[float]) -> None:
+    """Draw every refracting surface over the rays, and number the rows above the glass."""
+    top = sheet.middle - max(semi) * sheet.scale
+    previous = -100.0
+    level = 0
+    for k, row in enumerate(lens.rows):
+        if isinstance(row, Surface):
+            sheet.line(_profile(row, float(z[k]), semi[k]), f'stroke="{_EDGE}" stroke-width="1.3"')
+        px, _ = sheet.at(float(z[k]), 0.0)
+        # Numbers of close rows step up so that they stay legible.
+        level = (level + 1) % 3 if px - previous < 13.0 else 0
+        previous = px
+        sheet.text(px, top - 6.0 - 10.0 * level, str(k), f'font-size="9" text-anchor="middle" fill="{_FAINT}"')
+
+
+def _blade_reach(lens: Lens, semi: list[float], order: FirstOrder) -> float:
+    """Return how far out the blades are drawn: to the rim of the neighbouring glass."""
+    k = lens.stop_row
+    near = [semi[j] for j in (k - 1, k + 1) if 0 <= j < len(semi)]
+    return max(1.05 * max(near), 1.25 * order.stop_semi_diameter)
+
+
+def _draw_stop(sheet: _Sheet, z: float, opening: float, reach: float) -> None:
+    for side in (1.0, -1.0):
+        sheet.line(np.array([[z, side * opening], [z, side * reach]]), f'stroke="{_INK}" stroke-width="3"')
+        tip = 5.0 / sheet.scale
+        sheet.line(
+            np.array([[z - tip, side * opening], [z + tip, side * opening]]), f'stroke="{_INK}" stroke-width="1.5"'
+        )
+
+
+def _draw_fans(
+    sheet: _Sheet, lens: Lens, order: FirstOrder, lead: float, angle: float, ghost: tuple[int, int] | None
+) -> list[str]:
+    """Draw the rays of the axis, of the field and of a ghost; return remarks on what no ray passes."""
+    remarks: list[str] = []
+    fans: list[tuple[float, tuple[int, int] | None, str]] = [(0.0, None, _AXIS_RAYS)]
+    if ghost is not None:
+        # A ghost is drawn with the direct rays of the axis only, or the picture is a thicket.
+        fans.append((angle, ghost, _GHOST_RAYS))
+    elif angle:
+        fans.append((angle, None, _FIELD_RAYS))
+    for degrees, path, colour in fans:
+        rays = _fan(lens, order, degrees, path)
+        if not len(rays):
+            what = f"the ghost {path[0]}-{path[1]}" if path else "the direct path"
+            remarks.append(f"no ray of {what} gets through at {degrees:g} degrees, so none is drawn")
+        for points in rays:
+            direction = np.array([cos(radians(degrees)), -sin(radians(degrees))])
+            before = points[0] - direction * (points[0, 0] + lead) / direction[0]
+            sheet.line(
+                np.vstack([before, points]),
+                f'stroke="{colour}" stroke-width="{1.3 if path else 0.9}" stroke-opacity="0.8" stroke-linejoin="round"',
+            )
+    return remarks
+
+
+def _fan(lens: Lens, order: FirstOrder, degrees: float, ghost: tuple[int, int] | None) -> list[Floats]:
+    """Return the polylines (z, y) of a few rays that get through, spread over the opening."""
+    from ..optics.paths import direct_path, ghost_path
+    from ..optics.trace import trace_polylines
+
+    path = direct_path(lens) if ghost is None else ghost_path(lens, *ghost)
+    first = lens.rows[0]
+    limit = _semi(first, order)
+    # Rays start on the plane of the first vertex; a bulging front lets oblique ones in from further out.
+    reach = limit * (1.0 + abs(tan(radians(degrees))))
+    y = np.linspace(-reach, reach, _CANDIDATES)
+    hits = trace_polylines(lens, ghost, np.zeros_like(y), y, -radians(degrees), sensor_distance=order.sensor_distance)
+    semi = np.array([_semi(lens.rows[row], order) for row in path.rows])
+    radius = np.hypot(hits[:, 1:-1, 0], hits[:, 1:-1, 1])
+    with np.errstate(invalid="ignore"):
+        through = np.flatnonzero((radius <= semi * (1 + 1e-9)).all(axis=1) & np.isfinite(hits).all(axis=(1, 2)))
+    if not len(through):
+        return []
+    chosen = np.unique(through[np.linspace(0, len(through) - 1, _RAYS).round().astype(int)])
+    # The plane of the first vertex is not a place where anything happens: begin at the first hit.
+    return [np.stack([hits[k, 1:, 2], hits[k, 1:, 1]], axis=1) for k in chosen]
+
+
+def _label(
+    sheet: _Sheet, lens: Lens, order: FirstOrder, angle: float, ghost: tuple[int, int] | None, height: float
+) -> None:
+    sheet.text(_MARGIN_PX, 26.0, lens.name, f'font-size="16" font-weight="bold" fill="{_INK}"')
+    facts = f"focal length {order.efl:.2f} mm · f/{order.f_number:g} · back focus {order.bfl:.2f} mm"
+    sheet.text(WIDTH_PX - _MARGIN_PX, 26.0, facts, f'font-size="12" text-anchor="end" fill="{_INK}"')
+    foot = height - 16.0
+    legend = [(_AXIS_RAYS, "axis")]
+    if ghost is not None:
+        legend.append((_GHOST_RAYS, f"ghost {ghost[0]}-{ghost[1]}, light at {angle:g}°"))
+    elif angle:
+        legend.append((_FIELD_RAYS, f"light at {angle:g}°"))
+    at = _MARGIN_PX
+    for colour, words in legend:
+        sheet.parts.append(
+            f'<line x1="{at}" y1="{foot - 4}" x2="{at + 22}" y2="{foot - 4}" stroke="{colour}" stroke-width="2"/>'
+        )
+        sheet.text(at + 28, foot, words, f'font-size="11" fill="{_INK}"')
+        at += 46 + 6.2 * len(words)
+    steps = (200.0, 100.0, 50.0, 20.0, 10.0, 5.0, 2.0, 1.0, 0.5)
+    bar = next((step for step in steps if step * sheet.scale < 160), steps[-1])
+    right = WIDTH_PX - _MARGIN_PX
+    sheet.parts.append(
+        f'<line x1="{right - bar * sheet.scale:.2f}" y1="{foot - 4}" x2="{right}" y2="{foot - 4}" '
+        f'stroke="{_INK}" stroke-width="2"/>'
+    )
+    sheet.text(right - bar * sheet.scale - 6, foot, f"{bar:g} mm", f'font-size="11" text-anchor="end" fill="{_INK}"')
