@@ -150,8 +150,8 @@ def cauchy_from_abbe(n_d: float, v_d: float) -> Dispersion:
 
     Notes
     -----
-    The constants are L_d^2 = 0.34523 and 1 / (L_F^-2 - L_C^-2) = 0.52345. The last resort: the blue of real glass is
-    bent more.
+    The constants are L_d^2 = 0.34523 and 1 / (L_F^-2 - L_C^-2) = 0.52345 as printed (0.52366 exactly). The last resort:
+    the blue of real glass is bent more.
     """
     b = 0.52345 * (n_d - 1.0) / v_d
     return Dispersion(glass="Cauchy", formula="cauchy", coefficients=(n_d - b / 0.34523, b), range_nm=(360.0, 1100.0))

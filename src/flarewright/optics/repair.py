@@ -12,6 +12,7 @@ from math import isfinite, sqrt
 from typing import Literal
 
 import numpy as np
+from pydantic import ValidationError
 
 from ..errors import LensError
 from ..model import Coating, Lens, QuarterWave, Row, Stop, Surface
@@ -60,6 +61,14 @@ def repair(raw: RawLens, apertures: Apertures = "auto") -> LensReading:
     LensError
         The table is no camera lens by itself, or is damaged beyond repair.
     """
+    try:
+        return _repair(raw, apertures)
+    except ValidationError as error:
+        # A combination of values that no check foresaw; the model's own words are better than a traceback.
+        raise LensError(f"{raw.file}: {error.errors()[0]['msg'].removeprefix('Value error, ')}") from None
+
+
+def _repair(raw: RawLens, apertures: Apertures) -> LensReading:
     _refuse(raw)
     remarks: list[str] = []
     rows = _without_idle_rows(raw, remarks)
@@ -88,6 +97,9 @@ def _refuse(raw: RawLens) -> None:
         raise LensError(
             f"{raw.file}: the header counts {raw.stated_surfaces} surfaces, the table has {len(rows)}: rows are missing"
         )
+    if len(stops) > 1:
+        lines = ", ".join(str(rows[k].line) for k in stops)
+        raise LensError(f"{raw.file}: lines {lines} are all stops: a lens has one, remove the others")
 
     # Between surfaces light only runs backwards after a mirror; around a stop a negative gap just moves its plane.
     for k, row in enumerate(rows[:-1]):
@@ -101,10 +113,9 @@ def _refuse(raw: RawLens) -> None:
             f"{raw.file}: the table has {len(rows)} row{'s' * (len(rows) != 1)} and ends "
             f"{'inside glass' if _index_behind(rows) > 1.0 else 'there'}: surfaces are missing, so it is no lens"
         )
+    if all(row.medium is None for row in rows):
+        raise LensError(f"{raw.file}: no row has glass behind it, so nothing bends the light")
     _refuse_converters(raw)
-    if len(stops) > 1:
-        lines = ", ".join(str(rows[k].line) for k in stops)
-        raise LensError(f"{raw.file}: lines {lines} are all stops: a lens has one, remove the others")
     if not stops and raw.f_number is None:
         raise LensError(
             f"{raw.file}: it has neither a stop nor an f-number: an attachment (a close-up lens), "
@@ -122,7 +133,12 @@ def _refuse(raw: RawLens) -> None:
 
 def _refuse_converters(raw: RawLens) -> None:
     """Refuse what has no positive focal length by itself: tele-converters and afocal attachments."""
-    surfaces = [_surface(row) for row in raw.rows if not row.stop]
+    surfaces: list[Surface] = []
+    for row in raw.rows:
+        if not row.stop:
+            surfaces.append(_surface(row))
+        elif surfaces:
+            surfaces[-1] = surfaces[-1].replace(thickness=surfaces[-1].thickness + row.thickness)
     probe = Lens(name="probe", f_number=8.0, rows=(Stop(), *surfaces))
     _, system = path_matrices(probe, direct_path(probe), 587.56, sum(row.thickness for row in surfaces[:-1]))
     power = -system[1, 0]
