@@ -227,6 +227,7 @@ def test_missing_rims_are_left_to_be_estimated(tmp_path):
         ("  -43.33   79.34  1.00000  0.00    15.000   0\n", "", "ends inside glass"),
         ("  0        11.05  1.00000  0.00 ", "  stop     11.05  1.00000  0.00 ", "are all stops"),
         ("  39.75    2.50   1.00000  0.00    14.000   0\n", "", "the stop stands inside glass"),
+        ("14.000   1", "1e-9     1", "line 12: its aperture lets no light through"),
         ("11.05", "-11.05", "light runs backwards behind line 11"),
     ],
 )
@@ -245,10 +246,11 @@ def test_rows_that_are_missing_are_noticed(tmp_path):
     [
         ("surfaces:\n", "", 'there is no line "surfaces:"'),
         ("40.94 ", "forty ", "line 11: radius is 'forty', a number was expected"),
+        ("40.94 ", "1e-99 ", "line 11: radius is 1e-99: less than a micrometre is no lens surface"),
         ("8.74 ", "nan ", "line 11: thickness is 'nan', a number was expected"),
         ("8.74 ", "1e9 ", "line 11: thickness is 1000000000.0: it must be at most 10000"),
         ("1.61700", "0.61700", "line 11: index is 0.617: a glass lies between 1 and 4.5"),
-        ("18.500   1", "-18.500   1", "line 11: aperture is -18.5: it must not be negative"),
+        ("18.500   1", "-18.500   1", "line 11: aperture is -18.5: it must lie between 0 and 2000 mm"),
         ("55.00   18.500   1", "55.00", "line 11: 4 columns, 6 were expected"),
         ("focal_length: 99.0", "focal_length: long", "line 7: focal_length is 'long', a number in mm was expected"),
     ],

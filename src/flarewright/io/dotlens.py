@@ -25,6 +25,8 @@ _COLUMNS = ("radius", "thickness", "index", "Abbe number", "aperture", "coating 
 _COUNTS = re.compile(r"(\d+)\s+surfaces?(?:,\s*(\d+)\s+glass elements?)?")
 _F_NUMBER = re.compile(r"\bf/\s*(\d+(?:\.\d+)?)")
 _MOST_ROWS = 500
+_WIDEST = 2000.0
+_TIGHTEST = 1e-3
 
 
 def read_dotlens(path: str | Path) -> RawLens:
@@ -134,8 +136,10 @@ def _read_row(content: str, number: int, reading: _Reading) -> None:
         reading.problems.append(f"line {number}: thickness {refusal}")
     if not 1.0 <= n_d < 4.5:
         reading.problems.append(f"line {number}: index is {n_d:g}: a glass lies between 1 and 4.5")
-    if aperture < 0.0:
-        reading.problems.append(f"line {number}: aperture is {aperture:g}: it must not be negative")
+    if not 0.0 <= aperture <= _WIDEST:
+        reading.problems.append(f"line {number}: aperture is {aperture:g}: it must lie between 0 and {_WIDEST:g} mm")
+    if 0.0 < abs(radius) < _TIGHTEST:
+        reading.problems.append(f"line {number}: radius is {radius:g}: less than a micrometre is no lens surface")
     if reading.problems:
         return
     reading.rows.append(

@@ -57,9 +57,9 @@ class NumberField:
 TOP_NUMBERS = {
     "f_number": NumberField("f-number wide open; sets the stop", 0.3, 256.0, low_open=True, unit=""),
     "field_deg": NumberField("half field of view", 0.0, 90.0, True, True, unit="degrees"),
-    "stated_focal_length": NumberField("focal length as the source states it", 0.0, 1e6, low_open=True),
+    "stated_focal_length": NumberField("focal length as the source states it", 0.0, 1e9, low_open=True),
     "sensor_distance": NumberField(
-        "last vertex to sensor; without it the sensor lies at the paraxial focus", 0.0, 1e6, low_open=True
+        "last vertex to sensor; without it the sensor lies at the paraxial focus", 0.0, 1e9, low_open=True
     ),
     "focus_distance": NumberField(
         "plane in focus, in front of the first vertex; without it infinity", 0.0, 1e9, low_open=True

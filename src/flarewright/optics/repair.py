@@ -65,7 +65,9 @@ def repair(raw: RawLens, apertures: Apertures = "auto") -> LensReading:
         return _repair(raw, apertures)
     except ValidationError as error:
         # A combination of values that no check foresaw; the model's own words are better than a traceback.
-        raise LensError(f"{raw.file}: {error.errors()[0]['msg'].removeprefix('Value error, ')}") from None
+        first = error.errors()[0]
+        where = ".".join(str(part) for part in first["loc"])
+        raise LensError(f"{raw.file}: {where}: {first['msg'].removeprefix('Value error, ')}") from None
 
 
 def _repair(raw: RawLens, apertures: Apertures) -> LensReading:
@@ -84,7 +86,7 @@ def _repair(raw: RawLens, apertures: Apertures) -> LensReading:
         )
     finished = _finish(rows, draft, per_mm, remarks)
     _tell_aspheres(raw, rows, finished, order, remarks)
-    _tell_rims(rows, finished, order, remarks)
+    _tell_rims(raw, rows, finished, order, remarks)
     remarks += raw.remarks
     return LensReading(finished.replace(notes="\n".join((f"Imported from {raw.file}.", *remarks))), tuple(remarks))
 
@@ -374,7 +376,7 @@ def _axial_blur(lens: Lens, order: FirstOrder, rays: int = 64) -> float:
     return sqrt(float((weight * (at_sensor[:, 1] + shift * slope) ** 2).sum()))
 
 
-def _tell_rims(rows: list[RawRow], lens: Lens, order: FirstOrder, remarks: list[str]) -> None:
+def _tell_rims(raw: RawLens, rows: list[RawRow], lens: Lens, order: FirstOrder, remarks: list[str]) -> None:
     """Tell when a rim cuts the axial beam, so that the lens is slower than stated."""
     y = np.linspace(0.02, 1.0, 50) * order.entrance_pupil_diameter / 2.0
     hits = trace_polylines(lens, None, np.zeros_like(y), y, 0.0, sensor_distance=order.bfl)
@@ -382,10 +384,13 @@ def _tell_rims(rows: list[RawRow], lens: Lens, order: FirstOrder, remarks: list[
     for k, row in enumerate(lens.rows):
         if not isinstance(row, Surface) or row.semi_diameter is None:
             continue
-        through = np.abs(hits[:, 1 + k, 1]) <= row.semi_diameter
+        # a ray that ended before has no height; that is not this rim's doing
+        through = ~(np.abs(hits[:, 1 + k, 1]) > row.semi_diameter)
         free = float(y[through].max(initial=0.0) / y[-1]) if not through.all() else 1.0
         if free < tightest:
             tightest, where = free, rows[k].line
+    if tightest <= 0.0:
+        raise LensError(f"{raw.file}: line {where}: its aperture lets no light through: correct it")
     if tightest < 1.0 - RIM_CUT:
         remarks.append(
             f"line {where}: its rim cuts the axial beam: the lens passes f/{lens.f_number / tightest:.2f}, "
