@@ -31,6 +31,7 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode="rich",
+    context_settings={"help_option_names": ["-h", "--help"]},
 )
 lens_app = typer.Typer(help="Look at, check and convert lens files.")
 project_app = typer.Typer(help="Project files: everything a render needs, in one TOML file.")

@@ -315,11 +315,11 @@ def _suggestion(keys: list[int | str]) -> str:
     wrong = str(keys[-1]) if keys else ""
     section = next((key for key in reversed(keys[:-1]) if isinstance(key, str)), "")
     known = [name for model in _SECTIONS.get(section, ()) for name in model.model_fields]
-    if near := did_you_mean(wrong, known):
-        return near
     for other, models in _SECTIONS.items():
         if other and any(wrong in model.model_fields for model in models):
             return f" here; it belongs into [{other}]" if other != "lights" else " here; it belongs into [[lights]]"
+    if near := did_you_mean(wrong, known):
+        return near
     return f"; known are {', '.join(dict.fromkeys(known))}" if known else ""
 
 

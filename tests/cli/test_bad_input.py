@@ -1,0 +1,219 @@
+"""Whatever a person gives wrong: exit code 2 and one clear sentence, never a traceback, nothing half-written."""
+
+import pytest
+
+from flarewright.cli.app import run
+
+ROWS = """
+rows = [
+  { radius = 50.0, thickness = 5.0, glass = "N-BK7", n_d = 1.5168, v_d = 64.17, semi_diameter = 10.0 },
+  { radius = -50.0, thickness = 2.0, semi_diameter = 10.0 },
+  { stop = true, thickness = 80.0 },
+]
+"""
+LENS = f'schema_version = 1\nname = "Singlet"\nf_number = 5.0\n{ROWS}'
+
+
+def lens(**changes):
+    """The good lens file with texts replaced."""
+    text = LENS
+    for old, new in changes.values():
+        assert old in text
+        text = text.replace(old, new)
+    return text
+
+
+LENS_FILES = {
+    "empty": ("", "empty"),
+    "not TOML": ("name = ", "not valid TOML"),
+    "no version": (lens(a=("schema_version = 1\n", "")), "schema_version is missing"),
+    "newer version": (lens(a=("schema_version = 1", "schema_version = 7")), "schema_version is 7"),
+    "no f-number": (lens(a=("f_number = 5.0", "")), "f_number is missing"),
+    "f-number is text": (lens(a=("f_number = 5.0", 'f_number = "fast"')), "f_number"),
+    "f-number is nan": (lens(a=("f_number = 5.0", "f_number = nan")), "f_number is nan"),
+    "no rows": (lens(a=(ROWS, "")), "rows is missing"),
+    "no stop": (lens(a=("stop = true", 'radius = "flat"')), "no row is the stop"),
+    "two stops": (lens(a=("radius = -50.0, thickness = 2.0, semi_diameter = 10.0", "stop = true")), "stop"),
+    "no glass": (lens(a=('glass = "N-BK7", n_d = 1.5168, v_d = 64.17, ', "")), "no row has glass"),
+    "unknown glass": (lens(a=('glass = "N-BK7", n_d = 1.5168, v_d = 64.17', 'glass = "UNOBTAINIUM"')), "UNOBTAINIUM"),
+    "radius zero": (lens(a=("radius = 50.0", "radius = 0")), 'radius = "flat"'),
+    "radius is text": (lens(a=("radius = 50.0", 'radius = "round"')), "row 0: radius"),
+    "infinite thickness": (lens(a=("thickness = 5.0", "thickness = inf")), "row 0: thickness"),
+    "negative semi-diameter": (lens(a=("semi_diameter = 10.0 },\n  { radius", "semi_diameter = -1 },\n  { radius")),
+                               "row 0: semi_diameter"),
+    "index below 1": (lens(a=("n_d = 1.5168", "n_d = 0.9")), "row 0: n_d"),
+    "misspelt key": (lens(a=("thickness = 2.0", "thicknes = 2.0")), "did you mean 'thickness'"),
+    "coating nonsense": (lens(a=("thickness = 2.0", 'thickness = 2.0, coating = "shiny"')), "shiny"),
+    "preset too short": (LENS + '[coating_presets]\np = ["none"]\n', "preset 'p'"),
+    "negative lens": (lens(a=("radius = 50.0", "radius = -50.0"), b=("radius = -50.0, thickness = 2.0",
+                                                                     "radius = 50.0, thickness = 2.0")), "negative"),
+}  # fmt: skip
+
+PROJECT = 'lens = "heliar-tronnier"\n[[lights]]\nfield_deg = [10, 5]\n'
+
+PROJECT_FILES = {
+    "empty": ("", "empty"),
+    "not TOML": ("lens", "not valid TOML"),
+    "no lens": ("[[lights]]\nfield_deg = [1, 2]\n", "lens is missing"),
+    "no light": ('lens = "heliar-tronnier"\n', "lights is missing"),
+    "newer version": ("schema_version = 2\n" + PROJECT, "newer"),
+    "unknown lens": (PROJECT.replace("heliar-tronnier", "heliar-tronier"), "did you mean heliar-tronnier"),
+    "lens file that is not there": (PROJECT.replace("heliar-tronnier", "no.toml"), "does not exist"),
+    "misspelt key": ("f_numbr = 4\n" + PROJECT, "did you mean 'f_number'"),
+    "key in the wrong place": ("blades = 4\n" + PROJECT, "belongs into [iris]"),
+    "three angles": (PROJECT.replace("[10, 5]", "[10, 5, 1]"), "field_deg"),
+    "light behind the camera": (PROJECT.replace("10", "100"), "lights[0].field_deg[0]"),
+    "nan": (PROJECT.replace("10", "nan"), "finite"),
+    "negative intensity": (PROJECT + "intensity = -1\n", "lights[0].intensity"),
+    "unknown spectrum": (PROJECT + 'spectrum = "neon"\n', "lights[0].spectrum"),
+    "spectrum file that is not there": (PROJECT + 'spectrum = "neon.csv"\n', "does not exist"),
+    "unknown coating": ('coating = "quarter:550"\n' + PROJECT, "coating"),
+    "unknown preset": ('coating = "preset:gold"\n' + PROJECT, "gold"),
+    "faster than the lens": ("f_number = 1.0\n" + PROJECT, "f/1 is faster"),
+    "huge picture": (PROJECT + "[camera]\nsize_px = [100000, 10]\n", "between 1 and 32768"),
+    "unknown quality": (PROJECT + '[quality]\nmode = "best"\n', "'draft' or 'final'"),
+    "two blades": (PROJECT + "[iris]\nblades = 2\n", "at least 3"),
+    "negative sensor": (PROJECT + "[camera]\nsensor_mm = [-36, 24]\n", "above 0 mm"),
+}
+
+H = ["render", "heliar-tronnier"]
+GOOD = ["--light", "10,5", "-o", "a.exr"]
+
+COMMAND_LINES = {
+    "unknown command": (["rendre"], "no such command 'rendre'"),
+    "no output": ([*H, "--light", "1,1"], "missing option '-o'"),
+    "no lens": (["render", *GOOD], "no lens is given"),
+    "no light": ([*H, "-o", "a.exr"], "no light is given"),
+    "unknown flag": ([*H, *GOOD, "--glow"], "no such option: --glow"),
+    "unknown lens": (["render", "heliar-tronier", *GOOD], "did you mean heliar-tronnier"),
+    "lens is a folder": (["render", ".", *GOOD], "folder"),
+    "lens is a picture": (["render", "picture.png", *GOOD], "kind"),
+    "light is one number": ([*H, "--light", "10", "-o", "a.exr"], "--light '10' is not two numbers"),
+    "light is words": ([*H, "--light", "left,up", "-o", "a.exr"], "not two numbers"),
+    "light is nan": ([*H, "--light", "nan,1", "-o", "a.exr"], "not two numbers"),
+    "light behind": ([*H, "--light", "95,1", "-o", "a.exr"], "behind the camera"),
+    "intensity is text": ([*H, *GOOD, "--intensity", "bright"], "'--intensity'"),
+    "negative intensity": ([*H, *GOOD, "--intensity", "-1"], "--intensity"),
+    "infinite intensity": ([*H, *GOOD, "--intensity", "inf"], "--intensity"),
+    "three intensities": ([*H, *GOOD, *["--intensity", "1"] * 3], "3 times for 1 light"),
+    "unknown spectrum": ([*H, *GOOD, "--spectrum", "neon"], "neon"),
+    "cold black body": ([*H, *GOOD, "--spectrum", "black-body:5"], "between 500"),
+    "f-number zero": ([*H, *GOOD, "--fstop", "0"], "--fstop"),
+    "f-number is nan": ([*H, *GOOD, "--fstop", "nan"], "--fstop"),
+    "too fast": ([*H, *GOOD, "--fstop", "1"], "f/1 is faster"),
+    "two blades": ([*H, *GOOD, "--blades", "2"], "at least 3"),
+    "a thousand blades": ([*H, *GOOD, "--blades", "1000"], "--blades"),
+    "rounding 2": ([*H, *GOOD, "--rounding", "2"], "--rounding"),
+    "no iris image": ([*H, *GOOD, "--iris-image", "no.png"], "no.png"),
+    "unknown coating": ([*H, *GOOD, "--coating", "teflon"], "teflon"),
+    "unknown preset": ([*H, *GOOD, "--coating", "preset:gold"], "gold"),
+    "coating file missing": ([*H, *GOOD, "--coating", "no.toml"], "no.toml"),
+    "unknown quality": ([*H, *GOOD, "--quality", "best"], "--quality should be 'draft' or 'final'"),
+    "no wavelengths": ([*H, *GOOD, "--wavelengths", "0"], "--wavelengths"),
+    "size is one number": ([*H, *GOOD, "--size", "640"], "--size '640'"),
+    "size is not whole": ([*H, *GOOD, "--size", "640.5x480"], "whole numbers"),
+    "size zero": ([*H, *GOOD, "--size", "0x480"], "--size: 0x480"),
+    "size huge": ([*H, *GOOD, "--size", "99999x99999"], "32768"),
+    "sensor negative": ([*H, *GOOD, "--sensor", "-36x24"], "above 0 mm"),
+    "unknown layers": ([*H, *GOOD, "--layers", "all"], "--layers"),
+    "brightest zero": ([*H, *GOOD, "--brightest", "0"], "--brightest"),
+    "unknown colorspace": ([*H, *GOOD, "--colorspace", "aces"], "--colorspace"),
+    "unknown view": ([*H, *GOOD, "--view", "aces"], "--view 'aces'"),
+    "exposure nan": ([*H, *GOOD, "--exposure", "nan"], "--exposure"),
+    "unknown paths": ([*H, *GOOD, "--paths", "some"], "--paths"),
+    "focus behind": ([*H, *GOOD, "--focus", "-10"], "--focus"),
+    "threads zero": ([*H, *GOOD, "--threads", "0"], "--threads"),
+    "output is no EXR": ([*H, "--light", "1,1", "-o", "a.jpg"], "*.exr"),
+    "output folder missing": ([*H, "--light", "1,1", "-o", "no/a.exr"], "does not exist"),
+    "output is a folder": ([*H, "--light", "1,1", "-o", "folder.exr"], "it is a folder"),
+    "project missing": (["render", "--project", "no.toml", "-o", "a.exr"], "no.toml does not exist"),
+    "several at once": ([*H, *GOOD, "--fstop", "0", "--quality", "best"], "2 settings cannot be used"),
+    "ghosts without a light": (["ghosts", "heliar-tronnier"], "missing option '--light'"),
+    "ghosts in X-rays": (["ghosts", "heliar-tronnier", "--light", "1,1", "--wavelength-nm", "1"], "not visible"),
+    "ghosts too fast": (["ghosts", "heliar-tronnier", "--light", "1,1", "--fstop", "1"], "f/1 is faster"),
+    "ghosts of unknown paths": (["ghosts", "heliar-tronnier", "--light", "1,1", "--paths", "x"], "--paths 'x'"),
+    "show nothing": (["lens", "show"], "missing argument"),
+    "show an unknown lens": (["lens", "show", "summicron"], "neither a shipped lens nor a file"),
+    "show a ghost that is words": (["lens", "show", "heliar-tronnier", "--ghost", "bright"], "J-I"),
+    "draw a ghost of the stop": (
+        ["lens", "show", "heliar-tronnier", "--plot", "a.svg", "--ghost", "5-1"], "5-1 is no ghost"),
+    "draw into no folder": (["lens", "show", "heliar-tronnier", "--plot", "no/a.svg"], "does not exist"),
+    "convert onto itself": (["lens", "convert", "lens.toml", "lens.toml"], "is the file to convert"),
+    "convert to another kind": (["lens", "convert", "lens.toml", "a.lens"], "*.toml"),
+    "init over a file": (["project", "init", "heliar-tronnier", "-o", "lens.toml"], "exists already"),
+    "check a project that is a lens": (["project", "check", "lens.toml"], "is not a known key"),
+}  # fmt: skip
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "folder.exr").mkdir()
+    (tmp_path / "lens.toml").write_text(LENS)
+    (tmp_path / "picture.png").write_bytes(b"\x89PNG\r\n\x1a\n\x00\x00")
+    return tmp_path
+
+
+def refuse(capsys, folder, words, *keywords):
+    before = sorted(folder.iterdir())
+    assert run(words) == 2
+    out, err = capsys.readouterr()
+    lines = err.splitlines()
+    sentences = [line for line in lines if line.startswith("flarewright: error: ")]
+    assert len(sentences) == 1, err
+    assert "Traceback" not in out + err
+    assert not sentences[0].endswith((".", ":", ";", ",")), sentences[0]
+    # Below the sentence stands at most the list of all findings.
+    assert all(line.startswith("  - ") for line in lines[lines.index(sentences[0]) + 1 :])
+    for keyword in keywords:
+        assert keyword in err
+    assert sorted(folder.iterdir()) == before
+    return out
+
+
+@pytest.mark.parametrize("case", LENS_FILES)
+def test_lens_files(capsys, folder, case):
+    text, keyword = LENS_FILES[case]
+    (folder / "bad.toml").write_text(text)
+    out = refuse(capsys, folder, ["lens", "check", "bad.toml"], keyword)
+    assert out.startswith("bad.toml: refused")
+    assert refuse(capsys, folder, ["render", "bad.toml", "--light", "1,1", "-o", "a.exr"], keyword) == ""
+
+
+@pytest.mark.parametrize("case", PROJECT_FILES)
+def test_project_files(capsys, folder, case):
+    text, keyword = PROJECT_FILES[case]
+    (folder / "bad.toml").write_text(text)
+    assert refuse(capsys, folder, ["project", "check", "bad.toml"], keyword) == ""
+    assert refuse(capsys, folder, ["render", "--project", "bad.toml", "-o", "a.exr"], keyword) == ""
+
+
+@pytest.mark.parametrize("case", COMMAND_LINES)
+def test_command_lines(capsys, folder, case):
+    words, keyword = COMMAND_LINES[case]
+    assert refuse(capsys, folder, words, keyword) == ""
+
+
+def test_every_finding_of_a_lens_file_is_listed_with_its_row(capsys, folder):
+    text = LENS.replace("radius = 50.0", "radius = 0").replace("thickness = 2.0", 'thickness = "wide"')
+    (folder / "bad.toml").write_text(text + "colour = 1\n")
+    out = refuse(capsys, folder, ["lens", "check", "bad.toml"])
+    assert "  - row 0: radius" in out
+    assert "  - row 1: thickness" in out
+    assert run(["lens", "show", "bad.toml"]) == 2
+    assert capsys.readouterr().err.count("  - ") >= 2
+
+
+def test_one_bad_file_among_good_ones_is_told_and_the_others_are_checked(capsys, folder):
+    (folder / "bad.toml").write_text("")
+    assert run(["lens", "check", "lens.toml", "bad.toml", "heliar-tronnier"]) == 2
+    out, err = capsys.readouterr()
+    assert [line.split(":")[1].split(",")[0] for line in out.splitlines() if line[0] != " "] == [
+        " usable", " refused", " usable"]  # fmt: skip
+    assert "1 of 3 lens files were refused" in err
+
+
+def test_a_binary_project_and_a_folder_as_project(capsys, folder):
+    (folder / "bin.toml").write_bytes(bytes(range(256)))
+    refuse(capsys, folder, ["project", "check", "bin.toml"], "UTF-8")
+    refuse(capsys, folder, ["project", "check", "."], "is a folder")

@@ -1,0 +1,388 @@
+"""Every command does what its help says: one JSON object on stdout, words on stderr, whole files or none."""
+
+import json
+import os
+import subprocess
+import sys
+import xml.etree.ElementTree as ET
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import jsonschema
+import numpy as np
+import pytest
+
+import flarewright as fw
+from flarewright import __version__
+from flarewright.cli.app import run
+from flarewright.io.exr import read_exr
+from flarewright.io.library import shipped
+from flarewright.io.project_file import project_from_data, read_project
+from flarewright.model import (
+    AsLens,
+    Bare,
+    BlackBody,
+    Everywhere,
+    Layer,
+    Lens,
+    Preset,
+    Project,
+    QuarterWave,
+    Tabulated,
+)
+
+HELIAR_EFL = 99.235796
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def call(capsys, *words, code=0):
+    assert run([str(word) for word in words]) == code
+    return capsys.readouterr()
+
+
+def call_json(capsys, *words):
+    return json.loads(call(capsys, *words, "--json").out)
+
+
+@dataclass(frozen=True)
+class FakeRendering:
+    project: Project
+    layers: tuple[Layer, ...]
+    summary: dict = field(default_factory=lambda: {"efl_mm": 1.0, "far": float("inf")})
+    remarks: tuple[str, ...] = ("a remark",)
+
+
+@pytest.fixture
+def projects(monkeypatch):
+    """Replace the renderer by one that notes what it was asked for."""
+    seen = []
+
+    def fake(project, *, threads=None, progress=None):
+        seen.append(project)
+        width, height = project.camera.size_px
+        beauty = Layer("beauty", np.full((height, width, 3), 1e5, np.float32), (0, 0, width, height))
+        ghost = Layer("ghost.4-1", np.ones((2, 3, 3), np.float32), (1, 1, 3, 2))
+        return FakeRendering(project, (beauty, ghost))
+
+    monkeypatch.setattr("flarewright.render.render.render", fake)
+    return seen
+
+
+# ---------------------------------------------------------------------------------------------------------------------
+# render
+
+
+def test_render_writes_exr_and_preview_and_tells(capsys, projects, folder):
+    said = call(capsys, "render", "heliar-tronnier", "--light", "-3,4", "--size", "8x6", "--half", "-o", "a.exr")
+    assert said.out == ""
+    assert said.err.splitlines()[0] == "flarewright: a remark"
+    assert "clipped" in said.err
+    assert "exposure" in said.err
+    assert sorted(path.name for path in folder.iterdir()) == ["a.exr", "a.png"]
+    (project,) = projects
+    assert project.lights[0].field_deg == (-3, 4)
+    back = read_exr("a.exr")
+    assert back.metadata["version"] == __version__
+    (folder / "again.toml").write_text(back.metadata["project"])
+    assert read_project("again.toml") == project
+    assert [layer.name for layer in back.layers] == ["beauty", "ghost.4-1"]
+    assert b"exposure" in (folder / "a.png").read_bytes()
+
+
+def test_render_json_is_one_object_and_holds_no_infinity(capsys, projects, folder):
+    summary = call_json(
+        capsys, "render", "heliar-tronnier", "--light", "1,1", "--size", "8x6", "--no-png", "-o", "a.exr"
+    )
+    assert summary["efl_mm"] == 1.0
+    assert summary["far"] is None
+    assert summary["output"] == "a.exr"
+    assert summary["layers"] == ["beauty", "ghost.4-1"]
+    assert summary["remarks"] == ["a remark"]
+    assert [path.name for path in folder.iterdir()] == ["a.exr"]
+
+
+def test_every_flag_reaches_the_project(capsys, projects, folder):
+    (folder / "lamp.csv").write_text("400,1\n700,1\n")
+    (folder / "iris.png").write_bytes(b"")
+    call(
+        capsys, "render", "heliar-tronnier", "--light", "-10,5", "--light", "2,-6", "--intensity", "1", "--intensity",
+        "0.5", "--spectrum", "lamp.csv", "--fstop", "8", "--blades", "7", "--rotation", "-5", "--rounding", "0.5",
+        "--iris-image", "iris.png", "--coating", "quarter-wave:550", "--quality", "draft", "--wavelengths", "3",
+        "--size", "10x8", "--sensor", "24x18", "--layers", "ghosts", "--brightest", "4", "--colorspace", "acescg",
+        "--half", "--paths", "same-side", "--focus", "2000", "--sensor-distance", "82.5", "--no-starburst",
+        "--full-windows", "--exposure", "-2", "--view", "filmic", "--threads", "1", "-o", "a.exr",
+    )  # fmt: skip
+    (project,) = projects
+    flat = Tabulated(wavelength_nm=(400, 700), power=(1, 1))
+    assert [(x.field_deg, x.intensity, x.spectrum) for x in project.lights] == [
+        ((-10, 5), 1.0, flat), ((2, -6), 0.5, flat)]  # fmt: skip
+    assert (project.f_number, project.coating) == (8.0, Everywhere(coating=QuarterWave(center_wavelength_nm=550)))
+    assert project.iris is not None
+    assert project.iris.model_dump() == {"blades": 7, "rotation_deg": -5.0, "rounding": 0.5, "mask": "iris.png"}
+    assert (project.quality.mode, project.quality.wavelengths, project.quality.paths) == ("draft", 3, "same-side")
+    assert (project.camera.size_px, project.camera.sensor_mm) == ((10, 8), (24, 18))
+    assert (project.camera.focus_distance, project.camera.sensor_distance) == (2000, 82.5)
+    output = project.output
+    assert (output.layers, output.brightest, output.colorspace) == ("ghosts", 4, "acescg")
+    assert (output.pixel_type, output.starburst) == ("half", False)
+    assert read_exr("a.exr").layers[1].pixels.shape == (8, 10, 3)
+
+
+def test_flags_win_over_the_project_file_and_the_rest_of_it_stays(capsys, projects, folder):
+    (folder / "p.toml").write_text(
+        'lens = "heliar-tronnier"\nf_number = 5.6\ncoating = "none"\n[iris]\nblades = 9\nrounding = 0.5\n'
+        '[[lights]]\nfield_deg = [1, 2]\nspectrum = "black-body:3200"\n[[lights]]\nfield_deg = [3, 4]\n'
+        '[camera]\nsize_px = [8, 6]\nsensor_mm = [36, 27]\n[output]\npixel_type = "half"\n'
+    )
+    call(capsys, "render", "--project", "p.toml", "-o", "a.exr")
+    call(capsys, "render", "--project", "p.toml", "-o", "a.exr", "--rotation", "10", "--float", "--intensity", "3")
+    call(
+        capsys, "render", "tessar-brendel", "--project", "p.toml", "-o", "a.exr", "--light", "0,0", "--coating", "lens"
+    )
+    plain, changed, other = projects
+    assert plain == read_project("p.toml")
+    assert changed.iris == plain.iris.replace(rotation_deg=10)
+    assert [(x.intensity, x.spectrum) for x in changed.lights] == [
+        (3, plain.lights[0].spectrum), (3, plain.lights[1].spectrum)]  # fmt: skip
+    assert changed.lights[0].spectrum == BlackBody(temperature_k=3200)
+    assert changed.output.pixel_type == "float"
+    assert changed.camera == plain.camera
+    assert (other.lens, other.coating, len(other.lights)) == ("tessar-brendel", AsLens(), 1)
+    assert other.f_number == 5.6
+
+
+def test_turning_the_blades_keeps_the_lens_own_number(capsys, projects):
+    call(capsys, "render", "heliar-tronnier", "--light", "1,1", "--size", "8x6", "--rotation", "10", "-o", "a.exr")
+    call(
+        capsys,
+        "render",
+        "heliar-tronnier",
+        "--light",
+        "1,1",
+        "--size",
+        "8x6",
+        "--coating",
+        "preset:thesis",
+        "-o",
+        "a.exr",
+    )
+    assert projects[0].iris.blades == fw.load_lens("heliar-tronnier").iris.blades > 0
+    assert projects[1].iris is None
+    assert projects[1].coating == Preset(name="thesis")
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "words"),
+    [
+        (KeyboardInterrupt(), 130, "flarewright: interrupted; nothing was left half-written"),
+        (MemoryError(), 2, "flarewright: error: there is not enough memory"),
+        (OSError(28, "No space left on device"), 2, "flarewright: error: No space left on device"),
+    ],
+)
+def test_what_stops_a_render_is_one_sentence_and_leaves_nothing(capsys, monkeypatch, folder, error, code, words):
+    def stop(*args, **kwargs):
+        raise error
+
+    for place in ("flarewright.render.render.render", "flarewright.io.exr.write_exr"):
+        with monkeypatch.context() as patch:
+            if place.endswith("write_exr"):
+                patch.setattr("flarewright.render.render.render", lambda p, **_: FakeRendering(p, ()))
+            patch.setattr(place, stop)
+            said = call(capsys, "render", "heliar-tronnier", "--light", "1,1", "-o", "a.exr", code=code)
+        assert said.out == ""
+        assert len(said.err.splitlines()) == 1
+        assert said.err.startswith(words)
+    assert list(folder.iterdir()) == []
+
+
+def test_a_real_draft_render(capsys, folder):
+    summary = call_json(
+        capsys, "render", "heliar-tronnier", "--light", "8,4", "--quality", "draft", "--wavelengths", "3", "--size",
+        "96x54", "--no-starburst", "--layers", "ghosts", "--brightest", "3", "-o", "a.exr",
+    )  # fmt: skip
+    assert summary["efl_mm"] == pytest.approx(HELIAR_EFL, abs=1e-5)
+    back = read_exr("a.exr")
+    assert [layer.name for layer in back.layers] == summary["layers"]
+    assert len(back.layers) == 5
+    assert all(np.isfinite(layer.pixels).all() for layer in back.layers)
+    assert back.layers[0].pixels.max() > 0
+    assert (folder / "a.png").stat().st_size > 100
+
+
+# ---------------------------------------------------------------------------------------------------------------------
+# ghosts, lenses, lens
+
+
+def test_ghosts_json_is_the_promised_contract(capsys):
+    data = call_json(capsys, "ghosts", "heliar-tronnier", "--light", "10,0", "--coating", "none")
+    assert data["efl_mm"] == pytest.approx(HELIAR_EFL, abs=1e-5)
+    assert data["bfl_mm"] == pytest.approx(81.315056, abs=1e-5)
+    assert data["f_number"] == 3.5
+    assert data["entrance_pupil_diameter_mm"] == pytest.approx(HELIAR_EFL / 3.5, abs=1e-5)
+    assert set(data["direct"]) == {"throughput_mm2", "centroid_mm", "rms_radius_mm"}
+    assert len(data["ghosts"]) == 28
+    wanted = {"first_reflection", "second_reflection", "throughput_mm2", "centroid_mm", "rms_radius_mm"}
+    assert wanted | {"peak_irradiance", "bounded_by", "focus_distance_mm"} == set(data["ghosts"][0])
+    flux = [row["throughput_mm2"] for row in data["ghosts"]]
+    assert flux == sorted(flux, reverse=True)
+    assert all(row["first_reflection"] > row["second_reflection"] for row in data["ghosts"])
+    same_side = call_json(capsys, "ghosts", "heliar-tronnier", "--light", "10,0", "--paths", "same-side")
+    assert len(same_side["ghosts"]) == 13
+
+
+def test_ghosts_table_is_for_people(capsys):
+    out = call(capsys, "ghosts", "heliar-tronnier", "--light", "-3,4", "--brightest", "2", "--fstop", "8").out
+    assert "light at -3, 4 degrees" in out
+    assert "direct" in out
+    assert len([line for line in out.splitlines() if line.startswith("│")]) == 3
+
+
+def test_lenses_lists_all_that_ship(capsys):
+    listed = call_json(capsys, "lenses")["lenses"]
+    assert [row["name"] for row in listed] == list(shipped())
+    by_name = {row["name"]: row for row in listed}
+    assert by_name["heliar-tronnier"]["surfaces"] == 8
+    assert by_name["heliar-tronnier"]["efl_mm"] == pytest.approx(HELIAR_EFL, abs=1e-5)
+    assert "US 2,645,156" in call(capsys, "lenses").out
+
+
+def test_lens_show_json_has_every_row(capsys):
+    data = call_json(capsys, "lens", "show", "heliar-tronnier", "--fstop", "7")
+    assert data["f_number"] == 7
+    assert len(data["rows"]) == 9
+    stop, flat = data["rows"][5], data["rows"][6]
+    assert stop["stop"] is True
+    assert stop["semi_diameter"] == data["stop_semi_diameter_mm"]
+    assert flat["radius_mm"] is None
+    assert flat["curvature"] == 0.0
+    keys = {"row", "stop", "radius_mm", "curvature", "conic", "thickness", "n_d", "v_d", "glass", "semi_diameter"}
+    assert all(set(row) == keys | {"semi_diameter_estimated", "coating"} for row in data["rows"])
+    assert data["rows"][0]["glass"] == "LAKN7"
+    text = call(capsys, "lens", "show", "heliar-tronnier").out
+    for words in ("LAKN7", "stop", "flat", "99.236", "thesis"):
+        assert words in text
+
+
+@pytest.mark.parametrize("more", [(), ("--light", "0,12"), ("--light", "0,12", "--ghost", "4-1")])
+def test_lens_show_draws(capsys, folder, more):
+    call(capsys, "lens", "show", "heliar-tronnier", "--plot", "a.svg", *more)
+    svg = ET.parse("a.svg").getroot()
+    tags = [element.tag.split("}")[1] for element in svg.iter()]
+    assert svg.get("width") == "900"
+    assert tags.count("polygon") == 5
+    assert tags.count("polyline") > 15
+    assert "nan" not in (folder / "a.svg").read_text("utf-8").lower().replace("tronnier", "")
+
+
+def test_every_shipped_lens_can_be_drawn(capsys):
+    from flarewright.render.cross_section import cross_section
+    from flarewright.render.prepare import first_order
+
+    for name in shipped():
+        lens = fw.load_lens(name)
+        svg = cross_section(lens, first_order(lens)).svg
+        ET.fromstring(svg)
+        assert ">nan" not in svg
+        assert "nan," not in svg
+
+
+def test_lens_check_tells_and_converts(capsys, folder):
+    said = call(capsys, "lens", "check", "heliar-tronnier")
+    assert said.out.startswith("heliar-tronnier: usable, Heliar-Tronnier")
+    assert "  - row 3: glass 'BAF9' is not in the catalogue" in said.out
+    call(capsys, "lens", "convert", "heliar-tronnier", "copy.toml")
+    assert fw.load_lens("copy.toml") == fw.load_lens("heliar-tronnier")
+    files = call_json(capsys, "lens", "check", "copy.toml")["files"]
+    assert files[0]["usable"] is True
+    assert [path.name for path in folder.iterdir()] == ["copy.toml"]
+
+
+def test_schemas_are_schemas(capsys):
+    for kind in ("lens", "project"):
+        jsonschema.Draft202012Validator.check_schema(json.loads(call(capsys, kind, "schema").out))
+
+
+# ---------------------------------------------------------------------------------------------------------------------
+# project
+
+
+def test_project_init_teaches_and_is_usable(capsys, folder):
+    (folder / "sub").mkdir()
+    call(capsys, "lens", "convert", "tessar-brendel", "mine.toml")
+    call(capsys, "project", "init", "mine.toml", "--light", "-1,2", "-o", "sub/p.toml")
+    text = (folder / "sub" / "p.toml").read_text()
+    assert 'lens = "../mine.toml"' in text
+    assert "# f_number = 2.8" in text
+    assert call(capsys, "project", "check", "sub/p.toml").out.startswith("sub/p.toml: usable, ")
+    assert call_json(capsys, "project", "check", "sub/p.toml")["usable"] is True
+    assert read_project("sub/p.toml").lights[0].field_deg == (-1, 2)
+    out = call(capsys, "project", "init", "Heliar Tronnier").out
+    import tomllib
+
+    project = project_from_data(tomllib.loads(out), folder=Path(), where="stdout")
+    assert project.lens == "heliar-tronnier"
+    assert project.coating == AsLens()
+
+
+# ---------------------------------------------------------------------------------------------------------------------
+# the program itself
+
+
+@pytest.mark.parametrize("words", [(), ("lens",), ("project",), ("render", "--help"), ("ghosts", "-h")])
+def test_help_is_given(capsys, words):
+    out = call(capsys, *words).out
+    assert "Usage: flarewright" in out
+
+
+def test_version(capsys):
+    assert call(capsys, "--version").out == f"flarewright {__version__}\n"
+
+
+def python(code):
+    return subprocess.run([sys.executable, "-c", code], check=False, capture_output=True, text=True, timeout=60)
+
+
+def test_import_and_help_load_nothing_heavy():
+    heavy = "{'numpy', 'numba', 'scipy', 'OpenEXR', 'flarewright.model'} & set(sys.modules)"
+    for code in (
+        f"import flarewright, sys; assert not {heavy}; assert 'typer' not in sys.modules",
+        f"import sys; from flarewright.cli.app import run; assert run(['render', '--help']) == 0; assert not {heavy}",
+    ):
+        done = python(code)
+        assert done.returncode == 0, done.stderr
+
+
+def test_public_names_are_there_in_any_order():
+    code = (
+        "import flarewright as fw\n"
+        "lens = fw.load_lens('heliar-tronnier')\n"
+        "assert callable(fw.render) and callable(fw.ghosts)\n"
+        "import flarewright.render.display as display\n"
+        "assert fw.render.display is display and callable(fw.render)\n"
+        "assert abs(fw.paraxial(lens).efl - 99.2358) < 1e-3\n"
+        "assert issubclass(fw.ProjectError, fw.FlarewrightError)\n"
+        "assert set(fw.__all__) <= set(dir(fw)) and all(hasattr(fw, name) for name in fw.__all__)\n"
+        "assert not hasattr(fw, 'glow')\n"
+    )
+    done = python(code)
+    assert done.returncode == 0, done.stderr
+    assert isinstance(fw.load_lens("heliar-tronnier"), Lens)
+    assert fw.Everywhere(coating=fw.Bare()).coating == Bare()
+
+
+@pytest.mark.skipif(os.name == "nt", reason="pipes close otherwise there")
+def test_a_reader_that_goes_away_causes_no_complaint():
+    code = "from flarewright.cli.app import main; import sys; sys.argv[1:] = ['project', 'schema']; main()"
+    done = subprocess.run(
+        ["/bin/sh", "-c", f'"{sys.executable}" -c "{code}" | true'],
+        check=False,
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+    assert done.stderr == ""
