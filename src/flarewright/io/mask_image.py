@@ -58,7 +58,6 @@ def _read_picture(path: Path) -> NDArray[np.float64]:
 
 
 def _read_exr(path: Path) -> NDArray[np.float64]:
-    layers = read_exr(path)
-    first = next(iter(layers))
+    first = read_exr(path).layers[0]
     pixels: NDArray[np.float64] = np.asarray(first.pixels, dtype=np.float64).mean(axis=2)
     return pixels

@@ -53,9 +53,9 @@ def _rejected(data, nodes, crossings, iris_radius, slack):
 @compiled
 def find_box(
     rows, actions, curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, tilt,
-    crossings, iris_radius, box, nx, ny,
+    crossings, iris_radius, view_radius, box, nx, ny,
 ):  # fmt: skip
-    """Bound the part of the pupil that a path accepts.
+    """Bound the part of the pupil that a path accepts, and estimate what it carries.
 
     Parameters
     ----------
@@ -65,6 +65,8 @@ def find_box(
         How often the path crosses the stop.
     iris_radius : float
         Radius of the circle around the iris, mm.
+    view_radius : float
+        Radius around the axis that the picture covers, mm.
     box : ndarray, shape (4,)
         x0, x1, y0, y1 of the pupil to look at.
     nx, ny : int
@@ -74,8 +76,9 @@ def find_box(
     -------
     found : ndarray, shape (4,)
         The box of all cells that may pass light; x1 < x0 when there is none.
-    flux : float
-        Rough flux per unit irradiance, from the accepted samples (both halves).
+    sums : ndarray, shape (4,)
+        Rough estimates from the cells that may pass, both halves, per unit irradiance: flux; flux that lands within
+        `view_radius`; the integral of flux times irradiance; cells that may touch the view.
 
     Notes
     -----
@@ -93,8 +96,9 @@ def find_box(
     data = np.empty((count, STOP_X + 2 * crossings))
     trace_nodes(rows, actions, curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, tilt, px, py, data)
     found = np.array([np.inf, -np.inf, np.inf, -np.inf])
-    flux = 0.0
+    sums = np.zeros(4)
     nodes = np.empty(4, dtype=np.int64)
+    share = hx * hy * np.cos(tilt)
     for a in range(nx):
         for b in range(ny):
             nodes[0], nodes[1] = a * width + b, a * width + b + 1
@@ -103,15 +107,40 @@ def find_box(
                 continue
             found[0], found[1] = min(found[0], box[0] + a * hx), max(found[1], box[0] + (a + 1) * hx)
             found[2], found[3] = min(found[2], box[2] + b * hy), max(found[3], box[2] + (b + 1) * hy)
-            for k in nodes:
-                if data[k, ALIVE] > 0.0:
-                    flux += data[k, WEIGHT] * 0.25
+            _weigh(data, nodes, share, view_radius, sums)
     # the pre-pass sees one wavelength and straight cells: leave a cell of room around
     for m in range(2):
         step = hx if m == 0 else hy
         found[2 * m] = max(found[2 * m] - step, box[2 * m])
         found[2 * m + 1] = min(found[2 * m + 1] + step, box[2 * m + 1])
-    return found, 2.0 * flux * hx * hy * np.cos(tilt)
+    return found, sums
+
+
+@compiled
+def _weigh(data, nodes, share, view_radius, sums):
+    """Add a pre-pass cell's flux, seen flux, flux times irradiance and visibility, for both halves of the pupil."""
+    weight, alive = 0.0, 0
+    x_low, x_high, y_low, y_high = np.inf, -np.inf, np.inf, -np.inf
+    for k in nodes:
+        if data[k, ALIVE] > 0.0:
+            alive += 1
+            weight += data[k, WEIGHT]
+            x_low, x_high = min(x_low, data[k, X]), max(x_high, data[k, X])
+            y_low, y_high = min(y_low, data[k, Y]), max(y_high, data[k, Y])
+    flux = 2.0 * weight * 0.25 * share
+    sums[0] += flux
+    out_x, out_y = max(max(x_low, -x_high), 0.0), max(max(y_low, -y_high), 0.0)
+    if out_x * out_x + out_y * out_y > view_radius * view_radius:
+        return
+    sums[3] += 1.0
+    # the part of the cell's box on the sensor that the view can hold
+    width, height = x_high - x_low, y_high - y_low
+    part = min(1.0, 2.0 * view_radius / max(width, 1e-9)) * min(1.0, 2.0 * view_radius / max(height, 1e-9))
+    sums[1] += flux * part
+    if alive == 4:
+        a, b, c, d = nodes[0], nodes[1], nodes[3], nodes[2]
+        area = (data[c, X] - data[a, X]) * (data[d, Y] - data[b, Y]) - (data[c, Y] - data[a, Y]) * (data[d, X] - data[b, X])
+        sums[2] += flux * flux / max(abs(area), 1e-6)
 
 
 @compiled

@@ -15,39 +15,37 @@ from .clip import PX, PY
 @compiled
 def _add_edge(cover, first_row, low, high, x0, y0, x1, y1):
     """Add one edge's signed coverage differences to the local rows and note the columns that it touches."""
-    sign = 1.0
+    sign, side = 1.0, 0
     if y1 < y0:
-        sign = -1.0
+        sign, side = -1.0, 1
         x0, y0, x1, y1 = x1, y1, x0, y0
-    side = 0 if sign > 0.0 else 1
     slope = (x1 - x0) / (y1 - y0)
-    row = int(floor(y0))
-    x_top = x0
-    y_top = y0
+    row = int(y0)
+    x_top, y_top = x0, y0
     while y_top < y1:
+        # coordinates are inside the picture, so truncation is the floor
         y_bottom = min(row + 1.0, y1)
         x_bottom = x0 + (y_bottom - y0) * slope if y_bottom < y1 else x1
         d = (y_bottom - y_top) * sign
-        xa, xb = (x_top, x_bottom) if x_top < x_bottom else (x_bottom, x_top)
-        ca, cb = int(floor(xa)), int(floor(xb))
-        line = cover[row - first_row]
+        xa, xb = min(x_top, x_bottom), max(x_top, x_bottom)
+        ca, cb = int(xa), int(xb)
+        k = row - first_row
         if ca == cb:
             right = 0.5 * (xa + xb) - ca
-            line[ca] += d * (1.0 - right)
-            line[ca + 1] += d * right
+            cover[k, ca] += d * (1.0 - right)
+            cover[k, ca + 1] += d * right
         else:
             s = 1.0 / (xb - xa)
             done = 0.5 * s * (ca + 1 - xa) * (ca + 1 - xa)
-            line[ca] += d * done
-            # coverage of the column after k full columns grows by s each
+            cover[k, ca] += d * done
+            # coverage grows by s with each full column
             for c in range(ca + 1, cb):
                 covered = s * (c + 0.5 - xa)
-                line[c] += d * (covered - done)
+                cover[k, c] += d * (covered - done)
                 done = covered
             left = 1.0 - 0.5 * s * (xb - cb) * (xb - cb)
-            line[cb] += d * (left - done)
-            line[cb + 1] += d * (1.0 - left)
-        k = row - first_row
+            cover[k, cb] += d * (left - done)
+            cover[k, cb + 1] += d * (1.0 - left)
         low[side, k] = min(low[side, k], ca)
         high[side, k] = max(high[side, k], cb + 1)
         x_top, y_top = x_bottom, y_bottom
@@ -82,8 +80,8 @@ def fill_polygon(polygon, count, density, gx, gy, density_low, density_high, rgb
     y_low, y_high = np.inf, -np.inf
     for k in range(count):
         y_low, y_high = min(y_low, polygon[k, PY]), max(y_high, polygon[k, PY])
-    first_row = int(floor(y_low))
-    last_row = min(int(floor(y_high)), plane.shape[1] - 1)
+    first_row = int(y_low)
+    last_row = min(int(y_high), plane.shape[1] - 1)
     for r in range(last_row - first_row + 2):
         low[0, r], low[1, r] = 1 << 30, 1 << 30
         high[0, r], high[1, r] = -1, -1
@@ -98,7 +96,6 @@ def fill_polygon(polygon, count, density, gx, gy, density_low, density_high, rgb
     sign = 1.0 if twice_area < 0.0 else -1.0
     for r in range(last_row - first_row + 2):
         row = first_row + r
-        line = cover[r]
         start = min(low[0, r], low[1, r])
         end = max(high[0, r], high[1, r])
         if end < 0:
@@ -107,28 +104,34 @@ def fill_polygon(polygon, count, density, gx, gy, density_low, density_high, rgb
         second_start = max(low[0, r], low[1, r])
         if row > last_row or high[0, r] < 0 or high[1, r] < 0:
             for c in range(start, end + 1):
-                line[c] = 0.0
+                cover[r, c] = 0.0
             continue
         base = density + gy * (row + 0.5)
         if second_start <= first_end:
             first_end, second_start = end, end + 1
-        total = _sweep(line, start, first_end, 0.0, sign, base, gx, density_low, density_high, rgb, plane, row)
+        total = _sweep(cover, r, start, first_end, 0.0, sign, base, gx, density_low, density_high, rgb, plane, row)
         if second_start <= end:
+            even = np.float32((base + gx * (first_end + 1.5)) * total * sign)
+            slope = np.float32(gx * total * sign)
             for channel in range(3):
-                colour = rgb[channel] * total * sign
-                target = plane[channel, row]
-                for c in range(first_end + 1, second_start):
-                    target[c] += colour * (base + gx * (c + 0.5))
-            _sweep(line, second_start, end, total, sign, base, gx, density_low, density_high, rgb, plane, row)
+                _fill_run(plane[channel, row, first_end + 1 : second_start], np.float32(rgb[channel]), even, slope)
+            _sweep(cover, r, second_start, end, total, sign, base, gx, density_low, density_high, rgb, plane, row)
 
 
 @compiled
-def _sweep(line, start, end, total, sign, base, gx, density_low, density_high, rgb, plane, row):
+def _fill_run(run, colour, even, slope):
+    """Add a linear ramp to fully covered pixels."""
+    for c in range(run.size):
+        run[c] += colour * (even + slope * np.float32(c))
+
+
+@compiled
+def _sweep(cover, r, start, end, total, sign, base, gx, density_low, density_high, rgb, plane, row):
     """Sum coverage over partly covered pixels, deposit it and clear the scratch."""
     width = plane.shape[2]
     for c in range(start, end + 1):
-        total += line[c]
-        line[c] = 0.0
+        total += cover[r, c]
+        cover[r, c] = 0.0
         if c < width:
             value = total * sign * min(max(base + gx * (c + 0.5), density_low), density_high)
             plane[0, row, c] += rgb[0] * value

@@ -19,8 +19,8 @@ Floats = NDArray[np.float64]
 # cells of the pre-pass over half the pupil: 64 across the whole
 PREPASS = (32, 64)
 # coarsest cells of a bundle's grid over half its region, and how often each may be halved
-GRID = (8, 16)
-MAX_LEVEL = 5
+GRID = (4, 8)
+MAX_LEVEL = 6
 
 
 @dataclass(frozen=True)
@@ -96,7 +96,36 @@ def front_box(packed: PackedLens, tilt: float) -> Floats:
     return np.array([0.0, semi, low - lead, high + lead]) * (1.0 + 1e-9)
 
 
-def find_region(packed: PackedLens, w: int, path: LightPath, tilt: float, iris_radius: float) -> tuple[Floats | None, float]:
+@dataclass(frozen=True)
+class Region:
+    """What the pre-pass found of a path, per unit irradiance.
+
+    Attributes
+    ----------
+    box : ndarray, shape (4,)
+        x0, x1, y0, y1 of the accepted pupil in the meridional frame, mm.
+    flux : float
+        Rough flux, mm^2.
+    seen_flux : float
+        The part of it that may land in the picture; 0 when the path passes it by.
+    brightness : float
+        Irradiance on the sensor, weighted by flux.
+    """
+
+    box: Floats
+    flux: float
+    seen_flux: float
+    brightness: float
+
+
+def find_region(
+    packed: PackedLens,
+    w: int,
+    path: LightPath,
+    tilt: float,
+    iris_radius: float,
+    view_radius: float = float("inf"),
+) -> Region | None:
     """Find the part of the pupil that a path accepts (Hullin 2011, section 4.2, "Ray Bounding").
 
     Parameters
@@ -108,26 +137,26 @@ def find_region(packed: PackedLens, w: int, path: LightPath, tilt: float, iris_r
     tilt : float
     iris_radius : float
         Radius around the iris, mm.
+    view_radius : float
+        Radius around the axis that the picture covers, mm.
 
     Returns
     -------
-    box : ndarray, shape (4,), or None
-        x0, x1, y0, y1 in mm, None when nothing passes.
-    flux : float
-        Rough flux per unit irradiance.
+    Region or None
+        None when nothing passes.
     """
-    arguments = _arguments(packed, w, path, tilt)
+    arguments = (*_arguments(packed, w, path, tilt), path.stop_crossings, iris_radius, view_radius)
     box, cells = front_box(packed, tilt), PREPASS
-    flux = 0.0
     for _ in range(4):
-        found, flux = find_box(*arguments, path.stop_crossings, iris_radius, box, *cells)
-        if found[1] <= found[0]:
-            return None, 0.0
+        found, sums = find_box(*arguments, box, *cells)
+        if found[1] <= found[0] or sums[0] <= 0.0:
+            return None
         shrunk = (found[1] - found[0]) * (found[3] - found[2]) < 0.3 * (box[1] - box[0]) * (box[3] - box[2])
         box, cells = found, (16, 32)
         if not shrunk:
             break
-    return box, float(flux)
+    seen = float(sums[1]) if sums[3] > 0.0 else 0.0
+    return Region(box, float(sums[0]), seen, float(sums[2] / sums[0]))
 
 
 def trace_grid(
@@ -149,7 +178,7 @@ def trace_grid(
     packed, path, tilt, iris_radius
         As in `find_region`; the grid fits the first, middle and last wavelength.
     box : ndarray, shape (4,)
-        Its result.
+        Of the region found.
     tolerance : float
         Largest interpolation error, pixels.
     scale : float

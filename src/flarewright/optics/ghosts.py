@@ -154,15 +154,15 @@ def _relative(row: GhostRow, unit: float) -> GhostRow:
 def _measure(lens: Lens, packed: PackedLens, path: LightPath, light: Incidence) -> GhostRow:
     bounded_by, focus = _paraxial_facts(lens, packed, path)
     blades = blade_edges(Iris(), packed.stop_semi)
-    box, rough = find_region(packed, 0, path, light.tilt, packed.stop_semi)
+    region = find_region(packed, 0, path, light.tilt, packed.stop_semi)
     j, i = path.first_reflection, path.second_reflection
     nothing = GhostRow(j, i, 0.0, (0.0, 0.0), 0.0, 0.0, 0.0, bounded_by, focus)
-    if box is None or rough == 0.0:
+    if region is None:
         return nothing
     scale = 1e-6
     # first only the rim, to learn the size; then fine enough for that size
     for _ in range(2):
-        bundle = trace_grid(packed, path, light.tilt, packed.stop_semi, box, tolerance=0.25, scale=scale)
+        bundle = trace_grid(packed, path, light.tilt, packed.stop_semi, region.box, tolerance=0.25, scale=scale)
         data = trace_points(packed, 0, path, light.tilt, bundle.pupil)
         sums = measure_bundle(data, bundle.pupil, bundle.triangles, path.stop_crossings, blades, light.axes)
         if sums[0] <= 0.0:

@@ -9,6 +9,9 @@ from numpy.typing import NDArray
 
 from ..model import Layer
 
+# a canvas can also hold light at half and at a quarter of the resolution
+DETAILS = 3
+
 
 @dataclass(frozen=True)
 class Canvas:
@@ -16,29 +19,59 @@ class Canvas:
 
     Attributes
     ----------
-    plane : ndarray, shape (3, H, W), float32
-        Flux per pixel.
+    size_px : tuple of int
+    planes : list of ndarray or None
+        Flux per pixel, shape (3, H, W), float32: at full resolution, at half and at a quarter; made when first used.
     cover, low, high : ndarray
         Scratch of `kernels.raster.fill_polygon`.
     """
 
-    plane: NDArray[np.float32]
+    size_px: tuple[int, int]
+    planes: list[NDArray[np.float32] | None]
     cover: NDArray[np.float64]
     low: NDArray[np.int64]
     high: NDArray[np.int64]
 
-    @property
-    def scratch(self) -> tuple[NDArray[np.float32], NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
-        """The arrays in the order in which kernels take them."""
-        return self.plane, self.cover, self.low, self.high
+    def scratch(
+        self, detail: int = 0
+    ) -> tuple[NDArray[np.float32], NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
+        """Return plane and scratch in the order in which kernels take them; `detail` halves the resolution."""
+        plane = self.planes[detail]
+        if plane is None:
+            width, height = (-(-side // 2**detail) for side in self.size_px)
+            plane = self.planes[detail] = np.zeros((3, height, width), dtype=np.float32)
+        return plane, self.cover, self.low, self.high
+
+    def merged(self) -> NDArray[np.float32]:
+        """Return the light of all resolutions at full resolution, shape (3, H, W)."""
+        width, height = self.size_px
+        total = self.scratch()[0]
+        for detail in range(1, DETAILS):
+            plane = self.planes[detail]
+            if plane is not None:
+                fine = plane
+                for _ in range(detail):
+                    fine = _double(_double(fine, 1), 2)
+                total = total + fine[:, :height, :width]
+        return total
+
+
+def _double(plane: NDArray[np.float32], axis: int) -> NDArray[np.float32]:
+    """Double the resolution along an axis by linear interpolation of irradiance; the flux stays."""
+    plane = np.moveaxis(plane, axis, -1)
+    padded = np.concatenate([plane[..., :1], plane, plane[..., -1:]], axis=-1)
+    fine = np.empty((*plane.shape[:-1], 2 * plane.shape[-1]), dtype=np.float32)
+    # a pixel's halves lie a quarter pixel from its centre, and each holds half its flux
+    fine[..., 0::2] = np.float32(0.375) * plane + np.float32(0.125) * padded[..., :-2]
+    fine[..., 1::2] = np.float32(0.375) * plane + np.float32(0.125) * padded[..., 2:]
+    return np.moveaxis(fine, -1, axis)
 
 
 def blank(size_px: tuple[int, int]) -> Canvas:
     """Return an empty canvas of (width, height) pixels."""
     width, height = size_px
     rows = np.zeros((2, height + 2), dtype=np.int64)
-    plane = np.zeros((3, height, width), dtype=np.float32)
-    return Canvas(plane, np.zeros((height + 2, width + 3)), rows, rows.copy())
+    return Canvas(size_px, [None] * DETAILS, np.zeros((height + 2, width + 3)), rows, rows.copy())
 
 
 def to_layer(name: str, plane: NDArray[np.float32], pixel_area: float, about: dict[str, str | float]) -> Layer:

@@ -2,21 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..kernels.bundle import measure_bundle
-from ..model import Lens
+from ..model import Layer, Lens, Lines
 from ..optics.bundle import find_region, trace_grid, trace_points
 from ..optics.paths import direct_path
+from .prepare import Settled
 from .shot import Shot
+from .starburst import starburst_layer
 
 Floats = NDArray[np.float64]
 
 # pixels per mm that the grid of the direct path resolves; its flux needs no more
 _SCALE = 20.0
+# Hullin 2011, section 3.3: fine enough to blur the rings of single wavelengths into each other
+DIFFRACTION_STEP_NM = 5.0
 
 
 @dataclass(frozen=True)
@@ -55,11 +60,11 @@ def direct_image(lens: Lens, shot: Shot) -> DirectImage:
     packed, opening = shot.packed, shot.opening
     count = len(packed.wavelengths_nm)
     middle = (count - 1) // 2
-    box, _ = find_region(packed, middle, path, tilt, opening.radius)
-    if box is None:
+    region = find_region(packed, middle, path, tilt, opening.radius)
+    if region is None:
         ideal = -packed.first_order.efl * np.tan(tilt) * axes[1]
         return DirectImage(np.zeros(count), (float(ideal[0]), float(ideal[1])), 0.0)
-    bundle = trace_grid(packed, path, tilt, opening.radius, box, tolerance=0.25, scale=_SCALE)
+    bundle = trace_grid(packed, path, tilt, opening.radius, region.box, tolerance=0.25, scale=_SCALE)
     flux = np.zeros(count)
     place, mean = (0.0, 0.0), 0.0
     for w in range(count):
@@ -69,3 +74,48 @@ def direct_image(lens: Lens, shot: Shot) -> DirectImage:
         if w == middle and sums[0] > 0.0:
             place, mean = (float(sums[1] / sums[0]), float(sums[2] / sums[0])), float(sums[0] / sums[4])
     return DirectImage(flux, place, mean)
+
+
+def starburst_of(settled: Settled, shots: Sequence[Shot], images: Sequence[DirectImage], mask: Floats | None) -> Layer:
+    """Draw the direct image of every light, spread by diffraction at the iris.
+
+    Parameters
+    ----------
+    settled : Settled
+    shots, images : sequence
+        One a light.
+    mask : ndarray, shape (A, B), or None
+        The iris as an image.
+
+    Returns
+    -------
+    Layer
+        Named "starburst"; its light is the direct images' flux, in the unit of the ghosts.
+    """
+    width, height = shots[0].size_px
+    total = np.zeros((height, width, 3), dtype=np.float32)
+    for shot, image in zip(shots, images, strict=True):
+        fine_nm = _diffracted_wavelengths(shot)
+        flux = np.interp(fine_nm, shot.packed.wavelengths_nm, image.throughput_mm2) * shot.light.intensity
+        if not flux.any():
+            continue
+        column = shot.to_pixels[0] + image.position_mm[0] * shot.to_pixels[2]
+        row = shot.to_pixels[1] - image.position_mm[1] * shot.to_pixels[3]
+        total += starburst_layer(
+            settled.iris,
+            settled.order.f_number,
+            (1.0 / float(shot.to_pixels[2]), 1.0 / float(shot.to_pixels[3])),
+            shot.size_px,
+            (float(column), float(row)),
+            fine_nm,
+            shot.weights(fine_nm) * flux[:, None],
+            mask=mask,
+        )
+    return Layer("starburst", total, (0, 0, width, height))
+
+
+def _diffracted_wavelengths(shot: Shot) -> Floats:
+    """Steps of 5 nm over the visible range; the lines themselves for a spectrum of lines."""
+    if isinstance(shot.light.spectrum, Lines):
+        return np.array(sorted({nm for nm, _ in shot.light.spectrum.lines}))
+    return np.arange(380.0, 781.0, DIFFRACTION_STEP_NM)

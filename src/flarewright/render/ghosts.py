@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from ..model import Layer, Quality
 from ..optics.paths import LightPath
-from .canvas import Canvas, blank, to_layer
+from .canvas import blank, to_layer
 from .ghosts_draft import draw_draft
-from .ghosts_final import FinalPass, draw_final, find_final
+from .ghosts_final import FinalPass, contrast, draw_final, find_final
 from .shot import Shot
 
 Progress = Callable[[float, str], None]
@@ -120,9 +120,12 @@ def _final(
         return found
 
     found = [items for items in pool.map(find, paths) if items]
-    flux = np.array([sum(item.rough_flux for item in items) for items in found])
+    flux = np.array([sum(item.region.flux * item.shot.light.intensity for item in items) for items in found])
+    level = _level(found)
     keep = _worth_drawing(flux, quality.cull)
     order = [int(k) for k in np.argsort(-flux, kind="stable") if keep[k]]
+
+    alone = set(order if singles is None else order[:singles])
 
     def draw(group: list[int]) -> NDArray[np.float32]:
         canvas = blank(shots[0].size_px)
@@ -130,9 +133,12 @@ def _final(
             if meter.cancelled.is_set():
                 break
             for item in found[k]:
-                draw_final(item, quality, canvas)
+                if item.region.seen_flux > 0.0:
+                    # a layer of its own may be graded up, so it is drawn in full
+                    visibility = float("inf") if k in alone else contrast(item, level)
+                    draw_final(item, quality, canvas, visibility)
             meter.step(f"ghost {found[k][0].path.name}")
-        return canvas.plane
+        return canvas.merged()
 
     named = [found[k][0].path for k in order]
     total, layers = _collect(shots, [[k] for k in order], named, singles, draw, pool)
@@ -153,11 +159,20 @@ def _draft(
             draw_draft(shot, [paths[k] for k in group], canvas)
         for k in group:
             meter.step(f"ghost {paths[k].name}")
-        return canvas.plane
+        return canvas.merged()
 
     order = list(range(len(paths)))
     total, layers = _collect(shots, [[k] for k in order], paths, singles, draw, pool)
     return GhostPass(total, layers, len(paths), 0, 0, 0.0)
+
+
+def _level(found: list[list[FinalPass]]) -> float:
+    """Mean irradiance of all ghosts over the circle around the picture."""
+    items = [item for group in found for item in group]
+    if not items:
+        return 0.0
+    seen = sum(item.region.seen_flux * item.shot.light.intensity for item in items)
+    return float(seen / (np.pi * items[0].shot.view_radius ** 2))
 
 
 def _worth_drawing(flux: NDArray[np.float64], cull: float) -> NDArray[np.bool_]:
@@ -193,6 +208,3 @@ def _collect(
     for plane in pool.map(draw, [group for group in rest if group]):
         total += plane
     return to_layer("ghosts", total, pixel_area, {}), tuple(layers)
-
-
-__all__ = ["Canvas", "GhostPass", "render_ghosts"]

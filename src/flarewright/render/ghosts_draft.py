@@ -24,7 +24,7 @@ def draw_draft(shot: Shot, paths: Sequence[LightPath], canvas: Canvas) -> None:
     shot : Shot
     paths : sequence of LightPath
     canvas : Canvas
-        Its plane is added to.
+        Added to.
     """
     if not paths:
         return
@@ -36,5 +36,5 @@ def draw_draft(shot: Shot, paths: Sequence[LightPath], canvas: Canvas) -> None:
         np.array([path.stop_crossings for path in paths]), packed.curvature, packed.z_vertex, packed.n_gap,
         packed.reflectance, packed.sensor_z, float(packed.semi[first]), float(np.tan(shot.incidence.tilt)),
         opening.edges, opening.radius, opening.mask, opening.half, shot.incidence.axes, shot.to_pixels, shot.gain,
-        shot.weights(packed.wavelengths_nm), *canvas.scratch,
+        shot.weights(packed.wavelengths_nm), *canvas.scratch(),
     )  # fmt: skip

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ..kernels.bundle import draw_bundle, node_densities
 from ..kernels.trace import ALIVE, REL, X, Y
 from ..model import Quality
-from ..optics.bundle import Bundle, find_region, trace_grid, trace_points
+from ..optics.bundle import Region, find_region, trace_grid, trace_points
 from ..optics.paths import LightPath
 from .canvas import Canvas
 from .shot import Shot
@@ -24,6 +24,10 @@ Floats = NDArray[np.float64]
 
 # lateral colour wider than this many pixels between two drawn wavelengths would show as steps
 BRIDGE_PX = 1.5
+# ghosts fainter than these parts of the picture's mean are drawn at a half and a quarter of the resolution
+DETAIL_CONTRAST = (4e-3, 1e-3)
+# a step of colour fainter than this part of the picture's mean is not seen
+STEP_CONTRAST = 2e-3
 # never more drawings than this between two traced wavelengths
 MOST_BRIDGES = 32
 
@@ -36,16 +40,13 @@ class FinalPass:
     ----------
     shot : Shot
     path : LightPath
-    box : ndarray, shape (4,)
-        Accepted pupil region, mm.
-    rough_flux : float
-        Flux per unit irradiance from the pre-pass, mm^2.
+    region : Region
+        Accepted pupil and rough estimates, per unit irradiance.
     """
 
     shot: Shot
     path: LightPath
-    box: Floats
-    rough_flux: float
+    region: Region
 
 
 def find_final(shot: Shot, path: LightPath) -> FinalPass | None:
@@ -61,13 +62,27 @@ def find_final(shot: Shot, path: LightPath) -> FinalPass | None:
     FinalPass or None
     """
     middle = (len(shot.packed.wavelengths_nm) - 1) // 2
-    box, flux = find_region(shot.packed, middle, path, shot.incidence.tilt, shot.opening.radius)
-    if box is None or flux <= 0.0:
-        return None
-    return FinalPass(shot, path, box, flux * shot.light.intensity)
+    region = find_region(shot.packed, middle, path, shot.incidence.tilt, shot.opening.radius, shot.view_radius)
+    return None if region is None else FinalPass(shot, path, region)
 
 
-def draw_final(item: FinalPass, quality: Quality, canvas: Canvas) -> None:
+def contrast(item: FinalPass, level: float) -> float:
+    """Compare a path's irradiance with the mean of all ghosts in the picture.
+
+    Parameters
+    ----------
+    item : FinalPass
+    level : float
+        Mean irradiance of all ghosts in the picture.
+
+    Returns
+    -------
+    float
+    """
+    return item.region.brightness * item.shot.light.intensity / level if level > 0.0 else float("inf")
+
+
+def draw_final(item: FinalPass, quality: Quality, canvas: Canvas, visibility: float = float("inf")) -> None:
     """Trace one path of one light and add it to a canvas.
 
     Parameters
@@ -75,36 +90,35 @@ def draw_final(item: FinalPass, quality: Quality, canvas: Canvas) -> None:
     item : FinalPass
     quality : Quality
     canvas : Canvas
-        Its plane is added to.
+        Added to.
+    visibility : float
+        Its `contrast`: what cannot be told from its surroundings needs neither sharp edges nor many wavelengths.
     """
+    detail = sum(visibility < limit for limit in DETAIL_CONTRAST)
     shot, path = item.shot, item.path
     tilt, opening = shot.incidence.tilt, shot.opening
-    scale = float(max(shot.to_pixels[2], shot.to_pixels[3]))
+    to_pixels = shot.to_pixels / 2.0**detail
+    scale = float(max(to_pixels[2], to_pixels[3]))
     bundle = trace_grid(
-        shot.packed, path, tilt, opening.radius, item.box,
+        shot.packed, path, tilt, opening.radius, item.region.box,
         tolerance=quality.tolerance_px, scale=scale, view_radius=shot.view_radius,
     )  # fmt: skip
     count = len(shot.packed.wavelengths_nm)
     traced = [trace_points(shot.packed, w, path, tilt, bundle.pupil) for w in range(count)]
-    pieces = _bridges(traced, shot, scale) if quality.bridge else 1
+    pieces = _bridges(traced, shot, scale, visibility) if quality.bridge else 1
     fine_nm = _refine(shot.packed.wavelengths_nm, pieces)
     for m, rgb in enumerate(shot.weights(fine_nm)):
         if rgb.any():
             w, part = divmod(m, pieces)
             data = traced[w] if part == 0 else _between(traced[w], traced[w + 1], part / pieces)
-            _draw(bundle, data, rgb, shot, canvas)
+            draw_bundle(
+                data, bundle.pupil, bundle.triangles, node_densities(data, bundle.pupil, bundle.triangles),
+                path.stop_crossings, opening.blades, opening.mask, opening.half, shot.incidence.axes,
+                to_pixels, shot.gain, rgb, *canvas.scratch(detail),
+            )  # fmt: skip
 
 
-def _draw(bundle: Bundle, data: Floats, rgb: Floats, shot: Shot, canvas: Canvas) -> None:
-    opening = shot.opening
-    draw_bundle(
-        data, bundle.pupil, bundle.triangles, node_densities(data, bundle.pupil, bundle.triangles),
-        bundle.path.stop_crossings, opening.blades, opening.mask, opening.half, shot.incidence.axes,
-        shot.to_pixels, shot.gain, rgb, *canvas.scratch,
-    )  # fmt: skip
-
-
-def _bridges(traced: list[Floats], shot: Shot, scale: float) -> int:
+def _bridges(traced: list[Floats], shot: Shot, scale: float, visibility: float) -> int:
     """Into how many pieces to divide the gap between traced wavelengths: a power of two."""
     widest = 0.0
     for short, long in zip(traced, traced[1:], strict=False):
@@ -114,7 +128,7 @@ def _bridges(traced: list[Floats], shot: Shot, scale: float) -> int:
             shift = np.hypot(long[seen, X] - short[seen, X], long[seen, Y] - short[seen, Y])
             widest = max(widest, float(shift.max()) * scale)
     pieces = 1
-    while widest / pieces > BRIDGE_PX and pieces < MOST_BRIDGES:
+    while widest > BRIDGE_PX * pieces and visibility > STEP_CONTRAST * pieces and pieces < MOST_BRIDGES:
         pieces *= 2
     return pieces
 

@@ -11,7 +11,7 @@ from ..io.mask_image import read_mask
 from ..model import Layer, Project
 from ..optics.paths import ghost_paths
 from .compose import beauty
-from .direct import DirectImage, direct_image
+from .direct import DirectImage, direct_image, starburst_of
 from .ghosts import GhostPass, render_ghosts
 from .prepare import Settled, settle
 from .shot import Shot, make_opening, make_shots
@@ -74,8 +74,6 @@ def render(
     images = [direct_image(settled.lens, shot) for shot in shots]
     passes = [ghosts.total]
     if project.output.starburst:
-        from .starburst import starburst_of
-
         passes.insert(0, starburst_of(settled, shots, images, mask))
     whole = beauty(passes, project.camera.size_px)
     layers = (whole,)

@@ -1,0 +1,342 @@
+"""Fraunhofer pattern of the iris: its Fourier core and the asymptotic wings beyond.
+
+All lengths in the pupil are in units of the pupil's radius efl / (2 N), so a pattern belongs to a shape alone:
+frequency s (cycles per radius) lands at x = 2 N lambda s on the sensor, whatever the focal length. The pattern P(s) has
+unit integral and P(0) = the opening's area. The picture is the sensor turned by 180 degrees and P(-s) = P(s), so the
+pattern stands in the upright picture as the iris does seen from behind the camera.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from dataclasses import dataclass, field
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flarewright.model.iris import Iris
+
+from .iris import blade_edges, transmission
+
+Floats = NDArray[np.float64]
+
+FFT_SIZE = 4096
+WINDOW = 12.0
+"""Width of the zero-padded pupil plane in pupil radii; the step in s is 1 / WINDOW, the Nyquist frequency 171."""
+
+CORE_REACH = 60.0
+"""The core is used up to this s, a third of Nyquist: aliasing errs by 0.2 % there."""
+
+PUPIL_REACH = 1.65
+"""No opening reaches farther than this: the corner of a straight triangle lies at 1.56."""
+
+FAN_BINS = 720
+
+__all__ = ["CORE_REACH", "BladeWings", "FanWings", "Pattern", "SpikeProfile", "pupil_pattern", "spike_profile"]
+
+
+@dataclass(frozen=True)
+class FanWings:
+    """Wings P = g(phi) / s^3 of a border that turns everywhere.
+
+    Attributes
+    ----------
+    angular : ndarray, shape (A,)
+        g over [0, pi), periodic.
+    """
+
+    angular: Floats
+
+
+@dataclass(frozen=True)
+class BladeWings:
+    """Wings of B equal blades, in the pupil's units.
+
+    Attributes
+    ----------
+    angle : ndarray, shape (D,)
+        Different directions of their normals, modulo pi.
+    multiplicity : float
+        Blades per direction: 2 when their number is even.
+    length : float
+        Length of a blade's edge.
+    half_fan : float
+        Half the angle that a blade's arc subtends at its centre; 0 when straight.
+    """
+
+    angle: Floats
+    multiplicity: float
+    length: float
+    half_fan: float
+
+
+@dataclass(frozen=True)
+class Pattern:
+    """The Fraunhofer pattern of one iris.
+
+    Attributes
+    ----------
+    table : ndarray, shape (K, K)
+        Summed-area table of P: flux left of and below each knot; rows rise with y; centre at knot (K - 1) / 2.
+    knots_per_s : float
+        Knots per unit of s.
+    reach : float
+        The table is trusted up to this s.
+    wings : FanWings or BladeWings
+        Continues P beyond the reach.
+    """
+
+    table: Floats
+    knots_per_s: float
+    reach: float
+    wings: FanWings | BladeWings
+
+
+@dataclass(frozen=True)
+class SpikeProfile:
+    """Flux across the spikes, tabulated in v = distance from the spike / (2 N), mm.
+
+    Attributes
+    ----------
+    cumulative, density : ndarray, shape (D, V, C)
+        Flux between 0 and v, and its derivative, at v = k * step, averaged over the pixel's extent.
+    half_total, tail : ndarray, shape (C,)
+        Beyond the table the cumulative is half_total - tail / v.
+    step : float
+    """
+
+    cumulative: Floats
+    density: Floats
+    half_total: Floats
+    tail: Floats
+    step: float
+
+
+@dataclass(frozen=True)
+class _Mask:
+    """A mask image that a cache can compare: by its contents' digest."""
+
+    digest: bytes
+    pixels: NDArray[np.floating] = field(compare=False, repr=False)
+
+
+def pupil_pattern(iris: Iris, mask: NDArray[np.floating] | None = None) -> Pattern:
+    """Fraunhofer pattern of an iris or of a mask image; the last few are kept.
+
+    Parameters
+    ----------
+    iris : Iris
+    mask : ndarray, shape (rows, columns), or None
+        As in `iris.transmission`; the square root of its transmittance is the wave's amplitude.
+
+    Returns
+    -------
+    Pattern
+
+    Raises
+    ------
+    ValueError
+        When the mask is dark everywhere.
+
+    Notes
+    -----
+    Hullin et al. 2011, section 3.3, equation 2. The border of blades is softened by a triangle two samples wide along
+    its normal, and the light at a direction comes from the borders whose normal it is: dividing by sinc^4 of |s|
+    undoes the filter. (One sample's box would let borders that run along the grid alias by 10 %.) Beyond the core, an element ds of the border with normal phi sends ds / (4 pi^2 A s^2) ds' along
+    phi and phi + pi (stationary phase, fringes averaged). A circle's wings are the mean Airy tail 1 / (2 pi^3 s^3), so
+    1 / (pi^2 s) of the light falls outside s. A mask's wings are g(phi) / s^3 with the g that its own pattern has
+    between half its reach and the whole of it: the law of any sharp border, measured direction by direction. The reach
+    of a mask is an eighth of its pixels a side at most.
+    """
+    if mask is None:
+        return _pattern(iris, None)
+    pixels = np.ascontiguousarray(mask, dtype=np.float64)
+    digest = hashlib.blake2b(pixels.tobytes() + repr(pixels.shape).encode(), digest_size=16).digest()
+    return _pattern(iris, _Mask(digest, pixels))
+
+
+@lru_cache(maxsize=4)
+def _pattern(iris: Iris, mask: _Mask | None) -> Pattern:
+    spacing = WINDOW / FFT_SIZE
+    reach = math.ceil(CORE_REACH * WINDOW)
+    s = np.arange(-reach, reach + 1) / WINDOW
+    trusted = CORE_REACH
+    P = _power(_amplitude(iris, mask, spacing), reach)
+    if mask is None:
+        P /= np.sinc(spacing * np.hypot(s, s[:, None])) ** 4
+        P *= math.pi / P[reach, reach]
+        wings = _wings(iris)
+    else:
+        # An image's border is soft: its pixels are means over their area, then interpolated linearly. Up to an eighth
+        # of a cycle per pixel the softness is safely divided out (isotropic to second order), beyond it is not known.
+        finest = min(mask.pixels.shape)
+        trusted = min(CORE_REACH, max(8.0, finest / 8.0))
+        radius = np.minimum(np.hypot(s, s[:, None]), 2.0 * trusted)
+        P /= np.sinc(spacing * radius) ** 2 * np.sinc(2.0 * radius / max(finest, 64.0)) ** 6
+        wings = _measured_fans(P, s, trusted)
+        flux_outside = 2.0 * math.pi * wings.angular.mean() / trusted
+        total = P[np.hypot(s, s[:, None]) <= trusted].sum() / WINDOW**2 + flux_outside
+        P /= total
+        wings = FanWings(wings.angular / total)
+    table = np.zeros((len(s) + 1, len(s) + 1))
+    np.cumsum(np.cumsum(P, axis=0), axis=1, out=table[1:, 1:])
+    table /= WINDOW**2
+    table.flags.writeable = False
+    return Pattern(table, WINDOW, trusted, wings)
+
+
+def _amplitude(iris: Iris, mask: _Mask | None, spacing: float) -> Floats:
+    """Wave amplitude behind the pupil, sampled at the given spacing; rows rise with y."""
+    half = math.ceil(PUPIL_REACH / spacing)
+    at = (np.arange(-half, half) + 0.5) * spacing
+    if mask is None:
+        ramp = transmission(iris, 1.0, at, at[:, None], footprint=2.0 * spacing)
+        # The linear ramp is a box's integral; this is the triangle's.
+        return np.where(ramp < 0.5, 2.0 * ramp**2, 1.0 - 2.0 * (1.0 - ramp) ** 2)
+    # Mean of 3 x 3 bilinear samples: the image may be finer than the grid.
+    fine = (at[:, None] + np.array([-1.0, 0.0, 1.0]) * spacing / 3.0).ravel()
+    light = transmission(iris, 1.0, fine, fine[:, None], mask=mask.pixels)
+    light = light.reshape(len(at), 3, len(at), 3).mean(axis=(1, 3))
+    if not light.max() > 0.0:
+        raise ValueError("the iris mask is dark everywhere; white must mark the opening")
+    amplitude: Floats = np.sqrt(light)
+    return amplitude
+
+
+def _power(amplitude: Floats, reach: int) -> Floats:
+    """|FFT|^2 at the frequencies -reach..reach of both axes.
+
+    The two one-dimensional passes skip the rows of zeros and the columns beyond the core.
+    """
+    half = np.fft.rfft(amplitude, n=FFT_SIZE, axis=1)[:, : reach + 1]
+    right = np.empty((2 * reach + 1, reach + 1))
+    rows = np.arange(-reach, reach + 1)
+    block = 128  # columns at a time, to keep the padded transform in a few MB
+    for k in range(0, reach + 1, block):
+        A = np.fft.fft(half[:, k : k + block], n=FFT_SIZE, axis=0)[rows]
+        right[:, k : k + block] = A.real**2 + A.imag**2
+    P = np.empty((2 * reach + 1, 2 * reach + 1))
+    P[:, reach:] = right
+    P[:, :reach] = right[::-1, :0:-1]
+    return P
+
+
+def _wings(iris: Iris) -> FanWings | BladeWings:
+    edges = blade_edges(iris, 1.0)
+    if len(edges) == 1:
+        return FanWings(np.array([0.5 / math.pi**3]))
+    B = len(edges)
+    offset, curvature = float(edges[0, 2]), float(edges[0, 3])
+    from_centre = np.hypot(*_corner(offset, curvature, B))
+    chord = 2.0 * from_centre * math.sin(math.pi / B)
+    half_fan = math.asin(0.5 * curvature * chord)
+    length = chord / float(np.sinc(half_fan / math.pi))
+    angle = np.arctan2(edges[:, 1], edges[:, 0])
+    directions = B // 2 if B % 2 == 0 else B
+    return BladeWings(angle[:directions], B / directions, float(length), half_fan)
+
+
+def _corner(offset: float, curvature: float, blades: int) -> tuple[float, float]:
+    """Where two blades meet, from the normal of one of them: (along, across)."""
+    cosine, sine = math.cos(math.pi / blades), math.sin(math.pi / blades)
+    k = curvature * offset
+    b = (1.0 - k) * cosine
+    rho = offset * (2.0 - k) / (b + math.sqrt(b * b + k * (2.0 - k)))
+    return rho * cosine, rho * sine
+
+
+def _measured_fans(P: Floats, s: Floats, reach: float) -> FanWings:
+    """g(phi) from the flux of a pattern between half its reach and the whole: flux = g dphi (1/s1 - 1/s2)."""
+    s1, s2 = 0.5 * reach, reach
+    radius = np.hypot(s, s[:, None])
+    ring = (radius > s1) & (radius <= s2) & (s[:, None] >= 0.0)
+    y, x = np.nonzero(ring)
+    at = np.arctan2(s[y], s[x]) / math.pi * FAN_BINS
+    k = np.floor(at).astype(np.intp)
+    f = at - k
+    flux = P[ring] / WINDOW**2
+    bins = np.bincount(k % FAN_BINS, (1.0 - f) * flux, FAN_BINS) + np.bincount((k + 1) % FAN_BINS, f * flux, FAN_BINS)
+    return FanWings(bins / (math.pi / FAN_BINS) / (1.0 / s1 - 1.0 / s2))
+
+
+def spike_profile(
+    wings: BladeWings,
+    wavelengths_nm: Floats,
+    weights: Floats,
+    f_number: float,
+    pixel_mm: tuple[float, float],
+) -> SpikeProfile:
+    """Profile across the spikes of straight blades, all wavelengths together, averaged over a pixel.
+
+    Parameters
+    ----------
+    wings : BladeWings
+    wavelengths_nm : ndarray, shape (M,)
+    weights : ndarray, shape (M, C)
+        What each wavelength adds to each channel.
+    f_number : float
+    pixel_mm : tuple of float
+        Width and height of a pixel.
+
+    Returns
+    -------
+    SpikeProfile
+        For irradiance = profile / r^2, r in mm on the sensor.
+
+    Notes
+    -----
+    The incoherent sum over the straight edges, each of length l, of the exact polygon transform is
+    P = sum l^2 sinc^2(l s_t) / (4 pi^2 A s^2), s_t = s tan(angle from the normal). On the sensor the wavelength
+    is left in the sinc alone: E = l^2 / (4 pi^2 A r^2) G(v), G(v) = sum_m w_m sinc^2(l v / lambda_m). So one profile
+    serves a spike over its whole length, colours included. sinc^2 is a triangle's transform and the pixel's shadow
+    across the spike a trapezoid, so G and its integral are cosine and sine sums of a smooth compact spectrum. A curved
+    blade's fan is the same profile averaged over the fan's width, which the kernel does with the integral.
+    """
+    area = math.pi
+    lam = wavelengths_nm * 1e-6
+    length = wings.length
+    per_edge = wings.multiplicity * length**2 / (4.0 * math.pi**2 * area)
+    W = weights * per_edge
+    narrow, wide = lam.min() / length, lam.max() / length
+    sides = np.array(pixel_mm) / (2.0 * f_number)
+    span = float(sides.sum()) / 2.0
+    end = 24.0 * wide + 12.0 * span
+    step = max(narrow / 6.0, span / 48.0)
+    v = np.arange(math.ceil(end / step) + 2) * step
+    dq = 1.0 / (8.0 * v[-1])
+    q = np.arange(math.ceil(1.0 / narrow / dq) + 1) * dq
+    triangle = np.maximum(1.0 - q[:, None] * lam / length, 0.0) * (lam / length)
+    F = (triangle @ W) * (2.0 * dq)
+    F[0] *= 0.5
+    tail = (lam**2 @ W) / (2.0 * math.pi**2 * length**2)
+    half_total = 0.5 * (lam / length) @ W
+    fade = np.clip(2.0 * v / v[-1] - 1.0, 0.0, 1.0)[:, None]
+    far = np.maximum(v, step)[:, None]
+    shadow = np.sinc(sides[0] * np.outer(q, np.sin(wings.angle))) * np.sinc(sides[1] * np.outer(q, np.cos(wings.angle)))
+    seen = (shadow[:, :, None] * F[:, None, :]).reshape(len(q), -1)
+    shape = (len(v), len(wings.angle), weights.shape[1])
+    cumulative, density = (table.reshape(shape).swapaxes(0, 1) for table in _transform(v, q, seen))
+    return SpikeProfile(
+        np.ascontiguousarray((1.0 - fade) * cumulative + fade * (half_total - tail / far)),
+        np.ascontiguousarray((1.0 - fade) * density + fade * tail / far**2),
+        half_total,
+        tail,
+        step,
+    )
+
+
+def _transform(v: Floats, q: Floats, spectra: Floats) -> tuple[Floats, Floats]:
+    """Sum spectra (Q, S) times sin(2 pi q v) / (2 pi q), and times cos(2 pi q v), for every v: (V, S) each."""
+    integral, density = np.empty((2, len(v), spectra.shape[1]))
+    over_q = spectra.copy()
+    over_q[1:] /= 2.0 * math.pi * q[1:, None]
+    block = 64  # rows at a time, to keep the phases in a few MB
+    for k in range(0, len(v), block):
+        phase = 2.0 * math.pi * np.outer(v[k : k + block], q)
+        density[k : k + block] = np.cos(phase) @ spectra
+        sine = np.sin(phase)
+        sine[:, 0] = v[k : k + block]  # the limit at q = 0
+        integral[k : k + block] = sine @ over_q
+    return integral, density
