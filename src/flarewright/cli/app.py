@@ -27,7 +27,7 @@ from . import (
 app = typer.Typer(
     name="flarewright",
     help="Lens flare as physics: choose a lens, say where the light is, get a layered linear picture.",
-    epilog="Begin with: flarewright lenses · then: flarewright render heliar-tronnier --light 10,5 -o flare.exr",
+    epilog="Begin with: flarewright lenses\n\nThen: flarewright render heliar-tronnier --light 10,5 -o flare.exr",
     add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode="rich",

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from ..optics.ghosts import GhostRow, GhostTable
 
 EPILOG = (
-    "Examples: flarewright ghosts heliar-tronnier --light 10,0 · "
+    "Examples:\n\nflarewright ghosts heliar-tronnier --light 10,0\n\n"
     "flarewright ghosts my.toml --light 0,0 --coating quarter-wave:550 --fstop 8 --json"
 )
 

@@ -10,7 +10,7 @@ import typer
 from ..errors import FlarewrightError
 from .common import print_json
 
-EPILOG = "Example: flarewright lens check my-lenses/*.lens"
+EPILOG = "Example:\n\nflarewright lens check my-lenses/*.lens"
 
 
 def check(

@@ -10,7 +10,7 @@ import typer
 from ..errors import OutputError
 from .common import check_place, tell
 
-EPILOG = "Example: flarewright lens convert old/tessar.lens tessar.toml"
+EPILOG = "Example:\n\nflarewright lens convert old/tessar.lens tessar.toml"
 
 
 def convert(

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from ..optics.paraxial import FirstOrder
 
 EPILOG = (
-    "Examples: flarewright lens show tessar-brendel · "
+    "Examples:\n\nflarewright lens show tessar-brendel\n\n"
     "flarewright lens show canon-28-80 --plot canon.svg --light 0,12 --ghost 7-2"
 )
 

@@ -12,7 +12,7 @@ from ..errors import OutputError
 from .common import check_place, field_angles, tell
 
 EPILOG = (
-    "Example: flarewright project init heliar-tronnier -o shot.toml · "
+    "Example:\n\nflarewright project init heliar-tronnier -o shot.toml\n\n"
     "then: flarewright render --project shot.toml -o shot.exr"
 )
 

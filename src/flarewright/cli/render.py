@@ -15,10 +15,10 @@ if TYPE_CHECKING:
     from ..render.render import Rendering
 
 EPILOG = (
-    "Examples: flarewright render heliar-tronnier --light 10,5 -o flare.exr · "
+    "Examples:\n\nflarewright render heliar-tronnier --light 10,5 -o flare.exr\n\n"
     "flarewright render canon-28-80 --light -8,3 --light 2,6 --intensity 1 --intensity 0.2 --spectrum black-body:3200 "
     "--fstop 8 --blades 7 --coating quarter-wave:550 --size 1920x1080 --layers ghosts --brightest 30 --half "
-    "-o shot.exr · "
+    "-o shot.exr\n\n"
     "flarewright render --project shot.toml --quality draft -o test.exr"
 )
 
@@ -29,7 +29,7 @@ def render(
     output: Annotated[
         Path, typer.Option("-o", "--output", metavar="OUT.exr", help="The EXR file.", rich_help_panel=_OUT)
     ],
-    lens: Annotated[str | None, typer.Argument(metavar="[LENS]", help="A shipped lens or a lens file.")] = None,
+    lens: Annotated[str | None, typer.Argument(metavar="LENS", help="A shipped lens or a lens file.")] = None,
     project: Annotated[
         Path | None, typer.Option(metavar="FILE", help="A project file; flags given beside it win over it.")
     ] = None,
