@@ -13,7 +13,7 @@ from .common import check_place, field_angles, tell
 
 EPILOG = (
     "Example:\n\nflarewright project init heliar-tronnier -o shot.toml\n\n"
-    "then: flarewright render --project shot.toml -o shot.exr"
+    "flarewright render --project shot.toml -o shot.exr"
 )
 
 
