@@ -59,8 +59,18 @@ def test_auto_exposure_is_deterministic_scales_and_survives_black():
     assert auto_exposure(picture / 1024) == pytest.approx(stops + 10, abs=0.011)
     assert auto_exposure(np.zeros((4, 4, 3), np.float32)) == 0.0
     np.testing.assert_array_equal(view(picture), view(picture, stops))
-    # Pixels that no light reaches do not count.
-    assert auto_exposure(np.pad(picture, ((0, 400), (0, 400), (0, 0)))) == stops
+    # Pixels that no light reaches do not count towards the percentile.
+    flat = np.pad(np.full((9, 9, 3), 0.35, np.float32), ((0, 90), (0, 90), (0, 0)))
+    assert auto_exposure(flat) == 1.0
+
+
+def test_auto_exposure_keeps_a_veil_over_the_whole_picture_dark():
+    veil = np.full((50, 50, 3), 0.01, np.float32)
+    assert auto_exposure(veil) == 2.0
+    veil[:5, :5] = 0.02
+    assert auto_exposure(veil) == 2.0
+    veil[:20, :20] = 0.35
+    assert auto_exposure(veil) == 1.0
 
 
 def test_unknown_view_is_refused_and_the_view_is_stated():

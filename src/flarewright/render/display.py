@@ -28,9 +28,11 @@ ACESCG_TO_REC709: NDArray[np.float64] = np.array(
 
 _LUMINANCE_REC709 = np.array([0.2126, 0.7152, 0.0722])
 
-# Auto exposure puts this percentile of the lit pixels at this linear display value.
+# Auto exposure puts this percentile of the lit pixels at this linear display value,
 _PERCENTILE = 99.0
 _TARGET = 0.7
+# unless a veil over the whole picture, its median, would come out brighter than this.
+_BRIGHTEST_VEIL = 0.04
 _DARKEST = 1e-30
 
 _GREY = 0.18
@@ -95,8 +97,9 @@ def auto_exposure(rgb_linear: NDArray[np.float32], colorspace: Colorspace = "rec
     Returns
     -------
     float
-        Puts the 99th percentile of the luminance of all lit pixels at a linear 0.7, rounded to a hundredth of a stop;
-        0 for a black picture.
+        Puts the 99th percentile of the luminance of all lit pixels at a linear 0.7, or the median of all pixels at
+        0.04 where that is darker, so that large even ghosts do not turn black into grey. Rounded to a hundredth of a
+        stop; 0 for a black picture.
     """
     light = np.asarray(rgb_linear, np.float64)
     weights = _LUMINANCE_REC709 if colorspace == "rec709" else _LUMINANCE_REC709 @ ACESCG_TO_REC709
@@ -104,7 +107,11 @@ def auto_exposure(rgb_linear: NDArray[np.float32], colorspace: Colorspace = "rec
     lit = luminance[luminance > _DARKEST]
     if lit.size == 0:
         return 0.0
-    return round(float(np.log2(_TARGET / np.percentile(lit, _PERCENTILE))), 2)
+    gain = _TARGET / float(np.percentile(lit, _PERCENTILE))
+    veil = float(np.median(luminance))
+    if veil > _DARKEST:
+        gain = min(gain, _BRIGHTEST_VEIL / veil)
+    return round(float(np.log2(gain)), 2)
 
 
 def filmic(light: NDArray[np.float64]) -> NDArray[np.float64]:
