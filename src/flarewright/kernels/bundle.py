@@ -11,27 +11,26 @@ from .clip import (
     PW,
     PX,
     PY,
+    blade_value,
     clip_triangle,
     cut_to_rectangle,
     polygon_area,
 )
 from .mask import fill_through_mask, mask_value
 from .raster import fill_polygon, splat_line
-from .trace import ALIVE, WEIGHT, X, Y
+from .trace import ALIVE, REL, STOP_X, WEIGHT, X, Y
 
 # polygons thinner than this, in square pixels, are drawn as lines
 SLIVER = 1e-4
 
 
 @compiled
-def _triangle_flux(data, pupil, triangle):
+def _triangle_flux(data, pupil, a, b, c):
     """Return the flux entering a triangle of the pupil times its mean weight, and its signed area on the sensor."""
-    a, b, c = triangle[0], triangle[1], triangle[2]
-    area = (pupil[b, 0] - pupil[a, 0]) * (pupil[c, 1] - pupil[a, 1])
-    area -= (pupil[b, 1] - pupil[a, 1]) * (pupil[c, 0] - pupil[a, 0])
     spread = (data[b, X] - data[a, X]) * (data[c, Y] - data[a, Y])
     spread -= (data[b, Y] - data[a, Y]) * (data[c, X] - data[a, X])
-    return 0.5 * area * (data[a, WEIGHT] + data[b, WEIGHT] + data[c, WEIGHT]) / 3.0, 0.5 * spread
+    mean = (data[a, WEIGHT] + data[b, WEIGHT] + data[c, WEIGHT]) / 3.0
+    return _pupil_area(pupil, a, b, c) * mean, 0.5 * spread
 
 
 @compiled
@@ -51,12 +50,13 @@ def node_densities(data, pupil, triangles):
     """
     flux, area = np.zeros(pupil.shape[0]), np.zeros(pupil.shape[0])
     for t in range(triangles.shape[0]):
-        if data[triangles[t, 0], ALIVE] * data[triangles[t, 1], ALIVE] * data[triangles[t, 2], ALIVE] == 0.0:
+        a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+        if data[a, ALIVE] * data[b, ALIVE] * data[c, ALIVE] == 0.0:
             continue
-        f, a = _triangle_flux(data, pupil, triangles[t])
+        f, spread = _triangle_flux(data, pupil, a, b, c)
         for m in range(3):
             flux[triangles[t, m]] += f
-            area[triangles[t, m]] += abs(a)
+            area[triangles[t, m]] += abs(spread)
     for k in range(flux.size):
         flux[k] = flux[k] / area[k] if area[k] > 0.0 else 0.0
     return flux
@@ -100,41 +100,50 @@ def draw_bundle(
     polygon, other = np.empty((MAX_VERTICES, columns)), np.empty((MAX_VERTICES, columns))
     values = np.empty(MAX_VERTICES)
     corner = np.empty((3, 3))
+    spots, inside = np.empty((pupil.shape[0], 2)), np.empty(pupil.shape[0], dtype=np.bool_)
     pixel_area = to_pixels[2] * to_pixels[3]
-    for t in range(triangles.shape[0]):
-        triangle = triangles[t]
-        if data[triangle[0], ALIVE] * data[triangle[1], ALIVE] * data[triangle[2], ALIVE] == 0.0:
-            continue
-        flux, area = _triangle_flux(data, pupil, triangle)
-        flux *= gain
-        if flux == 0.0:
-            continue
-        for half in range(2):
-            mirror = 1.0 - 2.0 * half
-            _corners(data, triangle, mirror, axes, to_pixels, densities, corner)
-            if (
-                max(max(corner[0, 0], corner[1, 0]), corner[2, 0]) <= 0.0
-                or min(min(corner[0, 0], corner[1, 0]), corner[2, 0]) >= width
-                or max(max(corner[0, 1], corner[1, 1]), corner[2, 1]) <= 0.0
-                or min(min(corner[0, 1], corner[1, 1]), corner[2, 1]) >= height
-            ):
+    for half in range(2):
+        mirror = 1.0 - 2.0 * half
+        _place_nodes(data, mirror, crossings, blades, axes, to_pixels, spots, inside)
+        for t in range(triangles.shape[0]):
+            a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+            if data[a, ALIVE] * data[b, ALIVE] * data[c, ALIVE] == 0.0:
                 continue
-            count = clip_triangle(data, pupil, triangle, mirror, crossings, blades, axes, polygon, other, values)
+            left, right = min(spots[a, 0], spots[b, 0], spots[c, 0]), max(spots[a, 0], spots[b, 0], spots[c, 0])
+            top, bottom = min(spots[a, 1], spots[b, 1], spots[c, 1]), max(spots[a, 1], spots[b, 1], spots[c, 1])
+            if right <= 0.0 or left >= width or bottom <= 0.0 or top >= height:
+                continue
+            flux, area = _triangle_flux(data, pupil, a, b, c)
+            flux *= gain
+            whole = inside[a] and inside[b] and inside[c]
+            if whole and mask.size == 1:
+                if left >= 0.0 and top >= 0.0 and int(left) == int(right) and int(top) == int(bottom):
+                    for channel in range(3):
+                        plane[channel, int(top), int(left)] += flux * rgb[channel]
+                    continue
+                count = 3
+                for m in range(3):
+                    polygon[m, PX], polygon[m, PY] = spots[triangles[t, m], 0], spots[triangles[t, m], 1]
+            else:
+                count = clip_triangle(data, pupil, triangles[t], mirror, crossings, blades, axes, polygon, other, values)
+                for k in range(count):
+                    x, y = polygon[k, PX], polygon[k, PY]
+                    polygon[k, PX] = to_pixels[0] - to_pixels[2] * (x * axes[0, 0] + y * axes[1, 0])
+                    polygon[k, PY] = to_pixels[1] + to_pixels[3] * (x * axes[0, 1] + y * axes[1, 1])
             if count == 0:
                 continue
-            for k in range(count):
-                x, y = polygon[k, PX], polygon[k, PY]
-                polygon[k, PX] = to_pixels[0] - to_pixels[2] * (x * axes[0, 0] + y * axes[1, 0])
-                polygon[k, PY] = to_pixels[1] + to_pixels[3] * (x * axes[0, 1] + y * axes[1, 1])
             drawn = abs(area) * pixel_area
             if drawn < SLIVER:
-                whole = (pupil[triangle[1], 0] - pupil[triangle[0], 0]) * (pupil[triangle[2], 1] - pupil[triangle[0], 1])
-                whole -= (pupil[triangle[1], 1] - pupil[triangle[0], 1]) * (pupil[triangle[2], 0] - pupil[triangle[0], 0])
-                part = abs(polygon_area(polygon, count, PP, PQ)) / abs(0.5 * whole)
-                for c in range(crossings if mask.size > 1 else 0):
-                    part *= mask_value(mask, mask_half, polygon[0, PSTOP + 2 * c], polygon[0, PSTOP + 2 * c + 1])
+                part = 1.0
+                if not whole or mask.size > 1:
+                    part = abs(polygon_area(polygon, count, PP, PQ)) / _pupil_area(pupil, a, b, c)
+                for m in range(crossings if mask.size > 1 else 0):
+                    part *= mask_value(mask, mask_half, polygon[0, PSTOP + 2 * m], polygon[0, PSTOP + 2 * m + 1])
                 _splat_polygon(polygon, count, flux * part, rgb, plane)
                 continue
+            for m in range(3):
+                k = triangles[t, m]
+                corner[m, 0], corner[m, 1], corner[m, 2] = spots[k, 0], spots[k, 1], densities[k]
             base, gx, gy, dense_low, dense_high = _plane_through(corner, flux / drawn, gain / pixel_area, drawn)
             if mask.size > 1:
                 fill_through_mask(
@@ -142,22 +151,35 @@ def draw_bundle(
                     plane, cover, low, high,
                 )  # fmt: skip
                 continue
-            count = cut_to_rectangle(polygon, count, other, values, float(width), float(height))
-            if count < 3:
-                continue
+            if left < 0.0 or right > width or top < 0.0 or bottom > height:
+                count = cut_to_rectangle(polygon, count, other, values, float(width), float(height))
+                if count < 3:
+                    continue
             fill_polygon(polygon, count, base, gx, gy, dense_low, dense_high, rgb, plane, cover, low, high)
 
 
 @compiled
-def _corners(data, triangle, mirror, axes, to_pixels, densities, corner):
-    """Fill pixel x, y and density of a triangle's nodes."""
-    for m in range(3):
-        k = triangle[m]
+def _place_nodes(data, mirror, crossings, blades, axes, to_pixels, spots, inside):
+    """Fill the nodes' places in pixels, and whether nothing blocks them."""
+    for k in range(data.shape[0]):
         x, y = mirror * data[k, X], data[k, Y]
         # the upright picture is the sensor turned by 180 degrees
-        corner[m, 0] = to_pixels[0] - to_pixels[2] * (x * axes[0, 0] + y * axes[1, 0])
-        corner[m, 1] = to_pixels[1] + to_pixels[3] * (x * axes[0, 1] + y * axes[1, 1])
-        corner[m, 2] = densities[k]
+        spots[k, 0] = to_pixels[0] - to_pixels[2] * (x * axes[0, 0] + y * axes[1, 0])
+        spots[k, 1] = to_pixels[1] + to_pixels[3] * (x * axes[0, 1] + y * axes[1, 1])
+        clear = data[k, REL] <= 1.0
+        for c in range(crossings):
+            u, v = mirror * data[k, STOP_X + 2 * c], data[k, STOP_X + 2 * c + 1]
+            up_x, up_y = u * axes[0, 0] + v * axes[1, 0], u * axes[0, 1] + v * axes[1, 1]
+            for b in range(blades.shape[0]):
+                clear = clear and blade_value(blades, b, up_x, up_y) <= 0.0
+        inside[k] = clear
+
+
+@compiled
+def _pupil_area(pupil, a, b, c):
+    """Area of a triangle of the pupil; its nodes run counter-clockwise."""
+    area = (pupil[b, 0] - pupil[a, 0]) * (pupil[c, 1] - pupil[a, 1])
+    return 0.5 * (area - (pupil[b, 1] - pupil[a, 1]) * (pupil[c, 0] - pupil[a, 0]))
 
 
 @compiled

@@ -34,10 +34,10 @@ def _cut(polygon, count, values, other):
 
 
 @compiled
-def blade_value(blade, u, v):
+def blade_value(blades, b, u, v):
     """Evaluate a blade's edge: <= 0 on the open side, its gradient 1 on the border (`optics.iris.blade_edges`)."""
-    qx, qy = u - blade[2] * blade[0], v - blade[2] * blade[1]
-    return blade[0] * qx + blade[1] * qy + 0.5 * blade[3] * (qx * qx + qy * qy)
+    qx, qy = u - blades[b, 2] * blades[b, 0], v - blades[b, 2] * blades[b, 1]
+    return blades[b, 0] * qx + blades[b, 1] * qy + 0.5 * blades[b, 3] * (qx * qx + qy * qy)
 
 
 @compiled
@@ -47,7 +47,7 @@ def cut_by_blades(polygon, count, crossings, blades, other, values):
         for b in range(blades.shape[0]):
             high = -np.inf
             for m in range(count):
-                values[m] = blade_value(blades[b], polygon[m, PSTOP + 2 * c], polygon[m, PSTOP + 2 * c + 1])
+                values[m] = blade_value(blades, b, polygon[m, PSTOP + 2 * c], polygon[m, PSTOP + 2 * c + 1])
                 high = max(high, values[m])
             if high > 0.0:
                 count = _cut(polygon, count, values, other)

@@ -96,26 +96,25 @@ def fill_polygon(polygon, count, density, gx, gy, density_low, density_high, rgb
     sign = 1.0 if twice_area < 0.0 else -1.0
     for r in range(last_row - first_row + 2):
         row = first_row + r
-        start = min(low[0, r], low[1, r])
-        end = max(high[0, r], high[1, r])
+        start, end = min(low[0, r], low[1, r]), max(high[0, r], high[1, r])
         if end < 0:
             continue
-        first_end = min(high[0, r], high[1, r])
-        second_start = max(low[0, r], low[1, r])
         if row > last_row or high[0, r] < 0 or high[1, r] < 0:
             for c in range(start, end + 1):
                 cover[r, c] = 0.0
             continue
         base = density + gy * (row + 0.5)
-        if second_start <= first_end:
-            first_end, second_start = end, end + 1
-        total = _sweep(cover, r, start, first_end, 0.0, sign, base, gx, density_low, density_high, rgb, plane, row)
-        if second_start <= end:
-            even = np.float32((base + gx * (first_end + 1.5)) * total * sign)
+        # between the pixels that the left and the right edges touch, coverage does not change
+        pause, resume = min(high[0, r], high[1, r]), max(low[0, r], low[1, r])
+        if resume <= pause + 4:
+            pause, resume = end, end + 1
+        total = _sweep(cover, r, start, pause, 0.0, sign, base, gx, density_low, density_high, rgb, plane, row)
+        if resume <= end:
+            even = np.float32((base + gx * (pause + 1.5)) * total * sign)
             slope = np.float32(gx * total * sign)
             for channel in range(3):
-                _fill_run(plane[channel, row, first_end + 1 : second_start], np.float32(rgb[channel]), even, slope)
-            _sweep(cover, r, second_start, end, total, sign, base, gx, density_low, density_high, rgb, plane, row)
+                _fill_run(plane[channel, row, pause + 1 : resume], np.float32(rgb[channel]), even, slope)
+            _sweep(cover, r, resume, end, total, sign, base, gx, density_low, density_high, rgb, plane, row)
 
 
 @compiled

@@ -91,37 +91,56 @@ def _window(r, inner, outer):
     return t * t * t * (t * (6.0 * t - 15.0) + 10.0)
 
 
+@inlined
+def _turned(cumulative, turns):
+    """Integral of the angular profile up to an angle in half turns, which may lie outside one period."""
+    count = cumulative.shape[0] - 1
+    at = (turns - math.floor(turns)) * count
+    k = min(int(at), count - 1)
+    inside = cumulative[k] + (at - k) * (cumulative[k + 1] - cumulative[k])
+    return math.floor(turns) * cumulative[count] + inside
+
+
 @compiled
 def blend_fan_wings(
-    x: Floats, y: Floats, angular: Floats, colour: Floats, inner: float, outer: float, out: Picture
+    x: Floats,
+    y: Floats,
+    pixel: Floats,
+    cumulative: Floats,
+    colour: Floats,
+    inner: float,
+    outer: float,
+    out: Picture,
 ) -> None:
-    """Fade the core out and the wings g(phi) colour / r^3 in.
+    """Fade the core out and the wings g(phi) colour / r^3 in; g is averaged over the angle that a pixel subtends.
 
     Parameters
     ----------
     x, y : (W,), (H,) float64
         Pixel centres.
-    angular : (A,) float64
-        g over [0, pi), periodic; one entry for a round opening.
+    pixel : (2,) float64
+        Width and height of a pixel.
+    cumulative : (A + 1,) float64
+        Integral of g d(phi / pi) from 0 to pi, which is one period; g is a histogram.
     colour : (C,) float64
     inner, outer : float
         Radii between which the core gives way to the wings.
     out : (H, W, C) float
         Irradiance of the core on entry, of both on return.
     """
-    count = angular.shape[0]
+    count = cumulative.shape[0] - 1
     for i in range(y.shape[0]):
         for j in range(x.shape[0]):
             r = math.sqrt(x[j] * x[j] + y[i] * y[i])
             w = _window(r, inner, outer)
             if w <= 0.0:
                 continue
-            g = angular[0]
+            g = cumulative[count]
             if count > 1:
-                at = (math.atan2(y[i], x[j]) / math.pi + 2.0) * count
-                k = int(at)
-                f = at - k
-                g = (1.0 - f) * angular[k % count] + f * angular[(k + 1) % count]
+                a, b = 0.5 * pixel[0] * y[i] / r, 0.5 * pixel[1] * x[j] / r
+                spread = min(math.sqrt(a * a + b * b) / (r * math.pi), 0.5)
+                turns = math.atan2(y[i], x[j]) / math.pi
+                g = (_turned(cumulative, turns + spread) - _turned(cumulative, turns - spread)) / (2.0 * spread)
             wing = w * g / (r * r * r)
             for c in range(out.shape[2]):
                 out[i, j, c] = (1.0 - w) * out[i, j, c] + wing * colour[c]

@@ -44,7 +44,7 @@ class FanWings:
     Attributes
     ----------
     angular : ndarray, shape (A,)
-        g over [0, pi), periodic.
+        g, a histogram of equal bins over [0, pi), periodic.
     """
 
     angular: Floats
@@ -144,11 +144,13 @@ def pupil_pattern(iris: Iris, mask: NDArray[np.floating] | None = None) -> Patte
     -----
     Hullin et al. 2011, section 3.3, equation 2. The border of blades is softened by a triangle two samples wide along
     its normal, and the light at a direction comes from the borders whose normal it is: dividing by sinc^4 of |s|
-    undoes the filter. (One sample's box would let borders that run along the grid alias by 10 %.) Beyond the core, an element ds of the border with normal phi sends ds / (4 pi^2 A s^2) ds' along
-    phi and phi + pi (stationary phase, fringes averaged). A circle's wings are the mean Airy tail 1 / (2 pi^3 s^3), so
-    1 / (pi^2 s) of the light falls outside s. A mask's wings are g(phi) / s^3 with the g that its own pattern has
-    between half its reach and the whole of it: the law of any sharp border, measured direction by direction. The reach
-    of a mask is an eighth of its pixels a side at most.
+    undoes the filter. (One sample's box would let borders that run along the grid alias by 10 %.)
+
+    Beyond the core, an element ds of the border with normal phi sends ds / (4 pi^2 A s^2) ds' along phi and phi + pi
+    (stationary phase, fringes averaged). A circle's wings are the mean Airy tail 1 / (2 pi^3 s^3), so 1 / (pi^2 s) of
+    the light falls outside s. A mask's wings are g(phi) / s^3 with the g that its own pattern has between a quarter of its
+    reach and the whole of it: the law of any sharp border, measured direction by direction. The reach of a mask is an
+    eighth of its pixels a side at most.
     """
     if mask is None:
         return _pattern(iris, None)
@@ -248,17 +250,25 @@ def _corner(offset: float, curvature: float, blades: int) -> tuple[float, float]
 
 
 def _measured_fans(P: Floats, s: Floats, reach: float) -> FanWings:
-    """g(phi) from the flux of a pattern between half its reach and the whole: flux = g dphi (1/s1 - 1/s2)."""
-    s1, s2 = 0.5 * reach, reach
+    """g(phi) from the flux of a pattern between a quarter of its reach and the whole.
+
+    The window in s is smooth, so that the fringes of narrow slits and of opposite borders average out.
+    """
     radius = np.hypot(s, s[:, None])
-    ring = (radius > s1) & (radius <= s2) & (s[:, None] >= 0.0)
-    y, x = np.nonzero(ring)
+    y, x = np.nonzero((radius > 0.25 * reach) & (radius < reach) & (s[:, None] >= 0.0))
+    flux = P[y, x] * _ring_window(radius[y, x] / reach) / WINDOW**2
     at = np.arctan2(s[y], s[x]) / math.pi * FAN_BINS
-    k = np.floor(at).astype(np.intp)
-    f = at - k
-    flux = P[ring] / WINDOW**2
-    bins = np.bincount(k % FAN_BINS, (1.0 - f) * flux, FAN_BINS) + np.bincount((k + 1) % FAN_BINS, f * flux, FAN_BINS)
-    return FanWings(bins / (math.pi / FAN_BINS) / (1.0 / s1 - 1.0 / s2))
+    bins = np.bincount(np.floor(at).astype(np.intp) % FAN_BINS, flux, FAN_BINS)
+    # A fan of g = 1 sends dphi ds / s^2 through the window.
+    t = 0.25 + 0.75 * (np.arange(1000) + 0.5) / 1000
+    one = float(np.mean(_ring_window(t) / t**2)) * 0.75 / reach
+    return FanWings(bins / (math.pi / FAN_BINS) / one)
+
+
+def _ring_window(t: Floats) -> Floats:
+    """0 at a quarter and at 1, even in the logarithm between."""
+    window: Floats = np.sin(0.5 * math.pi * np.log2(4.0 * t)) ** 2
+    return window
 
 
 def spike_profile(

@@ -130,7 +130,8 @@ class _Painter:
         wings = self.pattern.wings
         if isinstance(wings, FanWings):
             colour = 2.0 * self.f_number * (self.wave * 1e-6) @ self.weights
-            blend_fan_wings(x, y, wings.angular, colour, self.inner, self.outer, out)
+            cumulative = np.concatenate([[0.0], np.cumsum(wings.angular) / len(wings.angular)])
+            blend_fan_wings(x, y, np.array(pixel_mm), cumulative, colour, self.inner, self.outer, out)
             return
         profile = spike_profile(wings, self.wave, self.weights, self.f_number, pixel_mm)
         blend_blade_wings(
