@@ -121,7 +121,7 @@ def blend_fan_wings(
     pixel : (2,) float64
         Width and height of a pixel.
     cumulative : (A + 1,) float64
-        Integral of g d(phi / pi) from 0 to pi, which is one period; g is a histogram.
+        Integral of g d(phi / pi) over one period, pi, from half a bin below 0; g is a histogram.
     colour : (C,) float64
     inner, outer : float
         Radii between which the core gives way to the wings.
@@ -139,7 +139,7 @@ def blend_fan_wings(
             if count > 1:
                 a, b = 0.5 * pixel[0] * y[i] / r, 0.5 * pixel[1] * x[j] / r
                 spread = min(math.sqrt(a * a + b * b) / (r * math.pi), 0.5)
-                turns = math.atan2(y[i], x[j]) / math.pi
+                turns = math.atan2(y[i], x[j]) / math.pi + 0.5 / count
                 g = (_turned(cumulative, turns + spread) - _turned(cumulative, turns - spread)) / (2.0 * spread)
             wing = w * g / (r * r * r)
             for c in range(out.shape[2]):

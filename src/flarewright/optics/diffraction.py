@@ -44,7 +44,7 @@ class FanWings:
     Attributes
     ----------
     angular : ndarray, shape (A,)
-        g, a histogram of equal bins over [0, pi), periodic.
+        g, a histogram of equal bins centred at 0, pi / A, ..., periodic in pi.
     """
 
     angular: Floats
@@ -148,9 +148,9 @@ def pupil_pattern(iris: Iris, mask: NDArray[np.floating] | None = None) -> Patte
 
     Beyond the core, an element ds of the border with normal phi sends ds / (4 pi^2 A s^2) ds' along phi and phi + pi
     (stationary phase, fringes averaged). A circle's wings are the mean Airy tail 1 / (2 pi^3 s^3), so 1 / (pi^2 s) of
-    the light falls outside s. A mask's wings are g(phi) / s^3 with the g that its own pattern has between a quarter of its
-    reach and the whole of it: the law of any sharp border, measured direction by direction. The reach of a mask is an
-    eighth of its pixels a side at most.
+    the light falls outside s. A mask's wings are g(phi) / s^3 with the g that its own pattern has between a quarter of
+    its reach and the whole of it: the law of any sharp border, measured direction by direction. The reach of a mask is
+    an eighth of its pixels a side at most.
     """
     if mask is None:
         return _pattern(iris, None)
@@ -258,7 +258,7 @@ def _measured_fans(P: Floats, s: Floats, reach: float) -> FanWings:
     y, x = np.nonzero((radius > 0.25 * reach) & (radius < reach) & (s[:, None] >= 0.0))
     flux = P[y, x] * _ring_window(radius[y, x] / reach) / WINDOW**2
     at = np.arctan2(s[y], s[x]) / math.pi * FAN_BINS
-    bins = np.bincount(np.floor(at).astype(np.intp) % FAN_BINS, flux, FAN_BINS)
+    bins = np.bincount(np.floor(at + 0.5).astype(np.intp) % FAN_BINS, flux, FAN_BINS)
     # A fan of g = 1 sends dphi ds / s^2 through the window.
     t = 0.25 + 0.75 * (np.arange(1000) + 0.5) / 1000
     one = float(np.mean(_ring_window(t) / t**2)) * 0.75 / reach
