@@ -5,8 +5,8 @@ angles, bare and coated.
 
 What 2 % of a centroid means: of the ghost's own rms radius. Of |centroid| it would be too lenient for a small bright
 ghost far from the axis (at 15 mm it would be 0.3 mm, more than the size of a caustic) and meaningless for a large one
-on the axis. The oracle's own doubt (4 standard errors) is granted on top, and is kept below the tolerance or the test
-fails: a bad oracle must not let bad numbers through.
+on the axis. Where the oracle's own doubt (4 standard errors) leaves the verdict open it counts more rays; what is left
+of the doubt is granted on top.
 
 Centroid and size do not exist for every ghost on an unbounded plane (`Estimate.size_exists`); those are judged by their
 throughput alone.
@@ -14,80 +14,99 @@ throughput alone.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
-from oracle import Estimate, glass_air_films, table
+from oracle import Estimate, System, estimate, from_lens, glass_air_films, table
 from prescriptions import CANON, FIVE, HELIAR, SUPER_ANGULON, lens, system
 
-from flarewright.model import AsLens, Everywhere, QuarterWave
-
-ghosts = pytest.importorskip("flarewright.optics.ghosts", exc_type=ImportError)
+from flarewright.model import Bare, Everywhere, Lens, QuarterWave
+from flarewright.optics import ghosts
+from flarewright.render.prepare import load_lens
 
 FLUX, PLACE, SIZE, FLOOR = 0.01, 0.02, 0.02, 1e-4
 ANGLES = [(3.0, 0.0), (8.0, 5.0), (15.0, 8.0)]
 QUARTER_WAVE = QuarterWave(center_wavelength_nm=500.0)
 
 
-def complaints(row, e: Estimate) -> list[str]:
-    """Say what is wrong with one row of the program's table."""
-    out = []
-
-    def judge(what: str, error: float, sigma: float, tolerance: float) -> None:
-        if 4 * sigma > tolerance:
-            out.append(f"{e.path}: the oracle doubts its {what}: 4 x {sigma:.2e} of {tolerance}")
-        elif not abs(error) < tolerance + 4 * sigma:
-            out.append(f"{e.path}: {what} is off by {error:+.4f} (oracle +- {sigma:.4f})")
-
-    judge("throughput", row.throughput_mm2 / e.throughput_mm2 - 1, e.relative_se, FLUX)
+def errors(row, e: Estimate) -> list[tuple[str, float, float, float]]:
+    """Return (what, error, the oracle's standard error, tolerance), all relative."""
+    out = [("throughput", row.throughput_mm2 / e.throughput_mm2 - 1, e.relative_se, FLUX)]
     if e.size_exists:
         away = float(np.hypot(*(np.array(row.centroid_mm) - e.centroid_mm)))
-        judge("centroid", away / e.rms_radius_mm, float(np.hypot(*e.centroid_se)) / e.rms_radius_mm, PLACE)
-        judge("size", row.rms_radius_mm / e.rms_radius_mm - 1, e.rms_radius_se / e.rms_radius_mm, SIZE)
+        out.append(("centroid", away / e.rms_radius_mm, float(np.hypot(*e.centroid_se)) / e.rms_radius_mm, PLACE))
+        out.append(("size", row.rms_radius_mm / e.rms_radius_mm - 1, e.rms_radius_se / e.rms_radius_mm, SIZE))
     return out
 
 
-def compare(prescription, f_number, field, *, paths=None, samples=4000, replicas=6) -> None:
+def complaints(row, e: Estimate, ask_again: Callable[[int], Estimate]) -> list[str]:
+    """Say what is wrong with one row of the program's table.
+
+    The tolerance is on the true error, so where the standard error leaves that open the oracle counts more rays.
+    """
+    for samples in (16_000, 64_000):
+        if all(abs(error) + 4 * sigma < limit for _, error, sigma, limit in errors(row, e)):
+            return []
+        e = ask_again(samples)
+    out = []
+    for what, error, sigma, limit in errors(row, e):
+        if 4 * sigma > limit:
+            out.append(f"{e.path}: the oracle doubts its {what}: 4 x {sigma:.2e} of {limit}")
+        elif abs(error) > limit + 4 * sigma:
+            out.append(f"{e.path}: {what} is off by {error:+.4f} (oracle +- {sigma:.4f})")
+    return out
+
+
+def compare(prescription, f_number, field, **how) -> None:
+    compare_systems(system(prescription, f_number), lens(prescription, f_number), field, **how)
+
+
+def compare_systems(s: System, a_lens: Lens, field, *, paths=None, samples=4000, replicas=6) -> None:
     """Trace bare and coated in one go, then judge both tables."""
-    s, a_lens = system(prescription, f_number), lens(prescription, f_number)
     film_sets = [[()] * len(s.rows), glass_air_films(s, QUARTER_WAVE)]
     truth = table(s, field, film_sets=film_sets, paths=paths, floor=FLOOR, samples=samples, replicas=replicas)
-    for estimates, choice in zip(truth, (AsLens(), Everywhere(coating=QUARTER_WAVE)), strict=True):
+    wrong = []
+    for k, choice in enumerate((Everywhere(coating=Bare()), Everywhere(coating=QUARTER_WAVE))):
         ours = ghosts.ghost_table(a_lens, field, coating=choice)
         assert ours.sensor_distance == pytest.approx(s.sensor_distance, abs=1e-9)
         assert ours.stop_semi_diameter == pytest.approx(s.rows[s.stop].semi_diameter, abs=1e-9)
         rows = {(g.first_reflection, g.second_reflection): g for g in ours.ghosts} | {None: ours.direct}
-        wrong = [c for p, e in estimates.items() for c in complaints(rows[p], e)]
-        assert not wrong, f"{choice.kind}, light at {field}:\n" + "\n".join(wrong)
+        for path, e in truth[k].items():
+
+            def ask_again(n: int, path=path, films=film_sets[k]) -> Estimate:
+                return estimate(s, path, field, film_sets=[films], samples=n, replicas=8, seed=n)[0]
+
+            for complaint in complaints(rows[path], e, ask_again):
+                wrong.append(f"{choice.coating.kind}, light at {field}, flux {e.throughput_mm2:.2e} mm2: {complaint}")
         if paths is None:  # nothing bright that the oracle knows nothing of
-            best = max(e.throughput_mm2 for p, e in estimates.items() if p is not None)
-            unknown = [
-                p for p, g in rows.items() if p not in estimates and g.throughput_mm2 > (1 + FLUX) * FLOOR * best
-            ]
-            assert not unknown
+            best = max(e.throughput_mm2 for p, e in truth[k].items() if p is not None)
+            bright = {p for p, g in rows.items() if g.throughput_mm2 > (1 + FLUX) * FLOOR * best}
+            wrong += [f"{choice.coating.kind}: the oracle knows nothing of {p}" for p in bright - set(truth[k])]
+    assert not wrong, "\n".join(wrong)
 
 
 def test_heliar():
-    compare(HELIAR, 4.5, (8.0, 5.0), samples=3000)
+    compare(HELIAR, 4.5, (8.0, 5.0), samples=2000)
 
 
 def test_canon_some_paths():
-    """Twelve of 351: inside the front group, across the stop, behind it."""
-    some = [
-        None,
-        (1, 0),
-        (3, 0),
-        (5, 4),
-        (7, 6),
-        (9, 1),
-        (13, 8),
-        (14, 2),
-        (17, 3),
-        (21, 16),
-        (25, 11),
-        (27, 23),
-        (27, 0),
-    ]
-    compare(CANON, 2.8, (8.0, 5.0), paths=some, samples=3000)
+    """Seven of 351: inside the front group, across the stop, behind it."""
+    some = [None, (1, 0), (5, 4), (9, 1), (17, 3), (25, 11), (27, 23)]
+    compare(CANON, 2.8, (8.0, 5.0), paths=some, samples=2000)
+
+
+def test_a_shipped_lens():
+    """The file, its loader and the table together, against the oracle's reading of the same frozen data."""
+    a_lens = load_lens("triplet-pestrecov")
+    compare_systems(from_lens(a_lens), a_lens, (6.0, 4.0), samples=2000)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["double-gauss-tronnier", "flektogon-35", "nikkor-180-ed", "takumar-50-f1.4"])
+def test_more_shipped_lenses(name):
+    a_lens = load_lens(name)
+    compare_systems(from_lens(a_lens), a_lens, (6.0, 4.0), samples=2000)
 
 
 @pytest.mark.slow
@@ -95,7 +114,8 @@ def test_canon_some_paths():
 @pytest.mark.parametrize("name", FIVE)
 def test_five_lenses(name, field):
     prescription, f_number = FIVE[name]
-    compare(prescription, f_number, field)
+    few = {"samples": 2000, "replicas": 4} if name == "canon" else {}
+    compare(prescription, f_number, field, **few)
 
 
 @pytest.mark.slow
@@ -107,3 +127,23 @@ def test_stopped_down(f_number):
 @pytest.mark.slow
 def test_a_wide_angle_at_forty_degrees():
     compare(SUPER_ANGULON, 4.0, (35.0, 20.0))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("prescription", "f_number", "field", "path"),
+    [
+        (SUPER_ANGULON, 4.0, (35.0, 20.0), (11, 0)),
+        (CANON, 2.8, (3.0, 0.0), (22, 0)),
+        (CANON, 2.8, (3.0, 0.0), (22, 2)),
+        (CANON, 2.8, (3.0, 0.0), (23, 1)),
+        (CANON, 2.8, (3.0, 0.0), (25, 0)),
+        (CANON, 2.8, (3.0, 0.0), (26, 0)),
+        (CANON, 2.8, (3.0, 0.0), (26, 1)),
+        (CANON, 2.8, (8.0, 5.0), (8, 1)),
+        (CANON, 2.8, (8.0, 5.0), (11, 2)),
+    ],
+)
+def test_spots_smaller_than_a_cell_of_the_pre_pass(prescription, f_number, field, path):
+    """Ghosts that enter through a spot of 0.6 mm; coated they are above 1e-4 of the strongest."""
+    compare(prescription, f_number, field, paths=[path], samples=2000)

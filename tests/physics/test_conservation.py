@@ -7,8 +7,8 @@ import pytest
 from prescriptions import CANON, HELIAR, TESSAR, TRIPLET, lens
 
 from flarewright.model import Everywhere, Lens, QuarterWave, Stop
+from flarewright.optics import ghosts
 
-ghosts = pytest.importorskip("flarewright.optics.ghosts", exc_type=ImportError)
 FIELD = (8.0, 5.0)
 
 
