@@ -129,6 +129,7 @@ def blend_fan_wings(
         Irradiance of the core on entry, of both on return.
     """
     count = cumulative.shape[0] - 1
+    area = pixel[0] * pixel[0] + pixel[1] * pixel[1]
     for i in range(y.shape[0]):
         for j in range(x.shape[0]):
             r = math.sqrt(x[j] * x[j] + y[i] * y[i])
@@ -141,7 +142,8 @@ def blend_fan_wings(
                 spread = min(math.sqrt(a * a + b * b) / (r * math.pi), 0.5)
                 turns = math.atan2(y[i], x[j]) / math.pi + 0.5 / count
                 g = (_turned(cumulative, turns + spread) - _turned(cumulative, turns - spread)) / (2.0 * spread)
-            wing = w * g / (r * r * r)
+            # The last factor turns the value at the centre into the mean over the pixel, to second order.
+            wing = w * g / (r * r * r) * (1.0 + 0.1875 * area / (r * r))
             for c in range(out.shape[2]):
                 out[i, j, c] = (1.0 - w) * out[i, j, c] + wing * colour[c]
 
@@ -170,6 +172,7 @@ def _cumulative(table, slope, c, v, per_step, half_total, tail):
 def blend_blade_wings(
     x: Floats,
     y: Floats,
+    pixel: Floats,
     angle: Floats,
     half_fan: float,
     tables: Floats,
@@ -188,6 +191,8 @@ def blend_blade_wings(
     ----------
     x, y : (W,), (H,) float64
         Pixel centres.
+    pixel : (2,) float64
+        Width and height of a pixel.
     angle : (B,) float64
         Direction of each blade's normal; a blade sends light along it both ways.
     half_fan : float
@@ -214,6 +219,7 @@ def blend_blade_wings(
     for b in range(blades):
         normal[b, 0], normal[b, 1] = math.cos(angle[b]), math.sin(angle[b])
     total = np.empty(channels)
+    area = pixel[0] * pixel[0] + pixel[1] * pixel[1]
     for i in range(y.shape[0]):
         for j in range(x.shape[0]):
             r = math.sqrt(x[j] * x[j] + y[i] * y[i])
@@ -246,5 +252,7 @@ def blend_blade_wings(
                         high = _cumulative(tables[b], slopes[b], c, v + half, per_step, half_total[c], tail[c])
                         low = _cumulative(tables[b], slopes[b], c, v - half, per_step, half_total[c], tail[c])
                         total[c] += (high - low) / (2.0 * half)
+            # The mean of 1 / r^2 along a spike over the pixel, to second order.
+            share = w / (r * r) * (1.0 + 0.125 * area / (r * r))
             for c in range(channels):
-                out[i, j, c] = (1.0 - w) * out[i, j, c] + w * (total[c] + far * tail[c]) / (r * r)
+                out[i, j, c] = (1.0 - w) * out[i, j, c] + share * (total[c] + far * tail[c])

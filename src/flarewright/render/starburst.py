@@ -137,6 +137,7 @@ class _Painter:
         blend_blade_wings(
             x,
             y,
+            np.array(pixel_mm),
             wings.angle,
             wings.half_fan,
             profile.cumulative,
