@@ -6,11 +6,7 @@ The command line prints it and ends with exit code 2; a library user catches `Fl
 
 
 class FlarewrightError(Exception):
-    """A mistake in what a person gave; the message says what, where, and the remedy."""
-
-
-class LensError(FlarewrightError):
-    """A lens file that cannot be read or is no camera lens.
+    """A mistake in what a person gave; the message says what, where, and the remedy.
 
     Parameters
     ----------
@@ -23,6 +19,10 @@ class LensError(FlarewrightError):
     def __init__(self, message: str, problems: tuple[str, ...] = ()) -> None:
         super().__init__(message)
         self.problems = problems
+
+
+class LensError(FlarewrightError):
+    """A lens file that cannot be read or is no camera lens."""
 
 
 class GlassError(FlarewrightError):

@@ -9,7 +9,10 @@ import numpy as np
 from ._jit import compiled
 from .trace import ALIVE, REL, STOP_X, WEIGHT, X, Y, trace_nodes
 
-UNKNOWN, LEAF, SPLIT, EMPTY = 0, 1, 2, 3
+# a FLAT leaf is good enough without its edges' middles, a LEAF needs them
+UNKNOWN, LEAF, SPLIT, EMPTY, FLAT = 0, 1, 2, 3, 4
+# cells that the rim crosses are halved at least this often
+RIM_LEVEL = 2
 
 
 @compiled
@@ -145,7 +148,10 @@ def _weigh(data, nodes, share, view_radius, sums):
 
 @compiled
 def _judge(data, nodes, crossings, iris_radius, level, max_level, h, tolerance, flux_tolerance, scale, view_radius):
-    """Decide whether a cell of 3 x 3 nodes is EMPTY, a LEAF or to be SPLIT."""
+    """Decide whether a cell of 3 x 3 nodes is EMPTY, to be SPLIT, a LEAF, or a FLAT one.
+
+    The fan of a LEAF uses the middles of its edges, which leaves a quarter of the measured error.
+    """
     if _rejected(data, nodes, crossings, iris_radius, 0.25):
         return EMPTY
     if level >= max_level:
@@ -160,30 +166,33 @@ def _judge(data, nodes, crossings, iris_radius, level, max_level, h, tolerance, 
     out_x = max(x_low, 0.0)
     out_y = max(max(y_low, -y_high), 0.0)
     if out_x * out_x + out_y * out_y > view_radius * view_radius:
-        return LEAF
+        return FLAT
     extent = max(x_high - x_low, y_high - y_low) * scale
+    error = 0.0
     # the rim of the bundle decides its flux, so it is resolved however small the ghost is
     for limit in range(1 + crossings):
         low, high, bend = _limit_range(data, nodes, limit, iris_radius)
         if low < 1.0 < high:
-            part = bend / (high - low)
-            if part * h > flux_tolerance or part * extent * 0.25 > tolerance:
+            # a rim met by several surfaces has corners that a coarse cell cannot tell
+            if level < RIM_LEVEL:
                 return SPLIT
-    if extent < 1.0:
-        return LEAF
-    bend_x, bend_y = _bend(data, nodes, X), _bend(data, nodes, Y)
-    if np.sqrt(bend_x * bend_x + bend_y * bend_y) * scale * 0.25 > tolerance:
+            part = bend / (high - low)
+            error = max(error, part * h / flux_tolerance, part * extent / tolerance)
+    if extent >= 1.0:
+        bend_x, bend_y = _bend(data, nodes, X), _bend(data, nodes, Y)
+        error = max(error, np.sqrt(bend_x * bend_x + bend_y * bend_y) * scale / tolerance)
+    if extent > 2.0:
+        area_low, area_high = _fan_areas(data, nodes)
+        if area_low * area_high <= 0.0:
+            return SPLIT
+        if extent > 5.0:
+            ratio = max(abs(area_low), abs(area_high)) / max(min(abs(area_low), abs(area_high)), 1e-300)
+            error = max(error, 4.0 * (ratio - 1.0))
+    if extent > 5.0 or level <= RIM_LEVEL:
+        error = max(error, _bend(data, nodes, WEIGHT) / (0.005 * abs(data[nodes[4], WEIGHT]) + 1e-300))
+    if error > 4.0:
         return SPLIT
-    area_low, area_high = _fan_areas(data, nodes)
-    if area_low * area_high <= 0.0 and extent > 2.0:
-        return SPLIT
-    ratio = max(abs(area_low), abs(area_high)) / max(min(abs(area_low), abs(area_high)), 1e-300)
-    if ratio > 2.0 and extent > 6.0:
-        return SPLIT
-    weight = abs(data[nodes[4], WEIGHT]) + 1e-300
-    if _bend(data, nodes, WEIGHT) > 0.02 * weight and extent > 4.0:
-        return SPLIT
-    return LEAF
+    return LEAF if error > 1.0 else FLAT
 
 
 @compiled
@@ -258,6 +267,8 @@ def build_mesh(
     -------
     pupil : ndarray, shape (N, 2)
         Nodes, mm.
+    data : ndarray, shape (V, N, 5 + 2 C)
+        Traced nodes (`kernels.trace`).
     triangles : ndarray, shape (T, 3), int64
         Counter-clockwise in the pupil. Neighbouring cells differ by one halving at most and share all their nodes.
     """
@@ -300,8 +311,8 @@ def build_mesh(
                 if found == SPLIT:
                     verdict = SPLIT
                     break
-                if found == LEAF:
-                    verdict = LEAF
+                if found == LEAF or (found == FLAT and verdict == EMPTY):
+                    verdict = found
             state[offsets[level] + cell] = verdict
             if verdict == SPLIT:
                 for m in range(4):
@@ -311,10 +322,16 @@ def build_mesh(
         if n_children == 0:
             break
     _balance(state, offsets, nx, ny, max_level)
+    first = n_nodes
     for level in range(1, max_level + 1):
         forced = _leaves(state, offsets, level)
         pupil, data, n_nodes = _add_nodes(lattice, pupil, data, n_nodes, forced, level, max_level, ny, da, db, box)
-    return pupil[:n_nodes].copy(), _triangulate(state, offsets, lattice, nx, ny, max_level)
+    for v in range(n_gap.shape[0]):
+        trace_nodes(
+            rows, actions, curvature, conic, z_vertex, inv_semi, n_gap[v], reflectance[v], sensor_z, tilt,
+            pupil[first:n_nodes, 0].copy(), pupil[first:n_nodes, 1].copy(), data[v, first:n_nodes],
+        )  # fmt: skip
+    return pupil[:n_nodes].copy(), data[:, :n_nodes].copy(), _triangulate(state, offsets, lattice, nx, ny, max_level)
 
 
 @compiled
@@ -355,12 +372,12 @@ def _leaves(state, offsets, level):
     part = state[offsets[level] : offsets[level + 1]]
     count = 0
     for k in range(part.size):
-        if part[k] == LEAF:
+        if part[k] == LEAF or part[k] == FLAT:
             count += 1
     found = np.empty(count, dtype=np.int64)
     count = 0
     for k in range(part.size):
-        if part[k] == LEAF:
+        if part[k] == LEAF or part[k] == FLAT:
             found[count] = k
             count += 1
     return found
@@ -391,23 +408,24 @@ def _ensure(state, offsets, ny, level, a, b):
         up -= 1
     if up < 0 or up == level:
         return
-    if state[offsets[up] + (a >> (level - up)) * (ny << up) + (b >> (level - up))] != LEAF:
+    kind = state[offsets[up] + (a >> (level - up)) * (ny << up) + (b >> (level - up))]
+    if kind != LEAF and kind != FLAT:
         return
     for mid in range(up, level):
         i, j = a >> (level - mid), b >> (level - mid)
         state[offsets[mid] + i * (ny << mid) + j] = SPLIT
         for m in range(4):
             child = (2 * i + m // 2) * (ny << (mid + 1)) + 2 * j + m % 2
-            state[offsets[mid + 1] + child] = LEAF
+            state[offsets[mid + 1] + child] = kind
 
 
 @compiled
 def _triangulate(state, offsets, lattice, nx, ny, max_level):
-    """Fan every leaf around its centre; an edge is halved unless the neighbour across it is coarser."""
+    """Fan every leaf around its centre; an edge is halved where one side asks for it and none is coarser."""
     total = 0
     for level in range(max_level + 1):
         for k in range(offsets[level], offsets[level + 1]):
-            if state[k] == LEAF:
+            if state[k] == LEAF or state[k] == FLAT:
                 total += 8
     triangles = np.empty((total, 3), dtype=np.int64)
     count = 0
@@ -417,15 +435,18 @@ def _triangulate(state, offsets, lattice, nx, ny, max_level):
     for level in range(max_level + 1):
         width, height = nx << level, ny << level
         for cell in range(width * height):
-            if state[offsets[level] + cell] != LEAF:
+            kind = state[offsets[level] + cell]
+            if kind != LEAF and kind != FLAT:
                 continue
             a, b = cell // height, cell % height
             _cell_nodes(lattice, a, b, level, max_level, nodes)
             for edge in edges:
                 i, j = a + edge[3], b + edge[4]
-                halved = True
+                halved = kind == LEAF
                 if 0 <= i < width and 0 <= j < height:
-                    halved = state[offsets[level] + i * height + j] != UNKNOWN
+                    beyond = state[offsets[level] + i * height + j]
+                    # both sides of an edge come to the same answer
+                    halved = beyond != UNKNOWN if kind == LEAF else (beyond == LEAF or beyond == SPLIT)
                 if halved:
                     triangles[count, 0], triangles[count, 1], triangles[count, 2] = nodes[4], nodes[edge[0]], nodes[edge[1]]
                     count += 1

@@ -73,11 +73,14 @@ class Bundle:
     pupil : ndarray, shape (N, 2)
         Nodes on the plane of the first vertex in the meridional frame, mm; x >= 0.
     triangles : ndarray, shape (T, 3)
+    traced : dict of int to ndarray, shape (N, 5 + 2 C)
+        The nodes as traced at the wavelengths that shaped the grid (`trace_points`).
     """
 
     path: LightPath
     pupil: Floats
     triangles: NDArray[np.int64]
+    traced: dict[int, Floats]
 
 
 def _arguments(packed: PackedLens, w: int | slice | list[int], path: LightPath, tilt: float) -> tuple[Any, ...]:
@@ -169,7 +172,7 @@ def trace_grid(
     tolerance: float,
     scale: float,
     view_radius: float = float("inf"),
-    flux_tolerance: float = 1e-3,
+    flux_tolerance: float = 5e-4,
 ) -> Bundle:
     """Build the adaptive grid of a path.
 
@@ -193,11 +196,31 @@ def trace_grid(
     Bundle
     """
     last = len(packed.wavelengths_nm) - 1
-    pupil, triangles = build_mesh(
-        *_arguments(packed, sorted({0, last // 2, last}), path, tilt), path.stop_crossings, iris_radius,
+    fitted = sorted({0, last // 2, last})
+    pupil, data, triangles = build_mesh(
+        *_arguments(packed, fitted, path, tilt), path.stop_crossings, iris_radius,
         box, *GRID, MAX_LEVEL, tolerance, flux_tolerance, scale, view_radius,
     )  # fmt: skip
-    return Bundle(path, pupil, triangles)
+    return Bundle(path, pupil, triangles, dict(zip(fitted, data, strict=True)))
+
+
+def trace_bundle(packed: PackedLens, w: int, bundle: Bundle, tilt: float) -> Floats:
+    """Trace a bundle's nodes at one wavelength, unless its grid already holds them.
+
+    Parameters
+    ----------
+    packed : PackedLens
+    w : int
+    bundle : Bundle
+    tilt : float
+
+    Returns
+    -------
+    ndarray, shape (N, 5 + 2 C)
+        As `trace_points`.
+    """
+    held = bundle.traced.get(w)
+    return trace_points(packed, w, bundle.path, tilt, bundle.pupil) if held is None else held
 
 
 def trace_points(packed: PackedLens, w: int, path: LightPath, tilt: float, points: Floats) -> Floats:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..kernels.bundle import draw_bundle, measure_bundle, node_densities
 from ..model import AsLens, CoatingChoice, Iris, Lens
-from .bundle import Bundle, Incidence, find_region, incidence, trace_grid, trace_points
+from .bundle import Bundle, Incidence, find_region, incidence, trace_bundle, trace_grid
 from .iris import blade_edges
 from .pack import PackedLens, pack_lens, resolve_coatings
 from .paraxial import D_LINE_NM, first_order, path_matrices
@@ -163,7 +163,7 @@ def _measure(lens: Lens, packed: PackedLens, path: LightPath, light: Incidence) 
     # first only the rim, to learn the size; then fine enough for that size
     for _ in range(2):
         bundle = trace_grid(packed, path, light.tilt, packed.stop_semi, region.box, tolerance=0.25, scale=scale)
-        data = trace_points(packed, 0, path, light.tilt, bundle.pupil)
+        data = trace_bundle(packed, 0, bundle, light.tilt)
         sums = measure_bundle(data, bundle.pupil, bundle.triangles, path.stop_crossings, blades, light.axes)
         if sums[0] <= 0.0:
             return nothing

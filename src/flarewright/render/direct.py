@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..kernels.bundle import measure_bundle
 from ..model import Layer, Lens, Lines
-from ..optics.bundle import find_region, trace_grid, trace_points
+from ..optics.bundle import find_region, trace_bundle, trace_grid
 from ..optics.paths import direct_path
 from .prepare import Settled
 from .shot import Shot
@@ -68,7 +68,7 @@ def direct_image(lens: Lens, shot: Shot) -> DirectImage:
     flux = np.zeros(count)
     place, mean = (0.0, 0.0), 0.0
     for w in range(count):
-        data = trace_points(packed, w, path, tilt, bundle.pupil)
+        data = trace_bundle(packed, w, bundle, tilt)
         sums = measure_bundle(data, bundle.pupil, bundle.triangles, 1, opening.blades, axes)
         flux[w] = sums[0] * shot.incidence.cosine * opening.mean_transmittance
         if w == middle and sums[0] > 0.0:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ..kernels.bundle import draw_bundle, node_densities
 from ..kernels.trace import ALIVE, REL, X, Y
 from ..model import Quality
-from ..optics.bundle import Region, find_region, trace_grid, trace_points
+from ..optics.bundle import Region, find_region, trace_bundle, trace_grid
 from ..optics.paths import LightPath
 from .canvas import Canvas
 from .shot import Shot
@@ -104,7 +104,7 @@ def draw_final(item: FinalPass, quality: Quality, canvas: Canvas, visibility: fl
         tolerance=quality.tolerance_px, scale=scale, view_radius=shot.view_radius,
     )  # fmt: skip
     count = len(shot.packed.wavelengths_nm)
-    traced = [trace_points(shot.packed, w, path, tilt, bundle.pupil) for w in range(count)]
+    traced = [trace_bundle(shot.packed, w, bundle, tilt) for w in range(count)]
     pieces = _bridges(traced, shot, scale, visibility) if quality.bridge else 1
     fine_nm = _refine(shot.packed.wavelengths_nm, pieces)
     for m, rgb in enumerate(shot.weights(fine_nm)):
