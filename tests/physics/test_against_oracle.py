@@ -46,8 +46,11 @@ def complaints(row, e: Estimate, ask_again: Callable[[int], Estimate]) -> list[s
     The tolerance is on the true error, so where the standard error leaves that open the oracle counts more rays.
     """
     for samples in (16_000, 64_000):
-        if all(abs(error) + 4 * sigma < limit for _, error, sigma, limit in errors(row, e)):
+        seen = errors(row, e)
+        if all(abs(error) + 4 * sigma < limit for _, error, sigma, limit in seen):
             return []
+        if any(abs(error) - 4 * sigma > limit for _, error, sigma, limit in seen):
+            break
         e = ask_again(samples)
     out = []
     for what, error, sigma, limit in errors(row, e):
