@@ -65,7 +65,7 @@ def node_densities(data, pupil, triangles):
 @compiled
 def draw_bundle(
     data, pupil, triangles, densities, crossings, blades, mask, mask_half, axes, to_pixels, gain, rgb,
-    plane, cover, low, high,
+    plane, strip,
 ):  # fmt: skip
     """Add a bundle and its mirror image to a picture, flux for flux.
 
@@ -86,7 +86,7 @@ def draw_bundle(
     rgb : ndarray, shape (3,)
     plane : ndarray, shape (3, H, W), float32
         Flux per pixel, added to.
-    cover, low, high
+    strip
         Scratch of `fill_polygon`.
 
     Notes
@@ -148,14 +148,14 @@ def draw_bundle(
             if mask.size > 1:
                 fill_through_mask(
                     polygon, count, crossings, mask, mask_half, base, gx, gy, dense_low, dense_high, rgb,
-                    plane, cover, low, high,
+                    plane, strip,
                 )  # fmt: skip
                 continue
             if left < 0.0 or right > width or top < 0.0 or bottom > height:
                 count = cut_to_rectangle(polygon, count, other, values, float(width), float(height))
                 if count < 3:
                     continue
-            fill_polygon(polygon, count, base, gx, gy, dense_low, dense_high, rgb, plane, cover, low, high)
+            fill_polygon(polygon, count, base, gx, gy, dense_low, dense_high, rgb, plane, strip)
 
 
 @compiled

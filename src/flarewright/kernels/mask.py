@@ -65,7 +65,7 @@ def _pieces(polygon, k, crossings, mask, half):
 
 @compiled
 def fill_through_mask(
-    polygon, count, crossings, mask, half, density, gx, gy, density_low, density_high, rgb, plane, cover, low, high
+    polygon, count, crossings, mask, half, density, gx, gy, density_low, density_high, rgb, plane, strip
 ):
     """Draw a polygon as `fill_polygon` does, its light multiplied by the mask at every crossing of the stop.
 
@@ -78,7 +78,7 @@ def fill_through_mask(
         Transmittance, row 0 up.
     half : float
         The mask spans [-half, half] in the stop, mm.
-    density ... high
+    density ... strip
         As in `fill_polygon`.
 
     Notes
@@ -100,7 +100,7 @@ def fill_through_mask(
         kept = cut_to_rectangle(piece, count, other, values, float(width), float(height))
         if kept >= 3:
             fill_polygon(
-                piece, kept, density, gx, gy, density_low, density_high, rgb * value, plane, cover, low, high
+                piece, kept, density, gx, gy, density_low, density_high, rgb * value, plane, strip
             )
         return
     for k in range(1, count - 1):
@@ -132,5 +132,5 @@ def fill_through_mask(
                 kept = cut_to_rectangle(piece, 3, other, values, float(width), float(height))
                 if kept >= 3:
                     fill_polygon(
-                        piece, kept, density, gx, gy, density_low, density_high, rgb * value, plane, cover, low, high
+                        piece, kept, density, gx, gy, density_low, density_high, rgb * value, plane, strip
                     )

@@ -107,7 +107,7 @@ def paraxial_weight(rows, actions, curvature, z_vertex, n_gap, reflectance, y, u
 @compiled
 def draw_matrix_ghosts(
     rows, actions, starts, crossings, curvature, z_vertex, n_gap, reflectance, sensor_z,
-    entrance, slope, edges, iris_radius, mask, mask_half, axes, to_pixels, gain, rgb, plane, cover, low, high,
+    entrance, slope, edges, iris_radius, mask, mask_half, axes, to_pixels, gain, rgb, plane, strip,
 ):  # fmt: skip
     """Draw many paths at many wavelengths with matrices (Lee and Eisemann 2013; Van Acoleyen 2025, chapter 4).
 
@@ -129,7 +129,7 @@ def draw_matrix_ghosts(
     edges : ndarray, shape (B, 4)
         The iris as straight blades.
     iris_radius : float
-    mask, mask_half, axes, to_pixels, gain, plane, cover, low, high
+    mask, mask_half, axes, to_pixels, gain, plane, strip
         As in `draw_bundle`.
     rgb : ndarray, shape (W, 3)
 
@@ -170,12 +170,12 @@ def draw_matrix_ghosts(
             if mask.size > 1:
                 fill_through_mask(
                     polygon, count, crossings[p], mask, mask_half, even, 0.0, 0.0, even, even, rgb[w],
-                    plane, cover, low, high,
+                    plane, strip,
                 )  # fmt: skip
                 continue
             count = cut_to_rectangle(polygon, count, other, values, float(width), float(height))
             if count >= 3:
-                fill_polygon(polygon, count, even, 0.0, 0.0, even, even, rgb[w], plane, cover, low, high)
+                fill_polygon(polygon, count, even, 0.0, 0.0, even, even, rgb[w], plane, strip)
 
 
 @compiled

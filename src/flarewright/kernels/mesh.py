@@ -11,6 +11,9 @@ from .trace import ALIVE, REL, STOP_X, WEIGHT, X, Y, trace_nodes
 
 # a FLAT leaf is good enough without its edges' middles, a LEAF needs them
 UNKNOWN, LEAF, SPLIT, EMPTY, FLAT = 0, 1, 2, 3, 4
+# paths seen by fewer cells of the pre-pass than this are searched for spots between its samples
+FEW_CELLS = 12
+PROBES = 8
 # cells that the rim crosses are halved at least this often
 RIM_LEVEL = 2
 
@@ -86,7 +89,8 @@ def find_box(
     Notes
     -----
     Hullin 2011, section 4.2, "Ray Bounding". A cell is kept unless one of its limits is exceeded at every corner by
-    more than half its variation over the cell, so a region that falls between the samples is kept too.
+    more than half its variation over the cell. Where few cells are kept, cells whose limits change fast are searched
+    with a finer grid, so that spots between the samples are found too.
     """
     width = ny + 1
     count = (nx + 1) * width
@@ -102,21 +106,91 @@ def find_box(
     sums = np.zeros(4)
     nodes = np.empty(4, dtype=np.int64)
     share = hx * hy * np.cos(tilt)
+    accepted = 0
+    doubtful = np.empty(nx * ny, dtype=np.int64)
+    n_doubtful = 0
     for a in range(nx):
         for b in range(ny):
             nodes[0], nodes[1] = a * width + b, a * width + b + 1
             nodes[2], nodes[3] = nodes[0] + width, nodes[1] + width
-            if _rejected(data, nodes, crossings, iris_radius, 0.5):
-                continue
-            found[0], found[1] = min(found[0], box[0] + a * hx), max(found[1], box[0] + (a + 1) * hx)
-            found[2], found[3] = min(found[2], box[2] + b * hy), max(found[3], box[2] + (b + 1) * hy)
-            _weigh(data, nodes, share, view_radius, sums)
+            if not _rejected(data, nodes, crossings, iris_radius, 0.5):
+                found[0], found[1] = min(found[0], box[0] + a * hx), max(found[1], box[0] + (a + 1) * hx)
+                found[2], found[3] = min(found[2], box[2] + b * hy), max(found[3], box[2] + (b + 1) * hy)
+                _weigh(data, nodes, share, view_radius, sums)
+                accepted += 1
+            elif _doubtful(data, nodes, nx, ny, crossings, iris_radius):
+                doubtful[n_doubtful] = a * ny + b
+                n_doubtful += 1
+    if accepted < FEW_CELLS and n_doubtful > 0:
+        # a spot smaller than a cell may hide between the samples
+        corners = np.empty((n_doubtful, 2))
+        for k in range(n_doubtful):
+            corners[k, 0] = box[0] + (doubtful[k] // ny) * hx
+            corners[k, 1] = box[2] + (doubtful[k] % ny) * hy
+        _probe(
+            rows, actions, curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, tilt,
+            crossings, iris_radius, corners, hx, hy, found, sums,
+        )  # fmt: skip
     # the pre-pass sees one wavelength and straight cells: leave a cell of room around
     for m in range(2):
         step = hx if m == 0 else hy
         found[2 * m] = max(found[2 * m] - step, box[2 * m])
         found[2 * m + 1] = min(found[2 * m + 1] + step, box[2 * m + 1])
     return found, sums
+
+
+@compiled
+def _doubtful(data, nodes, nx, ny, crossings, iris_radius):
+    """Tell whether a rejected cell may still hold a spot: its limits change so fast around it that they may dip below 1."""
+    low, change, alive = np.inf, 0.0, 0
+    width = ny + 1
+    for k in nodes:
+        if data[k, ALIVE] == 0.0:
+            continue
+        alive += 1
+        low = min(low, data[k, REL])
+        a, b = k // width, k % width
+        for m in range(4):
+            i = a + (1 if m == 0 else (-1 if m == 1 else 0))
+            j = b + (1 if m == 2 else (-1 if m == 3 else 0))
+            if 0 <= i <= nx and 0 <= j <= ny:
+                # beside a ray that ends, anything may happen
+                step = abs(data[i * width + j, REL] - data[k, REL]) if data[i * width + j, ALIVE] > 0.0 else np.inf
+                change = max(change, step)
+    if alive == 0 or low - 1.5 * change > 1.0:
+        return False
+    if alive < nodes.size:
+        return True
+    for crossing in range(crossings):
+        if _stop_outside(data, nodes, crossing, iris_radius, 1.5):
+            return False
+    return True
+
+
+@compiled
+def _probe(
+    rows, actions, curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, tilt,
+    crossings, iris_radius, corners, hx, hy, found, sums,
+):  # fmt: skip
+    """Look into doubtful cells with PROBES x PROBES rays each and widen the box by what passes."""
+    each = PROBES * PROBES
+    px, py = np.empty(corners.shape[0] * each), np.empty(corners.shape[0] * each)
+    for k in range(px.size):
+        cell, m = k // each, k % each
+        px[k] = corners[cell, 0] + (m // PROBES + 0.5) * hx / PROBES
+        py[k] = corners[cell, 1] + (m % PROBES + 0.5) * hy / PROBES
+    data = np.empty((px.size, STOP_X + 2 * crossings))
+    trace_nodes(rows, actions, curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, tilt, px, py, data)
+    for k in range(px.size):
+        passes = data[k, ALIVE] > 0.0 and data[k, REL] <= 1.0
+        for c in range(crossings):
+            u, v = data[k, STOP_X + 2 * c], data[k, STOP_X + 2 * c + 1]
+            passes = passes and u * u + v * v <= iris_radius * iris_radius
+        if passes:
+            found[0], found[1] = min(found[0], px[k] - hx / PROBES), max(found[1], px[k] + hx / PROBES)
+            found[2], found[3] = min(found[2], py[k] - hy / PROBES), max(found[3], py[k] + hy / PROBES)
+            sums[0] += 2.0 * data[k, WEIGHT] * hx * hy / each * np.cos(tilt)
+            sums[3] += 1.0
 
 
 @compiled

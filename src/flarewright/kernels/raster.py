@@ -1,59 +1,57 @@
 """Draw convex polygons with exact pixel coverage, so that what is drawn is what was meant to be drawn.
 
-Each edge adds the area to its right to the pixels it crosses, as differences along the row; a running sum over the row
-gives every pixel's coverage (the way font rasterisers work). No triangle is too thin or too small for it.
+A polygon is cut into strips that lie within one row of pixels and have one left and one right edge. How much of a pixel
+lies to the right of an edge is an exact integral, so no polygon is too thin or too small, and neighbours that share an
+edge add up without a seam.
 """
 
 from math import floor, sqrt
 
 import numpy as np
 
-from ._jit import compiled
+from ._jit import compiled, inlined
 from .clip import PX, PY
 
 
-@compiled
-def _add_edge(cover, first_row, low, high, x0, y0, x1, y1):
-    """Add one edge's signed coverage differences to the local rows and note the columns that it touches."""
-    sign, side = 1.0, 0
-    if y1 < y0:
-        sign, side = -1.0, 1
-        x0, y0, x1, y1 = x1, y1, x0, y0
-    slope = (x1 - x0) / (y1 - y0)
-    row = int(y0)
-    x_top, y_top = x0, y0
-    while y_top < y1:
-        # coordinates are inside the picture, so truncation is the floor
-        y_bottom = min(row + 1.0, y1)
-        x_bottom = x0 + (y_bottom - y0) * slope if y_bottom < y1 else x1
-        d = (y_bottom - y_top) * sign
-        xa, xb = min(x_top, x_bottom), max(x_top, x_bottom)
-        ca, cb = int(xa), int(xb)
-        k = row - first_row
-        if ca == cb:
-            right = 0.5 * (xa + xb) - ca
-            cover[k, ca] += d * (1.0 - right)
-            cover[k, ca + 1] += d * right
-        else:
-            s = 1.0 / (xb - xa)
-            done = 0.5 * s * (ca + 1 - xa) * (ca + 1 - xa)
-            cover[k, ca] += d * done
-            # coverage grows by s with each full column
-            for c in range(ca + 1, cb):
-                covered = s * (c + 0.5 - xa)
-                cover[k, c] += d * (covered - done)
-                done = covered
-            left = 1.0 - 0.5 * s * (xb - cb) * (xb - cb)
-            cover[k, cb] += d * (left - done)
-            cover[k, cb + 1] += d * (1.0 - left)
-        low[side, k] = min(low[side, k], ca)
-        high[side, k] = max(high[side, k], cb + 1)
-        x_top, y_top = x_bottom, y_bottom
-        row += 1
+@inlined
+def _right_of(t, near, far, half_inverse):
+    """Integrate max(t - x, 0) over a strip whose edge runs from x = near to x = far."""
+    u = min(max(t, near), far) - near
+    return u * u * half_inverse + max(t - far, 0.0)
+
+
+@inlined
+def _step(k, way, count):
+    """Walk around a polygon."""
+    k += way
+    return k - count if k >= count else k
 
 
 @compiled
-def fill_polygon(polygon, count, density, gx, gy, density_low, density_high, rgb, plane, cover, low, high):
+def _fill_strip(row, depth, xl0, xl1, xr0, xr1, base, gx, density_low, density_high, rgb, plane, strip):
+    """Add a strip of a polygon between two edges: exact coverage times the density at each pixel's centre."""
+    la, lb = min(xl0, xl1), max(xl0, xl1)
+    ra, rb = min(xr0, xr1), max(xr0, xr1)
+    first = int(la)
+    count = min(int(rb) + 1, plane.shape[2]) - first
+    # edges relative to the first pixel
+    la, lb, ra, rb = la - first, lb - first, ra - first, rb - first
+    l_inverse, r_inverse = 0.5 / max(lb - la, 1e-9), 0.5 / max(rb - ra, 1e-9)
+    start = base + gx * (first + 0.5)
+    for c in range(count):
+        t = float(c)
+        left = _right_of(t + 1.0, la, lb, l_inverse) - _right_of(t, la, lb, l_inverse)
+        right = _right_of(t + 1.0, ra, rb, r_inverse) - _right_of(t, ra, rb, r_inverse)
+        strip[c] = (left - right) * depth * min(max(start + gx * t, density_low), density_high)
+    for channel in range(3):
+        colour = rgb[channel]
+        line = plane[channel, row, first : first + count]
+        for c in range(count):
+            line[c] += colour * strip[c]
+
+
+@compiled
+def fill_polygon(polygon, count, density, gx, gy, density_low, density_high, rgb, plane, strip):
     """Add a convex polygon with linearly varying density to a picture.
 
     Parameters
@@ -68,75 +66,62 @@ def fill_polygon(polygon, count, density, gx, gy, density_low, density_high, rgb
     rgb : ndarray, shape (3,)
     plane : ndarray, shape (3, H, W), float32
         Added to.
-    cover : ndarray, shape (H + 1, W + 3), float64
-        Scratch, all zero before and after.
-    low, high : ndarray, shape (2, H + 1), int64
+    strip : ndarray, shape (>= W + 1,), float64
         Scratch.
 
     Notes
     -----
     A pixel receives exact coverage times the density at its centre; the sum over pixels is the polygon's flux.
     """
-    y_low, y_high = np.inf, -np.inf
-    for k in range(count):
-        y_low, y_high = min(y_low, polygon[k, PY]), max(y_high, polygon[k, PY])
-    first_row = int(y_low)
-    last_row = min(int(y_high), plane.shape[1] - 1)
-    for r in range(last_row - first_row + 2):
-        low[0, r], low[1, r] = 1 << 30, 1 << 30
-        high[0, r], high[1, r] = -1, -1
+    top, bottom = 0, 0
     twice_area = 0.0
     for k in range(count):
+        if polygon[k, PY] < polygon[top, PY]:
+            top = k
+        if polygon[k, PY] > polygon[bottom, PY]:
+            bottom = k
         following = k + 1 if k + 1 < count else 0
-        x0, y0, x1, y1 = polygon[k, PX], polygon[k, PY], polygon[following, PX], polygon[following, PY]
-        twice_area += (x0 - polygon[0, PX]) * (y1 - polygon[0, PY]) - (x1 - polygon[0, PX]) * (y0 - polygon[0, PY])
-        if y0 != y1:
-            _add_edge(cover, first_row, low, high, x0, y0, x1, y1)
-    # running upwards on the right means running downwards on the left
-    sign = 1.0 if twice_area < 0.0 else -1.0
-    for r in range(last_row - first_row + 2):
-        row = first_row + r
-        start, end = min(low[0, r], low[1, r]), max(high[0, r], high[1, r])
-        if end < 0:
-            continue
-        if row > last_row or high[0, r] < 0 or high[1, r] < 0:
-            for c in range(start, end + 1):
-                cover[r, c] = 0.0
-            continue
-        base = density + gy * (row + 0.5)
-        # between the pixels that the left and the right edges touch, coverage does not change
-        pause, resume = min(high[0, r], high[1, r]), max(low[0, r], low[1, r])
-        if resume <= pause + 4:
-            pause, resume = end, end + 1
-        total = _sweep(cover, r, start, pause, 0.0, sign, base, gx, density_low, density_high, rgb, plane, row)
-        if resume <= end:
-            even = np.float32((base + gx * (pause + 1.5)) * total * sign)
-            slope = np.float32(gx * total * sign)
-            for channel in range(3):
-                _fill_run(plane[channel, row, pause + 1 : resume], np.float32(rgb[channel]), even, slope)
-            _sweep(cover, r, resume, end, total, sign, base, gx, density_low, density_high, rgb, plane, row)
-
-
-@compiled
-def _fill_run(run, colour, even, slope):
-    """Add a linear ramp to fully covered pixels."""
-    for c in range(run.size):
-        run[c] += colour * (even + slope * np.float32(c))
-
-
-@compiled
-def _sweep(cover, r, start, end, total, sign, base, gx, density_low, density_high, rgb, plane, row):
-    """Sum coverage over partly covered pixels, deposit it and clear the scratch."""
-    width = plane.shape[2]
-    for c in range(start, end + 1):
-        total += cover[r, c]
-        cover[r, c] = 0.0
-        if c < width:
-            value = total * sign * min(max(base + gx * (c + 0.5), density_low), density_high)
-            plane[0, row, c] += rgb[0] * value
-            plane[1, row, c] += rgb[1] * value
-            plane[2, row, c] += rgb[2] * value
-    return total
+        twice_area += (polygon[k, PX] - polygon[0, PX]) * (polygon[following, PY] - polygon[0, PY])
+        twice_area -= (polygon[following, PX] - polygon[0, PX]) * (polygon[k, PY] - polygon[0, PY])
+    # rows count downwards: with positive area the vertices run down on the right
+    way = 1 if twice_area > 0.0 else count - 1
+    left, right = top, top
+    y, end = polygon[top, PY], polygon[bottom, PY]
+    row = int(y)
+    last_row = plane.shape[1] - 1
+    left_slope, right_slope = 0.0, 0.0
+    left_end, right_end = y, y
+    while y < end:
+        while left_end <= y and left != bottom:
+            following = _step(left, count - way, count)
+            left_end = polygon[following, PY]
+            if left_end > y:
+                left_slope = (polygon[following, PX] - polygon[left, PX]) / (left_end - polygon[left, PY])
+                break
+            left = following
+        while right_end <= y and right != bottom:
+            following = _step(right, way, count)
+            right_end = polygon[following, PY]
+            if right_end > y:
+                right_slope = (polygon[following, PX] - polygon[right, PX]) / (right_end - polygon[right, PY])
+                break
+            right = following
+        y_next = min(row + 1.0, min(left_end, right_end))
+        if y_next > y and row <= last_row:
+            xl, xr = polygon[left, PX], polygon[right, PX]
+            yl, yr = polygon[left, PY], polygon[right, PY]
+            _fill_strip(
+                row, y_next - y, xl + (y - yl) * left_slope, xl + (y_next - yl) * left_slope,
+                xr + (y - yr) * right_slope, xr + (y_next - yr) * right_slope,
+                density + gy * (row + 0.5), gx, density_low, density_high, rgb, plane, strip,
+            )  # fmt: skip
+        if left_end <= y_next:
+            left = _step(left, count - way, count)
+        if right_end <= y_next:
+            right = _step(right, way, count)
+        if y_next >= row + 1.0:
+            row += 1
+        y = y_next
 
 
 @compiled

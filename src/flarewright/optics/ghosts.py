@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..kernels.bundle import draw_bundle, measure_bundle, node_densities
+from ..kernels.trace import ALIVE, REL, STOP_X, WEIGHT, X, Y
 from ..model import AsLens, CoatingChoice, Iris, Lens
-from .bundle import Bundle, Incidence, find_region, incidence, trace_bundle, trace_grid
+from .bundle import Bundle, Incidence, find_region, incidence, trace_bundle, trace_grid, trace_points
 from .iris import blade_edges
 from .pack import PackedLens, pack_lens, resolve_coatings
 from .paraxial import D_LINE_NM, first_order, path_matrices
@@ -22,6 +23,8 @@ Floats = NDArray[np.float64]
 # pixels per rms radius for tracing, and the side of the grid on which a peak is looked for
 RESOLUTION = 100.0
 PEAK_GRID = 256
+# rays spent on the torn edge of a bundle
+MOST_FRAYED = 300_000
 
 # the kernels take a mask of one texel for none
 NO_MASK = np.ones((1, 1))
@@ -39,7 +42,8 @@ class GhostRow:
         Flux on the unbounded sensor plane when the light gives irradiance 1 on a plane facing it.
     centroid_mm : tuple of float
     rms_radius_mm : float
-        Root mean square distance from the centroid, weighted by flux.
+        Root mean square distance from the centroid, weighted by flux. It has no limit where a path's light leaves the
+        last surface at grazing angles without losing all its flux: such rays land arbitrarily far out on the plane.
     peak_irradiance : float
         Largest irradiance, averaged over a square of side `peak_patch_mm`, per flux of the direct image, 1/mm^2.
     peak_patch_mm : float
@@ -165,6 +169,7 @@ def _measure(lens: Lens, packed: PackedLens, path: LightPath, light: Incidence) 
         bundle = trace_grid(packed, path, light.tilt, packed.stop_semi, region.box, tolerance=0.25, scale=scale)
         data = trace_bundle(packed, 0, bundle, light.tilt)
         sums = measure_bundle(data, bundle.pupil, bundle.triangles, path.stop_crossings, blades, light.axes)
+        sums[:4] += _frayed(packed, bundle, data, light)
         if sums[0] <= 0.0:
             return nothing
         x, y = sums[1] / sums[0], sums[2] / sums[0]
@@ -173,6 +178,38 @@ def _measure(lens: Lens, packed: PackedLens, path: LightPath, light: Incidence) 
     peak, patch = _peak(bundle, data, blades, light, (x, y), min(4.0 * rms, _extent(sums)))
     flux = float(sums[0] * light.cosine)
     return GhostRow(j, i, flux, (float(x), float(y)), rms, peak, patch, bounded_by, focus)
+
+
+def _frayed(packed: PackedLens, bundle: Bundle, data: Floats, light: Incidence) -> Floats:
+    """Integrate over the triangles in which some rays end, ray by ray: weight times 1, x, y, x^2 + y^2.
+
+    They carry little light, but where rays leave the last surface at a grazing angle it lands so far out that it decides
+    the ghost's size.
+    """
+    alive = data[bundle.triangles, ALIVE]
+    torn = bundle.triangles[(alive.min(axis=1) == 0.0) & (alive.max(axis=1) > 0.0)]
+    if len(torn) == 0:
+        return np.zeros(4)
+    n = int(np.clip(sqrt(MOST_FRAYED / len(torn)), 2, 16))
+    # the centres of the n^2 parts of each triangle, in barycentric coordinates
+    a, b = (grid.ravel() for grid in np.meshgrid(np.arange(n), np.arange(n)))
+    up, down = a + b < n, a + b < n - 1
+    s = np.concatenate([a[up] + 1.0 / 3.0, a[down] + 2.0 / 3.0]) / n
+    t = np.concatenate([b[up] + 1.0 / 3.0, b[down] + 2.0 / 3.0]) / n
+    p0, p1, p2 = (bundle.pupil[torn[:, m], None, :] for m in range(3))
+    points = p0 + s[:, None] * (p1 - p0) + t[:, None] * (p2 - p0)
+    area = 0.5 * np.abs(np.cross(p1[:, 0] - p0[:, 0], p2[:, 0] - p0[:, 0])) / len(s)
+    rays = trace_points(packed, 0, bundle.path, light.tilt, points.reshape(-1, 2))
+    passes = (rays[:, ALIVE] > 0.0) & (rays[:, REL] <= 1.0)
+    for crossing in range(bundle.path.stop_crossings):
+        at = STOP_X + 2 * crossing
+        passes &= np.hypot(rays[:, at], rays[:, at + 1]) <= packed.stop_semi
+    # both halves of the pupil: across the meridional plane they cancel
+    weight = np.where(passes, 2.0 * rays[:, WEIGHT], 0.0) * np.repeat(area, len(s))
+    x, y = np.where(passes, rays[:, X], 0.0), np.where(passes, rays[:, Y], 0.0)
+    along = float((weight * y).sum())
+    moment = float((weight * (x * x + y * y)).sum())
+    return np.array([weight.sum(), -along * light.axes[1, 0], -along * light.axes[1, 1], moment])
 
 
 def _extent(sums: Floats) -> float:
@@ -187,13 +224,11 @@ def _peak(
     patch = max(2.0 * reach / PEAK_GRID, 0.01)
     side = min(PEAK_GRID, max(4, ceil(2.0 * reach / patch) + 2))
     plane = np.zeros((3, side, side), dtype=np.float32)
-    cover = np.zeros((side + 1, side + 3))
-    low, high = np.zeros((2, side + 1), dtype=np.int64), np.zeros((2, side + 1), dtype=np.int64)
     to_pixels = np.array([side / 2 - centre[0] / patch, side / 2 + centre[1] / patch, 1.0 / patch, 1.0 / patch])
     densities = node_densities(data, bundle.pupil, bundle.triangles)
     draw_bundle(
         data, bundle.pupil, bundle.triangles, densities, bundle.path.stop_crossings, blades, NO_MASK, 1.0, light.axes,
-        to_pixels, light.cosine, np.array([1.0, 0.0, 0.0]), plane, cover, low, high,
+        to_pixels, light.cosine, np.array([1.0, 0.0, 0.0]), plane, np.empty(side + 1),
     )  # fmt: skip
     return float(plane[0].max()) / patch**2, patch
 

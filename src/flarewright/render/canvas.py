@@ -22,25 +22,21 @@ class Canvas:
     size_px : tuple of int
     planes : list of ndarray or None
         Flux per pixel, shape (3, H, W), float32: at full resolution, at half and at a quarter; made when first used.
-    cover, low, high : ndarray
+    strip : ndarray
         Scratch of `kernels.raster.fill_polygon`.
     """
 
     size_px: tuple[int, int]
     planes: list[NDArray[np.float32] | None]
-    cover: NDArray[np.float64]
-    low: NDArray[np.int64]
-    high: NDArray[np.int64]
+    strip: NDArray[np.float64]
 
-    def scratch(
-        self, detail: int = 0
-    ) -> tuple[NDArray[np.float32], NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
+    def scratch(self, detail: int = 0) -> tuple[NDArray[np.float32], NDArray[np.float64]]:
         """Return plane and scratch in the order in which kernels take them; `detail` halves the resolution."""
         plane = self.planes[detail]
         if plane is None:
             width, height = (-(-side // 2**detail) for side in self.size_px)
             plane = self.planes[detail] = np.zeros((3, height, width), dtype=np.float32)
-        return plane, self.cover, self.low, self.high
+        return plane, self.strip
 
     def merged(self) -> NDArray[np.float32]:
         """Return the light of all resolutions at full resolution, shape (3, H, W)."""
@@ -69,9 +65,7 @@ def _double(plane: NDArray[np.float32], axis: int) -> NDArray[np.float32]:
 
 def blank(size_px: tuple[int, int]) -> Canvas:
     """Return an empty canvas of (width, height) pixels."""
-    width, height = size_px
-    rows = np.zeros((2, height + 2), dtype=np.int64)
-    return Canvas(size_px, [None] * DETAILS, np.zeros((height + 2, width + 3)), rows, rows.copy())
+    return Canvas(size_px, [None] * DETAILS, np.empty(size_px[0] + 1))
 
 
 def to_layer(name: str, plane: NDArray[np.float32], pixel_area: float, about: dict[str, str | float]) -> Layer:
