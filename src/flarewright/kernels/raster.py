@@ -21,6 +21,13 @@ def _right_of(t, near, far, half_inverse):
 
 
 @inlined
+def _share(c, la, lb, l_inverse, ra, rb, r_inverse):
+    """Return how much of pixel [c, c + 1] lies between two edges, per depth of the strip."""
+    left = _right_of(c + 1.0, la, lb, l_inverse) - _right_of(c, la, lb, l_inverse)
+    return left - _right_of(c + 1.0, ra, rb, r_inverse) + _right_of(c, ra, rb, r_inverse)
+
+
+@inlined
 def _step(k, way, count):
     """Walk around a polygon."""
     k += way
@@ -28,26 +35,39 @@ def _step(k, way, count):
 
 
 @compiled
-def _fill_strip(row, depth, xl0, xl1, xr0, xr1, base, gx, density_low, density_high, rgb, plane, strip):
-    """Add a strip of a polygon between two edges: exact coverage times the density at each pixel's centre."""
+def _fill_strip(flat, width, size, row, depth, xl0, xl1, xr0, xr1, start, gx, density_low, density_high, rgb, strip):
+    """Add a strip of a polygon between two edges: exact coverage times the density at each pixel's centre.
+
+    `flat` is the picture as one line of three planes of `size` pixels: an unsigned place in it needs no check for
+    counting from the end, which would keep the loops from vectorising.
+    """
     la, lb = min(xl0, xl1), max(xl0, xl1)
     ra, rb = min(xr0, xr1), max(xr0, xr1)
     first = int(la)
-    count = min(int(rb) + 1, plane.shape[2]) - first
+    count = min(int(rb) + 1, width) - first
     # edges relative to the first pixel
     la, lb, ra, rb = la - first, lb - first, ra - first, rb - first
     l_inverse, r_inverse = 0.5 / max(lb - la, 1e-9), 0.5 / max(rb - ra, 1e-9)
-    start = base + gx * (first + 0.5)
-    for c in range(count):
-        t = float(c)
-        left = _right_of(t + 1.0, la, lb, l_inverse) - _right_of(t, la, lb, l_inverse)
-        right = _right_of(t + 1.0, ra, rb, r_inverse) - _right_of(t, ra, rb, r_inverse)
-        strip[c] = (left - right) * depth * min(max(start + gx * t, density_low), density_high)
+    start += gx * (first + 0.5)
+    # between the pixels that edges touch, coverage is whole
+    whole, rest = int(lb) + 1, int(ra)
+    if rest - whole < 8:
+        whole, rest = count, count
+    for c in range(whole):
+        strip[c] = _share(float(c), la, lb, l_inverse, ra, rb, r_inverse) * depth * min(
+            max(start + gx * c, density_low), density_high
+        )
+    for c in range(whole, rest):
+        strip[c] = depth * (start + gx * c)
+    for c in range(rest, count):
+        strip[c] = _share(float(c), la, lb, l_inverse, ra, rb, r_inverse) * depth * min(
+            max(start + gx * c, density_low), density_high
+        )
     for channel in range(3):
-        colour = rgb[channel]
-        line = plane[channel, row, first : first + count]
+        colour = np.float32(rgb[channel])
+        place = np.uint64(channel * size + row * width + first)
         for c in range(count):
-            line[c] += colour * strip[c]
+            flat[place + np.uint64(c)] += colour * strip[c]
 
 
 @compiled
@@ -66,7 +86,7 @@ def fill_polygon(polygon, count, density, gx, gy, density_low, density_high, rgb
     rgb : ndarray, shape (3,)
     plane : ndarray, shape (3, H, W), float32
         Added to.
-    strip : ndarray, shape (>= W + 1,), float64
+    strip : ndarray, shape (>= W + 1,), float32
         Scratch.
 
     Notes
@@ -88,6 +108,8 @@ def fill_polygon(polygon, count, density, gx, gy, density_low, density_high, rgb
     left, right = top, top
     y, end = polygon[top, PY], polygon[bottom, PY]
     row = int(y)
+    width, size = plane.shape[2], plane.shape[1] * plane.shape[2]
+    flat = plane.reshape(3 * size)
     last_row = plane.shape[1] - 1
     left_slope, right_slope = 0.0, 0.0
     left_end, right_end = y, y
@@ -111,9 +133,9 @@ def fill_polygon(polygon, count, density, gx, gy, density_low, density_high, rgb
             xl, xr = polygon[left, PX], polygon[right, PX]
             yl, yr = polygon[left, PY], polygon[right, PY]
             _fill_strip(
-                row, y_next - y, xl + (y - yl) * left_slope, xl + (y_next - yl) * left_slope,
+                flat, width, size, row, y_next - y, xl + (y - yl) * left_slope, xl + (y_next - yl) * left_slope,
                 xr + (y - yr) * right_slope, xr + (y_next - yr) * right_slope,
-                density + gy * (row + 0.5), gx, density_low, density_high, rgb, plane, strip,
+                density + gy * (row + 0.5), gx, density_low, density_high, rgb, strip,
             )  # fmt: skip
         if left_end <= y_next:
             left = _step(left, count - way, count)

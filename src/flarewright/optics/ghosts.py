@@ -228,7 +228,7 @@ def _peak(
     densities = node_densities(data, bundle.pupil, bundle.triangles)
     draw_bundle(
         data, bundle.pupil, bundle.triangles, densities, bundle.path.stop_crossings, blades, NO_MASK, 1.0, light.axes,
-        to_pixels, light.cosine, np.array([1.0, 0.0, 0.0]), plane, np.empty(side + 1),
+        to_pixels, light.cosine, np.array([1.0, 0.0, 0.0]), plane, np.empty(side + 1, dtype=np.float32),
     )  # fmt: skip
     return float(plane[0].max()) / patch**2, patch
 

@@ -28,9 +28,9 @@ class Canvas:
 
     size_px: tuple[int, int]
     planes: list[NDArray[np.float32] | None]
-    strip: NDArray[np.float64]
+    strip: NDArray[np.float32]
 
-    def scratch(self, detail: int = 0) -> tuple[NDArray[np.float32], NDArray[np.float64]]:
+    def scratch(self, detail: int = 0) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """Return plane and scratch in the order in which kernels take them; `detail` halves the resolution."""
         plane = self.planes[detail]
         if plane is None:
@@ -65,7 +65,7 @@ def _double(plane: NDArray[np.float32], axis: int) -> NDArray[np.float32]:
 
 def blank(size_px: tuple[int, int]) -> Canvas:
     """Return an empty canvas of (width, height) pixels."""
-    return Canvas(size_px, [None] * DETAILS, np.empty(size_px[0] + 1))
+    return Canvas(size_px, [None] * DETAILS, np.empty(size_px[0] + 1, dtype=np.float32))
 
 
 def to_layer(name: str, plane: NDArray[np.float32], pixel_area: float, about: dict[str, str | float]) -> Layer:
