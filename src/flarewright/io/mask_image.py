@@ -40,7 +40,9 @@ def read_mask(path: str | Path) -> NDArray[np.float64]:
     except (OSError, ValueError, SyntaxError) as error:
         raise ProjectError(f"{place}: this cannot be read as an image ({error}); give a PNG or EXR file") from error
     if min(grey.shape) < 2 or max(grey.shape) > LARGEST:
-        raise ProjectError(f"{place}: an iris image has 2 to {LARGEST} pixels a side, this one is {grey.shape[1]}x{grey.shape[0]}")
+        raise ProjectError(
+            f"{place}: an iris image has 2 to {LARGEST} pixels a side, this one is {grey.shape[1]}x{grey.shape[0]}"
+        )
     grey = np.clip(grey, 0.0, 1.0)
     if not np.isfinite(grey).all() or grey.max() <= 0.0:
         raise ProjectError(f"{place}: the iris image is black or not finite, so no light passes; white transmits")

@@ -35,7 +35,7 @@ def _triangle_flux(data, pupil, a, b, c):
 
 @compiled
 def node_densities(data, pupil, triangles):
-    """Average the irradiance of the triangles around each node, by flux and area (Hullin 2011, section 4.3, "Smooth shading").
+    """Average the irradiance of the triangles around each node, by flux and area.
 
     Parameters
     ----------
@@ -47,6 +47,10 @@ def node_densities(data, pupil, triangles):
     -------
     ndarray, shape (N,)
         Flux per mm^2 of the sensor; finite on caustics because areas of either orientation add.
+
+    Notes
+    -----
+    Hullin 2011, section 4.3, "Smooth shading".
     """
     flux, area = np.zeros(pupil.shape[0]), np.zeros(pupil.shape[0])
     for t in range(triangles.shape[0]):
@@ -125,7 +129,9 @@ def draw_bundle(
                 for m in range(3):
                     polygon[m, PX], polygon[m, PY] = spots[triangles[t, m], 0], spots[triangles[t, m], 1]
             else:
-                count = clip_triangle(data, pupil, triangles[t], mirror, crossings, blades, axes, polygon, other, values)
+                count = clip_triangle(
+                    data, pupil, triangles[t], mirror, crossings, blades, axes, polygon, other, values
+                )
                 for k in range(count):
                     x, y = polygon[k, PX], polygon[k, PY]
                     polygon[k, PX] = to_pixels[0] - to_pixels[2] * (x * axes[0, 0] + y * axes[1, 0])
@@ -227,7 +233,7 @@ def measure_bundle(data, pupil, triangles, crossings, blades, axes):
     Returns
     -------
     ndarray, shape (8,)
-        Integrals over the pupil of weight times 1, x, y, x^2 + y^2 (sensor, upright frame, mm), the accepted pupil area,
+        Integrals over the pupil of weight times 1, x, y, x^2 + y^2 (upright picture, mm), the accepted pupil area,
         and the largest |x|, least y, largest y on the sensor in the meridional frame.
 
     Notes
@@ -244,7 +250,9 @@ def measure_bundle(data, pupil, triangles, crossings, blades, axes):
         if data[triangle[0], ALIVE] * data[triangle[1], ALIVE] * data[triangle[2], ALIVE] == 0.0:
             continue
         for half in range(2):
-            count = clip_triangle(data, pupil, triangle, 1.0 - 2.0 * half, crossings, blades, axes, polygon, other, values)
+            count = clip_triangle(
+                data, pupil, triangle, 1.0 - 2.0 * half, crossings, blades, axes, polygon, other, values
+            )
             for k in range(count):
                 sums[5] = max(sums[5], abs(polygon[k, PX]))
                 sums[6], sums[7] = min(sums[6], polygon[k, PY]), max(sums[7], polygon[k, PY])

@@ -99,9 +99,7 @@ def fill_through_mask(
             piece[k, 0], piece[k, 1] = polygon[k, PX], polygon[k, PY]
         kept = cut_to_rectangle(piece, count, other, values, float(width), float(height))
         if kept >= 3:
-            fill_polygon(
-                piece, kept, density, gx, gy, density_low, density_high, rgb * value, plane, strip
-            )
+            fill_polygon(piece, kept, density, gx, gy, density_low, density_high, rgb * value, plane, strip)
         return
     for k in range(1, count - 1):
         n = _pieces(polygon, k, crossings, mask, half)
@@ -131,6 +129,4 @@ def fill_through_mask(
                         )
                 kept = cut_to_rectangle(piece, 3, other, values, float(width), float(height))
                 if kept >= 3:
-                    fill_polygon(
-                        piece, kept, density, gx, gy, density_low, density_high, rgb * value, plane, strip
-                    )
+                    fill_polygon(piece, kept, density, gx, gy, density_low, density_high, rgb * value, plane, strip)

@@ -54,14 +54,18 @@ def _fill_strip(flat, width, size, row, depth, xl0, xl1, xr0, xr1, start, gx, de
     if rest - whole < 8:
         whole, rest = count, count
     for c in range(whole):
-        strip[c] = _share(float(c), la, lb, l_inverse, ra, rb, r_inverse) * depth * min(
-            max(start + gx * c, density_low), density_high
+        strip[c] = (
+            _share(float(c), la, lb, l_inverse, ra, rb, r_inverse)
+            * depth
+            * min(max(start + gx * c, density_low), density_high)
         )
     for c in range(whole, rest):
         strip[c] = depth * (start + gx * c)
     for c in range(rest, count):
-        strip[c] = _share(float(c), la, lb, l_inverse, ra, rb, r_inverse) * depth * min(
-            max(start + gx * c, density_low), density_high
+        strip[c] = (
+            _share(float(c), la, lb, l_inverse, ra, rb, r_inverse)
+            * depth
+            * min(max(start + gx * c, density_low), density_high)
         )
     for channel in range(3):
         colour = np.float32(rgb[channel])

@@ -90,8 +90,8 @@ def trace_nodes(rows, actions, curvature, conic, z_vertex, inv_semi, n_gap, refl
 
     Notes
     -----
-    physics.md, sequential tracing. A ray ends when it misses, is totally reflected where it should refract, or turns the
-    wrong way along its leg. A mirror beyond the critical angle has R = 1.
+    Hullin 2011, section 4.1. A ray ends when it misses, is totally reflected where it should refract, or turns the wrong
+    way along its leg. A mirror beyond the critical angle has R = 1.
     """
     n_rays = px.shape[0]
     samples = reflectance.shape[1]

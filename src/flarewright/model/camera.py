@@ -21,7 +21,8 @@ class Camera(Frozen):
     sensor_distance : float or None
         Last vertex to sensor in mm, overrides the lens; None: the lens file's, else the paraxial focus.
     focus_distance : float or None
-        Distance of the plane in focus, mm in front of the first vertex, overrides the lens; None: the lens file's, else infinity.
+        Distance of the plane in focus, mm in front of the first vertex, overrides the lens; None: the lens file's,
+        else infinity.
     """
 
     size_px: tuple[int, int] = (1280, 720)

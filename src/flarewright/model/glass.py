@@ -17,7 +17,8 @@ class Dispersion(Frozen):
     glass : str
         Catalogue name, "SCHOTT N-BK7" for example, or "Cauchy" for the last resort.
     formula : {"sellmeier", "polynomial", "cauchy"}
-        sellmeier: n^2 = 1 + c0 + sum B_i L^2 / (L^2 - C_i), coefficients (c0, B1, C1, B2, C2, ...), C_i in micrometres squared;
+        sellmeier: n^2 = 1 + c0 + sum B_i L^2 / (L^2 - C_i), coefficients (c0, B1, C1, B2, C2, ...), C_i in square
+        micrometres;
         polynomial: n^2 = c0 + sum c_k L^{p_k}, coefficients (c0, c1, p1, c2, p2, ...);
         cauchy: n = A + B / L^2, coefficients (A, B). L is the wavelength in micrometres.
     coefficients : tuple of float

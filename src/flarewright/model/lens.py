@@ -67,7 +67,8 @@ class Lens(Frozen):
     f_number : float
         Wide open; together with the focal length it sets the stop.
     field_deg : float or None
-        Half field of view in degrees (object side), used to estimate missing semi-diameters; None: from a 43.3 mm image circle.
+        Half field of view in degrees (object side), used to estimate missing semi-diameters; None: from a 43.3 mm
+        image circle.
     sensor_distance : float or None
         Last vertex to sensor, mm; None puts the sensor at the paraxial focus.
     focus_distance : float or None

@@ -62,7 +62,8 @@ class Light(Frozen):
     Attributes
     ----------
     field_deg : tuple of float
-        Field angles (X, Y) in degrees: the direct image lies near (+efl tan X right, +efl tan Y up) in the upright picture.
+        Field angles (X, Y) in degrees: the direct image lies near (+efl tan X right, +efl tan Y up) in the upright
+        picture.
     intensity : float
         Irradiance (luminous, so a white light of 1 is RGB 1, 1, 1) on a plane that faces the light.
     spectrum : Spectrum

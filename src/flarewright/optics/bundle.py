@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernels.mesh import build_mesh, find_box
+from ..kernels.mesh import build_mesh
+from ..kernels.prepass import find_box
 from ..kernels.trace import STOP_X, trace_nodes
 from .pack import PackedLens
 from .paths import LightPath
@@ -83,7 +84,8 @@ class Bundle:
     traced: dict[int, Floats]
 
 
-def _arguments(packed: PackedLens, w: int | slice | list[int], path: LightPath, tilt: float) -> tuple[Any, ...]:
+def _arguments(packed: PackedLens, w: int | list[int], path: LightPath, tilt: float) -> Any:
+    """List what every tracing kernel takes first."""
     geometry = (packed.curvature, packed.conic, packed.z_vertex, packed.inv_semi)
     return (path.rows, path.actions, *geometry, packed.n_gap[w], packed.reflectance[w], packed.sensor_z, tilt)
 

@@ -123,8 +123,8 @@ def ghost_table(
     Notes
     -----
     Traced on the unbounded sensor plane. A ray counts when it passes every surface's semi-diameter and the round stop
-    at each crossing; R and T are the means of s and p, multiplied along the path. Judged by a plain Monte Carlo tracer in
-    `tests/physics`. The stop and the sensor are placed at the d line whatever the wavelength.
+    at each crossing; R and T are the means of s and p, multiplied along the path. Judged by a plain Monte Carlo tracer
+    in `tests/physics`. The stop and the sensor are placed at the d line whatever the wavelength.
     """
     order = first_order(lens, f_number)
     coatings = resolve_coatings(lens, AsLens() if coating is None else coating)
@@ -183,8 +183,8 @@ def _measure(lens: Lens, packed: PackedLens, path: LightPath, light: Incidence) 
 def _frayed(packed: PackedLens, bundle: Bundle, data: Floats, light: Incidence) -> Floats:
     """Integrate over the triangles in which some rays end, ray by ray: weight times 1, x, y, x^2 + y^2.
 
-    They carry little light, but where rays leave the last surface at a grazing angle it lands so far out that it decides
-    the ghost's size.
+    They carry little light, but where rays leave the last surface at a grazing angle it lands so far out that it
+    decides the ghost's size.
     """
     alive = data[bundle.triangles, ALIVE]
     torn = bundle.triangles[(alive.min(axis=1) == 0.0) & (alive.max(axis=1) > 0.0)]
@@ -220,7 +220,7 @@ def _extent(sums: Floats) -> float:
 def _peak(
     bundle: Bundle, data: Floats, blades: Floats, light: Incidence, centre: tuple[float, float], reach: float
 ) -> tuple[float, float]:
-    """Draw the bundle around its centroid and take the brightest pixel: irradiance per unit light, and the pixel's side."""
+    """Draw the bundle around its centroid; return the brightest pixel's irradiance per unit light, and its side."""
     patch = max(2.0 * reach / PEAK_GRID, 0.01)
     side = min(PEAK_GRID, max(4, ceil(2.0 * reach / patch) + 2))
     plane = np.zeros((3, side, side), dtype=np.float32)

@@ -166,7 +166,8 @@ def _sensor(lens: Lens, system: Matrix, sensor_distance: float | None, focus_dis
         y, u = a * focus + b, c * focus + d
         if u >= 0.0:
             raise LensError(
-                f"{lens.name}: nothing at {focus:g} mm can be focused, that is inside the front focus; focus farther away"
+                f"{lens.name}: nothing at {focus:g} mm can be focused, that is inside the front focus; "
+                "focus farther away"
             )
         found = -y / u
     if found <= 0.0:

@@ -35,7 +35,8 @@ def trace_rays(
     -------
     dict of str to ndarray, shape (N,)
         `x`, `y` on the sensor in the lens' frame (the upright picture is (-x, -y)), `weight` (product of R and T),
-        `rel_radius` (largest r / semi-diameter met), `status` (1 alive, 0 ended), `stop_x`, `stop_y` at the last crossing.
+        `rel_radius` (largest r / semi-diameter met), `status` (1 alive, 0 ended), `stop_x`, `stop_y` at the last
+        crossing.
     """
     light = incidence(field_deg)
     data = trace_points(packed, w, path, light.tilt, np.stack([x, y], axis=1) @ light.axes.T)

@@ -85,8 +85,8 @@ def to_layer(name: str, plane: NDArray[np.float32], pixel_area: float, about: di
     Layer
         Its window is the smallest that holds all light; one black pixel when there is none.
     """
-    lit = plane.any(axis=0)
-    rows, columns = np.flatnonzero(lit.any(axis=1)), np.flatnonzero(lit.any(axis=0))
+    lit = np.any(plane != 0.0, axis=0)
+    rows, columns = np.flatnonzero(np.any(lit, axis=1)), np.flatnonzero(np.any(lit, axis=0))
     if rows.size == 0:
         return Layer(name, np.zeros((1, 1, 3), dtype=np.float32), (0, 0, 1, 1), about)
     y0, y1, x0, x1 = rows[0], rows[-1] + 1, columns[0], columns[-1] + 1

@@ -115,7 +115,7 @@ def starburst_of(settled: Settled, shots: Sequence[Shot], images: Sequence[Direc
 
 
 def _diffracted_wavelengths(shot: Shot) -> Floats:
-    """Steps of 5 nm over the visible range; the lines themselves for a spectrum of lines."""
+    """Return steps of 5 nm over the visible range, or the lines of a spectrum of lines."""
     if isinstance(shot.light.spectrum, Lines):
         return np.array(sorted({nm for nm, _ in shot.light.spectrum.lines}))
     return np.arange(380.0, 781.0, DIFFRACTION_STEP_NM)

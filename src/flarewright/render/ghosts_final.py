@@ -8,6 +8,7 @@ colour runs smoothly instead of in steps.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -121,7 +122,7 @@ def draw_final(item: FinalPass, quality: Quality, canvas: Canvas, visibility: fl
 def _bridges(traced: list[Floats], shot: Shot, scale: float, visibility: float) -> int:
     """Into how many pieces to divide the gap between traced wavelengths: a power of two."""
     widest = 0.0
-    for short, long in zip(traced, traced[1:], strict=False):
+    for short, long in pairwise(traced):
         passing = (short[:, ALIVE] * long[:, ALIVE] > 0.0) & (np.minimum(short[:, REL], long[:, REL]) <= 1.0)
         seen = passing & (np.hypot(short[:, X], short[:, Y]) <= shot.view_radius)
         if seen.any():

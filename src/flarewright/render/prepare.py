@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..errors import LensError, ProjectError
-from ..io.dotlens import read_dotlens
 from ..io.lens_file import read_lens
 from ..io.library import lens_path
 from ..model import Iris, Lens, Project, Surface
+from ..model.raw_lens import RawLens
 from ..optics.paraxial import FirstOrder
 from ..optics.paraxial import first_order as _first_order
 from ..optics.repair import repair
@@ -40,13 +40,10 @@ def load_lens(name_or_path: str | Path, *, remarks: list[str] | None = None) -> 
     """
     told: list[str] = [] if remarks is None else remarks
     path = lens_path(str(name_or_path))
-    if path.suffix.lower() == ".lens":
-        lens, repairs = repair(read_dotlens(path))
-        told.extend(repairs)
-    else:
-        reading = read_lens(path)
-        lens = reading.lens
-        told.extend(reading.remarks)
+    reading = read_lens(path)
+    # a `.lens` table needs optics to tell diameters from semi-diameters, so it is repaired here
+    lens, found = repair(reading) if isinstance(reading, RawLens) else reading
+    told.extend(found)
     return complete_lens(lens, remarks=told)
 
 
@@ -70,21 +67,27 @@ def complete_lens(lens: Lens, *, remarks: list[str] | None = None) -> Lens:
     """
     order = first_order(lens)
     full = complete(lens)
-    estimated = [
-        str(k) for k, row in enumerate(full.rows) if isinstance(row, Surface) and row is not lens.rows[k]
-    ]
+    surfaces = sum(isinstance(row, Surface) for row in full.rows)
+    estimated = [str(k) for k, row in enumerate(full.rows) if isinstance(row, Surface) and row is not lens.rows[k]]
     if remarks is not None:
         if estimated:
-            remarks.append(
-                f"semi-diameters of rows {', '.join(estimated)} are estimated from f/{lens.f_number:g} and the field of view"
+            which = (
+                "all rows" if len(estimated) == surfaces else f"row{'s'[: len(estimated) > 1]} {', '.join(estimated)}"
             )
+            remarks.append(f"semi-diameters of {which} estimated from f/{lens.f_number:g} and the field of view")
         stated = lens.stated_focal_length
         if stated is not None and abs(order.efl / stated - 1.0) > 0.02:
             remarks.append(f"the focal length is {order.efl:.2f} mm, the file says {stated:g} mm")
     return full
 
 
-def first_order(lens: Lens, f_number: float | None = None, **where: float | None) -> FirstOrder:
+def first_order(
+    lens: Lens,
+    f_number: float | None = None,
+    *,
+    sensor_distance: float | None = None,
+    focus_distance: float | None = None,
+) -> FirstOrder:
     """Compute focal length, pupils, stop and sensor position of a lens.
 
     Parameters
@@ -92,8 +95,8 @@ def first_order(lens: Lens, f_number: float | None = None, **where: float | None
     lens : Lens
     f_number : float, optional
         None: wide open.
-    **where
-        `sensor_distance` or `focus_distance` in mm, overriding the lens file's.
+    sensor_distance, focus_distance : float, optional
+        Override the lens file's, mm.
 
     Returns
     -------
@@ -108,9 +111,10 @@ def first_order(lens: Lens, f_number: float | None = None, **where: float | None
     """
     if f_number is not None and f_number < lens.f_number * (1.0 - 1e-6):
         raise ProjectError(
-            f"f/{f_number:g} is faster than {lens.name} opens (f/{lens.f_number:g}); choose f/{lens.f_number:g} or a larger number"
+            f"f/{f_number:g} is faster than {lens.name} opens (f/{lens.f_number:g}); "
+            f"choose f/{lens.f_number:g} or a larger number"
         )
-    return _first_order(lens, f_number, **where)
+    return _first_order(lens, f_number, sensor_distance=sensor_distance, focus_distance=focus_distance)
 
 
 @dataclass(frozen=True)
@@ -150,6 +154,8 @@ def settle(project: Project) -> Settled:
         lens, project.f_number, sensor_distance=camera.sensor_distance, focus_distance=camera.focus_distance
     )
     if order.sensor_distance > 1e5:
-        raise LensError(f"{lens.name}: the sensor would stand {order.sensor_distance / 1000:.0f} m behind the lens; check the focus")
+        raise LensError(
+            f"{lens.name}: the sensor would stand {order.sensor_distance / 1000:.0f} m behind the lens; check the focus"
+        )
     iris = project.iris if project.iris is not None else lens.iris
     return Settled(project, lens, iris, order, tuple(remarks))

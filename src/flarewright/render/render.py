@@ -40,9 +40,7 @@ class Rendering:
     remarks: tuple[str, ...]
 
 
-def render(
-    project: Project, *, threads: int | None = None, progress: Progress | None = None
-) -> Rendering:
+def render(project: Project, *, threads: int | None = None, progress: Progress | None = None) -> Rendering:
     """Render the flare of a project.
 
     Parameters
@@ -76,9 +74,7 @@ def render(
     if project.output.starburst:
         passes.insert(0, starburst_of(settled, shots, images, mask))
     whole = beauty(passes, project.camera.size_px)
-    layers = (whole,)
-    if project.output.layers != "beauty":
-        layers = (whole, *passes, *ghosts.singles)
+    layers = (whole,) if project.output.layers == "beauty" else (whole, *passes, *ghosts.singles)
     return Rendering(project, layers, _summary(settled, shots, images, ghosts), (*settled.remarks, *_remarks(ghosts)))
 
 
@@ -88,9 +84,7 @@ def _remarks(ghosts: GhostPass) -> tuple[str, ...]:
     return (f"{ghosts.culled} ghosts that carry {ghosts.culled_share:.2e} of the ghost light were left out",)
 
 
-def _summary(
-    settled: Settled, shots: tuple[Shot, ...], images: list[DirectImage], ghosts: GhostPass
-) -> dict[str, Any]:
+def _summary(settled: Settled, shots: tuple[Shot, ...], images: list[DirectImage], ghosts: GhostPass) -> dict[str, Any]:
     order, project = settled.order, settled.project
     # an extended scene of radiance L images as L times this (physics.md, "Radiometry"); divides layers into plate units
     scene = pi * images[0].transmittance / (4.0 * order.f_number**2)

@@ -113,7 +113,8 @@ def make_opening(settled: Settled, mask: Floats | None) -> Opening:
     semi = settled.order.stop_semi_diameter
     if mask is not None:
         # the mask ends at its own border, so the border cuts as four blades
-        square = np.array([[1.0, 0.0, semi, 0.0], [0.0, 1.0, semi, 0.0], [-1.0, 0.0, semi, 0.0], [0.0, -1.0, semi, 0.0]])
+        sides = ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))
+        square = np.array([[x, y, semi, 0.0] for x, y in sides])
         return Opening(square, square, float(np.sqrt(2.0) * semi), np.ascontiguousarray(mask, dtype=np.float64), semi)
     iris = settled.iris
     curved = iris.blades == 0 or iris.rounding > 0.0

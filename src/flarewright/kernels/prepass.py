@@ -1,0 +1,218 @@
+"""The pre-pass: where in the pupil a path accepts light, and roughly how much.
+
+The pupil is the plane of the first vertex in the meridional frame: the light comes along y, so the bundle is mirror
+symmetric in x and only x >= 0 is traced (Hullin 2011, section 4.2, "Symmetries").
+"""
+
+import numpy as np
+
+from ._jit import compiled
+from .trace import ALIVE, REL, STOP_X, WEIGHT, X, Y, trace_nodes
+
+# paths seen by fewer cells of the pre-pass than this are searched for spots between its samples
+FEW_CELLS = 12
+PROBES = 8
+
+
+@compiled
+def _outside(value_low, value_high, slack):
+    """Tell whether a quantity stays above 1 between samples, allowing for `slack` of its range below the least."""
+    return value_low - slack * (value_high - value_low) > 1.0
+
+
+@compiled
+def _stop_outside(data, nodes, crossing, iris_radius, slack):
+    """Tell whether a patch misses the iris at one crossing: its widened box in the stop plane lies outside."""
+    u_low, u_high, v_low, v_high = np.inf, -np.inf, np.inf, -np.inf
+    for k in nodes:
+        if data[k, ALIVE] > 0.0:
+            u = data[k, STOP_X + 2 * crossing]
+            v = data[k, STOP_X + 2 * crossing + 1]
+            u_low, u_high = min(u_low, u), max(u_high, u)
+            v_low, v_high = min(v_low, v), max(v_high, v)
+    u_wide, v_wide = slack * (u_high - u_low), slack * (v_high - v_low)
+    du = max(max(u_low - u_wide, -u_high - u_wide), 0.0)
+    dv = max(max(v_low - v_wide, -v_high - v_wide), 0.0)
+    return du * du + dv * dv > iris_radius * iris_radius
+
+
+@compiled
+def rejected(data, nodes, crossings, iris_radius, slack):
+    """Tell whether no ray of a patch can pass: all samples dead, all beyond a rim, or all beside the iris."""
+    low, high, alive = np.inf, -np.inf, 0
+    for k in nodes:
+        if data[k, ALIVE] > 0.0:
+            alive += 1
+            low, high = min(low, data[k, REL]), max(high, data[k, REL])
+    if alive == 0 or _outside(low, high, slack):
+        return True
+    for crossing in range(crossings):
+        if _stop_outside(data, nodes, crossing, iris_radius, slack):
+            return True
+    return False
+
+
+@compiled
+def find_box(
+    rows, actions, curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, tilt,
+    crossings, iris_radius, view_radius, box, nx, ny,
+):  # fmt: skip
+    """Bound the part of the pupil that a path accepts, and estimate what it carries.
+
+    Parameters
+    ----------
+    rows ... tilt
+        As in `trace_nodes`.
+    crossings : int
+        How often the path crosses the stop.
+    iris_radius : float
+        Radius of the circle around the iris, mm.
+    view_radius : float
+        Radius around the axis that the picture covers, mm.
+    box : ndarray, shape (4,)
+        x0, x1, y0, y1 of the pupil to look at.
+    nx, ny : int
+        Cells of the pre-pass.
+
+    Returns
+    -------
+    found : ndarray, shape (4,)
+        The box of all cells that may pass light; x1 < x0 when there is none.
+    sums : ndarray, shape (4,)
+        Rough estimates from the cells that may pass, both halves, per unit irradiance: flux; flux that lands within
+        `view_radius`; the integral of flux times irradiance; cells that may touch the view.
+
+    Notes
+    -----
+    Hullin 2011, section 4.2, "Ray Bounding". A cell is kept unless one of its limits is exceeded at every corner by
+    more than half its variation over the cell. Where few cells are kept, cells whose limits change fast are searched
+    with a finer grid, so that spots between the samples are found too.
+    """
+    width = ny + 1
+    count = (nx + 1) * width
+    hx, hy = (box[1] - box[0]) / nx, (box[3] - box[2]) / ny
+    px, py = np.empty(count), np.empty(count)
+    for a in range(nx + 1):
+        for b in range(width):
+            px[a * width + b] = box[0] + a * hx
+            py[a * width + b] = box[2] + b * hy
+    data = np.empty((count, STOP_X + 2 * crossings))
+    trace_nodes(rows, actions, curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, tilt, px, py, data)
+    found = np.array([np.inf, -np.inf, np.inf, -np.inf])
+    sums = np.zeros(4)
+    nodes = np.empty(4, dtype=np.int64)
+    share = hx * hy * np.cos(tilt)
+    accepted = 0
+    doubtful = np.empty(nx * ny, dtype=np.int64)
+    n_doubtful = 0
+    for a in range(nx):
+        for b in range(ny):
+            nodes[0], nodes[1] = a * width + b, a * width + b + 1
+            nodes[2], nodes[3] = nodes[0] + width, nodes[1] + width
+            if not rejected(data, nodes, crossings, iris_radius, 0.5):
+                found[0], found[1] = min(found[0], box[0] + a * hx), max(found[1], box[0] + (a + 1) * hx)
+                found[2], found[3] = min(found[2], box[2] + b * hy), max(found[3], box[2] + (b + 1) * hy)
+                _weigh(data, nodes, share, view_radius, sums)
+                accepted += 1
+            elif _doubtful(data, nodes, nx, ny, crossings, iris_radius):
+                doubtful[n_doubtful] = a * ny + b
+                n_doubtful += 1
+    if accepted < FEW_CELLS and n_doubtful > 0:
+        # a spot smaller than a cell may hide between the samples
+        corners = np.empty((n_doubtful, 2))
+        for k in range(n_doubtful):
+            corners[k, 0] = box[0] + (doubtful[k] // ny) * hx
+            corners[k, 1] = box[2] + (doubtful[k] % ny) * hy
+        _probe(
+            rows, actions, curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, tilt,
+            crossings, iris_radius, corners, hx, hy, found, sums,
+        )  # fmt: skip
+    # the pre-pass sees one wavelength and straight cells: leave a cell of room around
+    for m in range(2):
+        step = hx if m == 0 else hy
+        found[2 * m] = max(found[2 * m] - step, box[2 * m])
+        found[2 * m + 1] = min(found[2 * m + 1] + step, box[2 * m + 1])
+    return found, sums
+
+
+@compiled
+def _doubtful(data, nodes, nx, ny, crossings, iris_radius):
+    """Tell whether a rejected cell may still hold a spot: limits change so fast around it that they may dip below 1."""
+    low, change, alive = np.inf, 0.0, 0
+    width = ny + 1
+    for k in nodes:
+        if data[k, ALIVE] == 0.0:
+            continue
+        alive += 1
+        low = min(low, data[k, REL])
+        a, b = k // width, k % width
+        for m in range(4):
+            i = a + (1 if m == 0 else (-1 if m == 1 else 0))
+            j = b + (1 if m == 2 else (-1 if m == 3 else 0))
+            if 0 <= i <= nx and 0 <= j <= ny:
+                # beside a ray that ends, anything may happen
+                step = abs(data[i * width + j, REL] - data[k, REL]) if data[i * width + j, ALIVE] > 0.0 else np.inf
+                change = max(change, step)
+    if alive == 0 or low - 1.5 * change > 1.0:
+        return False
+    if alive < nodes.size:
+        return True
+    for crossing in range(crossings):
+        if _stop_outside(data, nodes, crossing, iris_radius, 1.5):
+            return False
+    return True
+
+
+@compiled
+def _probe(
+    rows, actions, curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, tilt,
+    crossings, iris_radius, corners, hx, hy, found, sums,
+):  # fmt: skip
+    """Look into doubtful cells with PROBES x PROBES rays each and widen the box by what passes."""
+    each = PROBES * PROBES
+    px, py = np.empty(corners.shape[0] * each), np.empty(corners.shape[0] * each)
+    for k in range(px.size):
+        cell, m = k // each, k % each
+        px[k] = corners[cell, 0] + (m // PROBES + 0.5) * hx / PROBES
+        py[k] = corners[cell, 1] + (m % PROBES + 0.5) * hy / PROBES
+    data = np.empty((px.size, STOP_X + 2 * crossings))
+    trace_nodes(rows, actions, curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, tilt, px, py, data)
+    for k in range(px.size):
+        passes = data[k, ALIVE] > 0.0 and data[k, REL] <= 1.0
+        for c in range(crossings):
+            u, v = data[k, STOP_X + 2 * c], data[k, STOP_X + 2 * c + 1]
+            passes = passes and u * u + v * v <= iris_radius * iris_radius
+        if passes:
+            found[0], found[1] = min(found[0], px[k] - hx / PROBES), max(found[1], px[k] + hx / PROBES)
+            found[2], found[3] = min(found[2], py[k] - hy / PROBES), max(found[3], py[k] + hy / PROBES)
+            sums[0] += 2.0 * data[k, WEIGHT] * hx * hy / each * np.cos(tilt)
+            sums[3] += 1.0
+
+
+@compiled
+def _weigh(data, nodes, share, view_radius, sums):
+    """Add a pre-pass cell's flux, seen flux, flux times irradiance and visibility, for both halves of the pupil."""
+    weight, alive = 0.0, 0
+    x_low, x_high, y_low, y_high = np.inf, -np.inf, np.inf, -np.inf
+    for k in nodes:
+        if data[k, ALIVE] > 0.0:
+            alive += 1
+            weight += data[k, WEIGHT]
+            x_low, x_high = min(x_low, data[k, X]), max(x_high, data[k, X])
+            y_low, y_high = min(y_low, data[k, Y]), max(y_high, data[k, Y])
+    flux = 2.0 * weight * 0.25 * share
+    sums[0] += flux
+    out_x, out_y = max(max(x_low, -x_high), 0.0), max(max(y_low, -y_high), 0.0)
+    if out_x * out_x + out_y * out_y > view_radius * view_radius:
+        return
+    sums[3] += 1.0
+    # the part of the cell's box on the sensor that the view can hold
+    width, height = x_high - x_low, y_high - y_low
+    part = min(1.0, 2.0 * view_radius / max(width, 1e-9)) * min(1.0, 2.0 * view_radius / max(height, 1e-9))
+    sums[1] += flux * part
+    if alive == 4:
+        a, b, c, d = nodes[0], nodes[1], nodes[3], nodes[2]
+        area = (data[c, X] - data[a, X]) * (data[d, Y] - data[b, Y]) - (data[c, Y] - data[a, Y]) * (
+            data[d, X] - data[b, X]
+        )
+        sums[2] += flux * flux / max(abs(area), 1e-6)
