@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, TypeVar
+from typing import Any
 
 from numba import njit
-
-F = TypeVar("F", bound=Callable[..., Any])
 
 # contract, reassoc, arcp, nsz and afn keep tests for NaN and infinity legal, unlike fastmath=True
 _FASTMATH = {"contract", "reassoc", "arcp", "nsz", "afn"}
 
 
-def compiled(function: F) -> F:
+def compiled(function: Callable[..., Any]) -> Any:
     """Compile a kernel that Python calls."""
     return njit(function, cache=True, nogil=True, error_model="numpy", fastmath=_FASTMATH)
 
 
-def inlined(function: F) -> F:
+def inlined(function: Callable[..., Any]) -> Any:
     """Compile a formula that kernels call, inlined so that loops over lanes vectorise."""
     return njit(function, inline="always", error_model="numpy", fastmath=_FASTMATH)

@@ -36,7 +36,7 @@ def intersect_conic(curvature, conic, x, y, z, dx, dy, dz, heading):
     -----
     The vertex form c (x^2 + y^2 + (1 + k) z^2) = 2 z needs no branch for planes. Of the two hits it takes the one that
     tends to the vertex: t = C / (-B + heading sqrt(B^2 - A C)), which for a sphere is
-    t = -D.d - sgn(R d_z) sqrt((D.d)^2 - |D|^2 + R^2) (physics.md, sequential tracing).
+    t = -D.d - sgn(R d_z) sqrt((D.d)^2 - |D|^2 + R^2) (docs/physics.md, sequential tracing).
     """
     a = curvature * (1.0 + conic * dz * dz)
     b = curvature * (x * dx + y * dy + (1.0 + conic) * z * dz) - dz

@@ -35,7 +35,7 @@ def path_matrices(rows, actions, curvature, z_vertex, n_gap, sensor_z, to_stop):
     Notes
     -----
     Rays (y, u); refraction [[1, 0], [(n1 - n2) / (n2 Re), n1 / n2]], reflection [[1, 0], [2 / Re, 1]], Re = +R on
-    forward and -R on backward legs (physics.md; Lee and Eisemann 2013 with the sign of the second mirror corrected).
+    forward and -R on backward legs (docs/physics.md; Lee and Eisemann 2013, the sign of the second mirror corrected).
     """
     a, b, c, d = 1.0, 0.0, 0.0, 1.0
     heading, here = 1.0, 0.0

@@ -114,8 +114,8 @@ def build_mesh(
     Parameters
     ----------
     rows ... iris_radius
-        As in `kernels.prepass.find_box`, but `n_gap` (V, K + 1) and `reflectance` (V, K, M) at the few
-        wavelengths that the grid shall fit: a cell is left out when none of them passes and refined when one of them asks for it.
+        As in `kernels.prepass.find_box`, but `n_gap` (V, K + 1) and `reflectance` (V, K, M) at the few wavelengths
+        that the grid shall fit: a cell is left out when none of them passes and refined when one of them asks for it.
     box : ndarray, shape (4,)
         Pupil region, mm.
     nx, ny : int

@@ -49,8 +49,8 @@ def bend(curvature, conic, x, y, z, dx, dy, dz, root, heading, eta, mirror):
 
     Notes
     -----
-    d' = eta d + (eta c - sqrt k) N and d' = d + 2 c N with c = -N.d, k = 1 - eta^2 (1 - c^2) (physics.md). The normal
-    against the ray is heading * gradient / norm, which holds beyond a sphere's equator too.
+    d' = eta d + (eta c - sqrt k) N and d' = d + 2 c N with c = -N.d, k = 1 - eta^2 (1 - c^2) (docs/physics.md). The
+    normal against the ray is heading * gradient / norm, which holds beyond a sphere's equator too.
     """
     gx = curvature * x
     gy = curvature * y
@@ -90,8 +90,8 @@ def trace_nodes(rows, actions, curvature, conic, z_vertex, inv_semi, n_gap, refl
 
     Notes
     -----
-    Hullin 2011, section 4.1. A ray ends when it misses, is totally reflected where it should refract, or turns the wrong
-    way along its leg. A mirror beyond the critical angle has R = 1.
+    Hullin 2011, section 4.1. A ray ends when it misses, is totally reflected where it should refract, or turns the
+    wrong way along its leg. A mirror beyond the critical angle has R = 1.
     """
     n_rays = px.shape[0]
     samples = reflectance.shape[1]

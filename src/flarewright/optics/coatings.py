@@ -120,7 +120,7 @@ def stack_reflectance(
 
     Notes
     -----
-    physics.md "Fresnel and thin films"; H. A. Macleod, Thin-Film Optical Filters, section 2.4.
+    docs/physics.md "Fresnel and thin films"; H. A. Macleod, Thin-Film Optical Filters, section 2.4.
     Limits are tested in tests/optics/test_coatings.py.
     """
     R, _ = stack_reflectance_transmittance(n_front, n_back, indices, thicknesses_nm, wavelength_nm, cos_front)

@@ -48,7 +48,7 @@ class GhostRow:
         Largest irradiance, averaged over a square of side `peak_patch_mm`, per flux of the direct image, 1/mm^2.
     peak_patch_mm : float
     bounded_by : {"stop", "entrance"}
-        Which edge shapes the ghost: the smaller of the two as projected to the entrance (physics.md).
+        Which edge shapes the ghost: the smaller of the two as projected to the entrance (docs/physics.md).
     focus_distance_mm : float or None
         Where the path focuses a distant light, mm behind the sensor (negative: in front); None for an afocal path.
     """
@@ -234,7 +234,7 @@ def _peak(
 
 
 def _paraxial_facts(lens: Lens, packed: PackedLens, path: LightPath) -> tuple[str, float | None]:
-    """Tell which edge bounds a ghost, and where the path focuses (physics.md, "Ray transfer matrices")."""
+    """Tell which edge bounds a ghost, and where the path focuses (docs/physics.md, "Ray transfer matrices")."""
     to_stop, total = path_matrices(lens, path, float(packed.wavelengths_nm[0]), packed.sensor_z)
     entrance = packed.semi[0] if packed.inv_semi[0] > 0.0 else packed.semi[1]
     stop_height = min((packed.stop_semi / max(abs(Ma[0, 0]), 1e-12)) for Ma in to_stop)

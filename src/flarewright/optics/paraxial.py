@@ -1,6 +1,6 @@
 """First-order optics by ray transfer matrices: system, pupils, flare matrices Ma and Ms.
 
-Rays are (y, u), the path is unfolded so that distances run forward (physics.md, "Ray transfer matrices").
+Rays are (y, u), the path is unfolded so that distances run forward (docs/physics.md, "Ray transfer matrices").
 """
 
 from __future__ import annotations

@@ -55,7 +55,7 @@ def render(project: Project, *, threads: int | None = None, progress: Progress |
     -------
     Rendering
         Layers of irradiance on the sensor, in units of the irradiance that a light of intensity 1 gives on a plane
-        facing it (physics.md, "Radiometry").
+        facing it (docs/physics.md, "Radiometry").
 
     Raises
     ------
@@ -86,7 +86,8 @@ def _remarks(ghosts: GhostPass) -> tuple[str, ...]:
 
 def _summary(settled: Settled, shots: tuple[Shot, ...], images: list[DirectImage], ghosts: GhostPass) -> dict[str, Any]:
     order, project = settled.order, settled.project
-    # an extended scene of radiance L images as L times this (physics.md, "Radiometry"); divides layers into plate units
+    # an extended scene of radiance L images as L times this (docs/physics.md, "Radiometry"): layers divided by it are in
+    # the plate's unit
     scene = pi * images[0].transmittance / (4.0 * order.f_number**2)
     return {
         "lens": settled.lens.name,
