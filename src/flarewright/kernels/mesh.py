@@ -8,6 +8,8 @@ from .trace import ALIVE, REL, STOP_X, WEIGHT, X, Y, trace_nodes
 
 # a FLAT leaf is good enough without its edges' middles, a LEAF needs them
 UNKNOWN, LEAF, SPLIT, EMPTY, FLAT = 0, 1, 2, 3, 4
+# away from the rim positions may err by this part of the cell
+INNER_BEND = 0.02
 # cells that the rim crosses are halved at least this often
 RIM_LEVEL = 2
 
@@ -35,6 +37,7 @@ def _judge(data, nodes, crossings, iris_radius, level, max_level, h, tolerance, 
         return FLAT
     extent = max(x_high - x_low, y_high - y_low) * scale
     error = 0.0
+    at_rim = False
     # the rim of the bundle decides its flux, so it is resolved however small the ghost is
     for limit in range(1 + crossings):
         low, high, bend = _limit_range(data, nodes, limit, iris_radius)
@@ -42,11 +45,14 @@ def _judge(data, nodes, crossings, iris_radius, level, max_level, h, tolerance, 
             # a rim met by several surfaces has corners that a coarse cell cannot tell
             if level < RIM_LEVEL:
                 return SPLIT
+            at_rim = True
             part = bend / (high - low)
             error = max(error, part * h / flux_tolerance, part * extent / tolerance)
     if extent >= 1.0:
         bend_x, bend_y = _bend(data, nodes, X), _bend(data, nodes, Y)
-        error = max(error, np.sqrt(bend_x * bend_x + bend_y * bend_y) * scale / tolerance)
+        # away from the rim nothing marks a place: an error that is small beside a wide cell is not seen
+        allowed = tolerance if at_rim else max(tolerance, INNER_BEND * extent)
+        error = max(error, np.sqrt(bend_x * bend_x + bend_y * bend_y) * scale / allowed)
     if extent > 2.0:
         area_low, area_high = _fan_areas(data, nodes)
         if area_low * area_high <= 0.0:

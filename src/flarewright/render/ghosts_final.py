@@ -24,7 +24,8 @@ from .shot import Shot
 Floats = NDArray[np.float64]
 
 # lateral colour wider than this many pixels between two drawn wavelengths would show as steps
-BRIDGE_PX = 1.5
+BRIDGE_PX = 2.0
+SHIFT_QUANTILE = 0.9
 # ghosts fainter than these parts of the picture's mean are drawn at a half and a quarter of the resolution
 DETAIL_CONTRAST = (4e-3, 1e-3)
 # a step of colour fainter than this part of the picture's mean is not seen
@@ -106,12 +107,12 @@ def draw_final(item: FinalPass, quality: Quality, canvas: Canvas, visibility: fl
     )  # fmt: skip
     count = len(shot.packed.wavelengths_nm)
     traced = [trace_bundle(shot.packed, w, bundle, tilt) for w in range(count)]
-    pieces = _bridges(traced, shot, scale, visibility) if quality.bridge else 1
-    fine_nm = _refine(shot.packed.wavelengths_nm, pieces)
-    for m, rgb in enumerate(shot.weights(fine_nm)):
+    pieces = _bridges(traced, shot, scale, visibility) if quality.bridge else [1] * (count - 1)
+    steps = [(w, k / n) for w, n in enumerate(pieces) for k in range(n)] + [(count - 1, 0.0)]
+    fine_nm = np.interp([w + part for w, part in steps], np.arange(count), shot.packed.wavelengths_nm)
+    for (w, part), rgb in zip(steps, shot.weights(fine_nm), strict=True):
         if rgb.any():
-            w, part = divmod(m, pieces)
-            data = traced[w] if part == 0 else _between(traced[w], traced[w + 1], part / pieces)
+            data = traced[w] if part == 0.0 else _between(traced[w], traced[w + 1], part)
             draw_bundle(
                 data, bundle.pupil, bundle.triangles, node_densities(data, bundle.pupil, bundle.triangles),
                 path.stop_crossings, opening.blades, opening.mask, opening.half, shot.incidence.axes,
@@ -119,26 +120,18 @@ def draw_final(item: FinalPass, quality: Quality, canvas: Canvas, visibility: fl
             )  # fmt: skip
 
 
-def _bridges(traced: list[Floats], shot: Shot, scale: float, visibility: float) -> int:
-    """Into how many pieces to divide the gap between traced wavelengths: a power of two."""
-    widest = 0.0
+def _bridges(traced: list[Floats], shot: Shot, scale: float, visibility: float) -> list[int]:
+    """Into how many pieces to divide each gap between traced wavelengths, so that nothing steps farther than is seen."""
+    most = min(MOST_BRIDGES, max(1, int(visibility / STEP_CONTRAST))) if visibility < float("inf") else MOST_BRIDGES
+    pieces = []
     for short, long in pairwise(traced):
         passing = (short[:, ALIVE] * long[:, ALIVE] > 0.0) & (np.minimum(short[:, REL], long[:, REL]) <= 1.0)
         seen = passing & (np.hypot(short[:, X], short[:, Y]) <= shot.view_radius)
-        if seen.any():
-            shift = np.hypot(long[seen, X] - short[seen, X], long[seen, Y] - short[seen, Y])
-            widest = max(widest, float(shift.max()) * scale)
-    pieces = 1
-    while widest > BRIDGE_PX * pieces and visibility > STEP_CONTRAST * pieces and pieces < MOST_BRIDGES:
-        pieces *= 2
+        shift = np.hypot(long[seen, X] - short[seen, X], long[seen, Y] - short[seen, Y]) * scale
+        # the few nodes that fly farthest carry hardly any light
+        wide = float(np.quantile(shift, SHIFT_QUANTILE)) if shift.size else 0.0
+        pieces.append(int(np.clip(np.ceil(wide / BRIDGE_PX), 1, most)))
     return pieces
-
-
-def _refine(wavelengths_nm: Floats, pieces: int) -> Floats:
-    """Divide every gap between wavelengths into equal pieces."""
-    count = len(wavelengths_nm)
-    at = np.arange((count - 1) * pieces + 1) / pieces
-    return np.interp(at, np.arange(count), wavelengths_nm)
 
 
 def _between(short: Floats, long: Floats, part: float) -> Floats:

@@ -86,8 +86,8 @@ def _remarks(ghosts: GhostPass) -> tuple[str, ...]:
 
 def _summary(settled: Settled, shots: tuple[Shot, ...], images: list[DirectImage], ghosts: GhostPass) -> dict[str, Any]:
     order, project = settled.order, settled.project
-    # an extended scene of radiance L images as L times this (docs/physics.md, "Radiometry"): layers divided by it are in
-    # the plate's unit
+    # an extended scene of radiance L images as L times this (docs/physics.md, "Radiometry"): layers divided by it are
+    # in the unit of the plate
     scene = pi * images[0].transmittance / (4.0 * order.f_number**2)
     return {
         "lens": settled.lens.name,
