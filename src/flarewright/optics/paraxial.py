@@ -89,6 +89,23 @@ def path_matrices(lens: Lens, path: LightPath, wavelength_nm: float, sensor_z: f
     return list(to_stop), np.array(total).reshape(2, 2)
 
 
+def flare_matrices(lens: Lens, path: LightPath, wavelength_nm: float, sensor_z: float) -> tuple[Matrix, Matrix]:
+    """Split a path at its first crossing of the stop.
+
+    Parameters
+    ----------
+    lens, path, wavelength_nm, sensor_z
+        As in `path_matrices`.
+
+    Returns
+    -------
+    Ma, Ms : ndarray, shape (2, 2)
+        r_stop = Ma r_in and r_sensor = Ms r_stop (Lee and Eisemann 2013; Van Acoleyen 2025, section 4.3.1).
+    """
+    to_stop, total = path_matrices(lens, path, wavelength_nm, sensor_z)
+    return to_stop[0], total @ np.linalg.inv(to_stop[0])
+
+
 def first_order(
     lens: Lens,
     f_number: float | None = None,
@@ -128,7 +145,7 @@ def first_order(
     number = lens.f_number if f_number is None else f_number
     pupil = efl / number
     (sa, sb), _ = to_stop
-    rear = system @ np.linalg.inv(to_stop)
+    _, rear = flare_matrices(lens, direct_path(lens), wavelength_nm, last)
     exit_diameter, exit_z = _exit_pupil(rear, abs(sa) * pupil)
     return FirstOrder(
         efl=float(efl),

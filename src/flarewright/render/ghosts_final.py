@@ -121,7 +121,7 @@ def draw_final(item: FinalPass, quality: Quality, canvas: Canvas, visibility: fl
 
 
 def _bridges(traced: list[Floats], shot: Shot, scale: float, visibility: float) -> list[int]:
-    """Into how many pieces to divide each gap between traced wavelengths, so that nothing steps farther than is seen."""
+    """Into how many pieces to divide each gap between traced wavelengths so that no step is seen."""
     most = min(MOST_BRIDGES, max(1, int(visibility / STEP_CONTRAST))) if visibility < float("inf") else MOST_BRIDGES
     pieces = []
     for short, long in pairwise(traced):
