@@ -7,11 +7,13 @@ import numpy as np
 from ._jit import compiled
 from .clip import MAX_VERTICES, PP, PQ, PREL, PSTOP, PW, PX, PY, cut_by_blades, cut_to_rectangle, polygon_area
 from .mask import fill_through_mask
-from .raster import fill_polygon, splat_line
+from .raster import fill_polygon
 from .trace import REFLECT, STOP
 
 # straight edges that stand for the round rim of the entrance
 RIM = 64
+# side of the square that stands for a point, pixels
+SPOT = 0.05
 
 
 @compiled
@@ -164,8 +166,9 @@ def draw_matrix_ghosts(
                 polygon[k, PY] = to_pixels[1] + to_pixels[3] * (x * axes[0, 1] + y * axes[1, 1])
             area = abs(polygon_area(polygon, count, PX, PY))
             if area < 1e-4:
-                splat_line(polygon[0, PX], polygon[0, PY], polygon[0, PX], polygon[0, PY], flux, rgb[w], plane)
-                continue
+                # a focus: a small square holds its light
+                count = _square(polygon, polygon[0, PX], polygon[0, PY])
+                area = SPOT * SPOT
             even = flux / area
             if mask.size > 1:
                 fill_through_mask(
@@ -176,6 +179,17 @@ def draw_matrix_ghosts(
             count = cut_to_rectangle(polygon, count, other, values, float(width), float(height))
             if count >= 3:
                 fill_polygon(polygon, count, even, 0.0, 0.0, even, even, rgb[w], plane, strip)
+
+
+@compiled
+def _square(polygon, x, y):
+    """Replace a polygon without area by a small square around a point, its places in the stop kept."""
+    for k in range(4):
+        for m in range(polygon.shape[1]):
+            polygon[k, m] = polygon[0, m]
+        polygon[k, PX] = x + SPOT * (0.5 if k in (1, 2) else -0.5)
+        polygon[k, PY] = y + SPOT * (0.5 if k in (2, 3) else -0.5)
+    return 4
 
 
 @compiled

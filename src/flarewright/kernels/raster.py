@@ -75,6 +75,54 @@ def _fill_strip(flat, width, size, row, depth, xl0, xl1, xr0, xr1, start, gx, de
 
 
 @compiled
+def _mark_strip(flat, width, size, row, depth, xl0, xl1, xr0, xr1, density, rgb):
+    """Add a strip of even density to a picture of differences along its rows: only the pixels at its edges change."""
+    la, lb = min(xl0, xl1), max(xl0, xl1)
+    ra, rb = min(xr0, xr1), max(xr0, xr1)
+    first = int(la)
+    count = min(int(rb) + 1, width) - first
+    la, lb, ra, rb = la - first, lb - first, ra - first, rb - first
+    l_inverse, r_inverse = 0.5 / max(lb - la, 1e-9), 0.5 / max(rb - ra, 1e-9)
+    whole, rest = int(lb) + 1, int(ra)
+    if rest < whole:
+        whole, rest = count, count
+    before = 0.0
+    for part in range(2):
+        # the pixels of the left edge and the first whole one, then those of the right edge and the first behind it
+        start, end = (0, whole) if part == 0 else (rest, count)
+        for c in range(start, end + 1):
+            here = 0.0
+            if c < end:
+                here = _share(float(c), la, lb, l_inverse, ra, rb, r_inverse)
+            elif part == 0 and whole < rest:
+                here = 1.0
+            if first + c < width:
+                place = np.uint64(row * width + first + c)
+                change = (here - before) * depth * density
+                flat[place] += rgb[0] * change
+                flat[place + np.uint64(size)] += rgb[1] * change
+                flat[place + np.uint64(2 * size)] += rgb[2] * change
+            before = here
+
+
+@compiled
+def sum_rows(differences):
+    """Turn a picture of differences into the picture, in place.
+
+    Parameters
+    ----------
+    differences : ndarray, shape (3, H, W), float64
+        As `fill_polygon` leaves it when it marks.
+    """
+    for channel in range(differences.shape[0]):
+        for row in range(differences.shape[1]):
+            total = 0.0
+            for c in range(differences.shape[2]):
+                total += differences[channel, row, c]
+                differences[channel, row, c] = total
+
+
+@compiled
 def fill_polygon(polygon, count, density, gx, gy, density_low, density_high, rgb, plane, strip):
     """Add a convex polygon with linearly varying density to a picture.
 
@@ -88,10 +136,11 @@ def fill_polygon(polygon, count, density, gx, gy, density_low, density_high, rgb
     density_low, density_high : float
         Bounds kept at pixels whose centre lies outside the polygon.
     rgb : ndarray, shape (3,)
-    plane : ndarray, shape (3, H, W), float32
+    plane : ndarray, shape (3, H, W)
         Added to.
     strip : ndarray, shape (>= W + 1,), float32
-        Scratch.
+        Scratch. Empty: the density is even, and only the differences along the rows are marked, which costs no more for
+        large polygons than for small ones; `sum_rows` turns them into the picture.
 
     Notes
     -----
@@ -136,11 +185,29 @@ def fill_polygon(polygon, count, density, gx, gy, density_low, density_high, rgb
         if y_next > y and row <= last_row:
             xl, xr = polygon[left, PX], polygon[right, PX]
             yl, yr = polygon[left, PY], polygon[right, PY]
-            _fill_strip(
-                flat, width, size, row, y_next - y, xl + (y - yl) * left_slope, xl + (y_next - yl) * left_slope,
-                xr + (y - yr) * right_slope, xr + (y_next - yr) * right_slope,
-                density + gy * (row + 0.5), gx, density_low, density_high, rgb, strip,
-            )  # fmt: skip
+            xl0, xl1 = xl + (y - yl) * left_slope, xl + (y_next - yl) * left_slope
+            xr0, xr1 = xr + (y - yr) * right_slope, xr + (y_next - yr) * right_slope
+            if strip.size == 0:
+                _mark_strip(flat, width, size, row, y_next - y, xl0, xl1, xr0, xr1, density, rgb)
+            else:
+                base = density + gy * (row + 0.5)
+                _fill_strip(
+                    flat,
+                    width,
+                    size,
+                    row,
+                    y_next - y,
+                    xl0,
+                    xl1,
+                    xr0,
+                    xr1,
+                    base,
+                    gx,
+                    density_low,
+                    density_high,
+                    rgb,
+                    strip,
+                )
         if left_end <= y_next:
             left = _step(left, count - way, count)
         if right_end <= y_next:

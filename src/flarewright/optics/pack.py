@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -153,7 +154,15 @@ def _reflectance(
         # films are designed at the d line and keep their index
         indices, thicknesses_nm = film_stack(coatings[k], n_d[k], n_d[k + 1])
         for w, wavelength_nm in enumerate(wavelengths_nm):
-            table[w, k] = reflectance_table(
-                n_gap[w, k], n_gap[w, k + 1], indices, thicknesses_nm, float(wavelength_nm), REFLECTANCE_SAMPLES
+            table[w, k] = _table(
+                float(n_gap[w, k]), float(n_gap[w, k + 1]), indices, thicknesses_nm, float(wavelength_nm)
             )
     return table
+
+
+@lru_cache(maxsize=4096)
+def _table(
+    n_front: float, n_back: float, indices: tuple[float, ...], thicknesses_nm: tuple[float, ...], wavelength_nm: float
+) -> NDArray[np.float64]:
+    """Remember the tables of surfaces that a dragging hand asks for again and again (8 kB each)."""
+    return reflectance_table(n_front, n_back, indices, thicknesses_nm, wavelength_nm, REFLECTANCE_SAMPLES)

@@ -7,7 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..kernels.interleave import interleave, lit_window
 from ..model import Layer
+
+Plane = NDArray[np.float32] | NDArray[np.float64]
 
 # a canvas can also hold light at half and at a quarter of the resolution
 DETAILS = 3
@@ -68,13 +71,13 @@ def blank(size_px: tuple[int, int]) -> Canvas:
     return Canvas(size_px, [None] * DETAILS, np.empty(size_px[0] + 1, dtype=np.float32))
 
 
-def to_layer(name: str, plane: NDArray[np.float32], pixel_area: float, about: dict[str, str | float]) -> Layer:
+def to_layer(name: str, plane: Plane, pixel_area: float, about: dict[str, str | float]) -> Layer:
     """Crop a plane of flux to what is not black and turn it into irradiance.
 
     Parameters
     ----------
     name : str
-    plane : ndarray, shape (3, H, W), float32
+    plane : ndarray, shape (3, H, W)
         Flux per pixel.
     pixel_area : float
         mm^2.
@@ -85,10 +88,9 @@ def to_layer(name: str, plane: NDArray[np.float32], pixel_area: float, about: di
     Layer
         Its window is the smallest that holds all light; one black pixel when there is none.
     """
-    lit = np.any(plane != 0.0, axis=0)
-    rows, columns = np.flatnonzero(np.any(lit, axis=1)), np.flatnonzero(np.any(lit, axis=0))
-    if rows.size == 0:
+    x0, y0, x1, y1 = lit_window(plane)
+    if x1 <= x0:
         return Layer(name, np.zeros((1, 1, 3), dtype=np.float32), (0, 0, 1, 1), about)
-    y0, y1, x0, x1 = rows[0], rows[-1] + 1, columns[0], columns[-1] + 1
-    pixels = np.ascontiguousarray(plane[:, y0:y1, x0:x1].transpose(1, 2, 0)) * np.float32(1.0 / pixel_area)
-    return Layer(name, pixels, (int(x0), int(y0), int(x1 - x0), int(y1 - y0)), about)
+    pixels = np.empty((y1 - y0, x1 - x0, 3), dtype=np.float32)
+    interleave(plane, x0, y0, 1.0 / pixel_area, pixels)
+    return Layer(name, pixels, (x0, y0, x1 - x0, y1 - y0), about)

@@ -33,7 +33,7 @@ def beauty(layers: Sequence[Layer], size_px: tuple[int, int] | None = None) -> L
 
     Notes
     -----
-    The sum runs in double precision in the order given, so it does not depend on the number of threads.
+    The sum runs in the order given, so it does not depend on the number of threads.
     """
     if size_px is None:
         if not layers:
@@ -43,10 +43,10 @@ def beauty(layers: Sequence[Layer], size_px: tuple[int, int] | None = None) -> L
             max(1, *(layer.window[1] + layer.window[3] for layer in layers)),
         )
     width, height = size_px
-    total = np.zeros((height, width, 3), np.float64)
+    total = np.zeros((height, width, 3), np.float32)
     for layer in layers:
         x, y, w, h = layer.window
         left, top, right, bottom = max(x, 0), max(y, 0), min(x + w, width), min(y + h, height)
         if left < right and top < bottom:
             total[top:bottom, left:right] += layer.pixels[top - y : bottom - y, left - x : right - x]
-    return Layer("beauty", total.astype(np.float32), (0, 0, width, height))
+    return Layer("beauty", total, (0, 0, width, height))

@@ -10,9 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..kernels.raster import sum_rows
 from ..model import Layer, Quality
 from ..optics.paths import LightPath
-from .canvas import blank, to_layer
+from .canvas import Plane, blank, to_layer
 from .ghosts_draft import draw_draft
 from .ghosts_final import FinalPass, contrast, draw_final, find_final
 from .shot import Shot
@@ -21,6 +22,7 @@ Progress = Callable[[float, str], None]
 
 # pictures drawn side by side before they are added: fixed by size, never by threads, so sums round alike everywhere
 _CHUNKS = ((1_100_000, 8), (2_500_000, 4))
+_PATHS_A_CHUNK = 16
 
 
 @dataclass(frozen=True)
@@ -127,7 +129,7 @@ def _final(
 
     alone = set(order if singles is None else order[:singles])
 
-    def draw(group: list[int]) -> NDArray[np.float32]:
+    def draw(group: list[int]) -> Plane:
         canvas = blank(shots[0].size_px)
         for k in group:
             if meter.cancelled.is_set():
@@ -153,13 +155,15 @@ def _draft(
     pool: ThreadPoolExecutor,
     meter: _Meter,
 ) -> GhostPass:
-    def draw(group: list[int]) -> NDArray[np.float32]:
-        canvas = blank(shots[0].size_px)
+    def draw(group: list[int]) -> Plane:
+        width, height = shots[0].size_px
+        picture = np.zeros((3, height, width))
         for shot in shots:
-            draw_draft(shot, [paths[k] for k in group], canvas)
+            draw_draft(shot, [paths[k] for k in group], picture)
+        sum_rows(picture)
         for k in group:
             meter.step(f"ghost {paths[k].name}")
-        return canvas.merged()
+        return picture
 
     order = list(range(len(paths)))
     total, layers = _collect(shots, [[k] for k in order], paths, singles, draw, pool)
@@ -188,7 +192,7 @@ def _collect(
     items: list[list[int]],
     named: Sequence[LightPath],
     singles: int | None,
-    draw: Callable[[list[int]], NDArray[np.float32]],
+    draw: Callable[[list[int]], Plane],
     pool: ThreadPoolExecutor,
 ) -> tuple[Layer, tuple[Layer, ...]]:
     """Draw the first `singles` items by themselves and the others in a fixed number of groups; add all in order."""
@@ -196,15 +200,18 @@ def _collect(
     width, height = shot.size_px
     pixel_area = 1.0 / float(shot.to_pixels[2] * shot.to_pixels[3])
     alone = len(items) if singles is None else min(singles, len(items))
-    chunks = next((n for size, n in _CHUNKS if width * height <= size), 2)
+    most = next((n for size, n in _CHUNKS if width * height <= size), 2)
+    chunks = max(1, min(most, (len(items) - alone) // _PATHS_A_CHUNK))
     rest = [[k for item in items[alone + c :: chunks] for k in item] for c in range(chunks)]
-    total = np.zeros((3, height, width), dtype=np.float32)
+    total: Plane | None = None
     layers = []
     for k, plane in enumerate(pool.map(draw, items[:alone])):
-        total += plane
+        total = plane.copy() if total is None else np.add(total, plane, out=total)
         path = named[k]
         about: dict[str, str | float] = {"path": path.name, "flux_mm2": float(plane.sum(dtype=np.float64) / 3.0)}
         layers.append(to_layer(f"ghost.{path.name}", plane, pixel_area, about))
     for plane in pool.map(draw, [group for group in rest if group]):
-        total += plane
+        total = plane if total is None else np.add(total, plane, out=total)
+    if total is None:
+        total = np.zeros((3, height, width), dtype=np.float32)
     return to_layer("ghosts", total, pixel_area, {}), tuple(layers)

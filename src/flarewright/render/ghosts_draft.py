@@ -9,22 +9,22 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..kernels.matrix import draw_matrix_ghosts
 from ..optics.paths import LightPath
-from .canvas import Canvas
 from .shot import Shot
 
 
-def draw_draft(shot: Shot, paths: Sequence[LightPath], canvas: Canvas) -> None:
-    """Add the paraxial ghosts of some paths to a canvas.
+def draw_draft(shot: Shot, paths: Sequence[LightPath], differences: NDArray[np.float64]) -> None:
+    """Mark the paraxial ghosts of some paths.
 
     Parameters
     ----------
     shot : Shot
     paths : sequence of LightPath
-    canvas : Canvas
-        Added to.
+    differences : ndarray, shape (3, H, W), float64
+        Added to; `kernels.raster.sum_rows` turns it into flux per pixel.
     """
     if not paths:
         return
@@ -36,5 +36,5 @@ def draw_draft(shot: Shot, paths: Sequence[LightPath], canvas: Canvas) -> None:
         np.array([path.stop_crossings for path in paths]), packed.curvature, packed.z_vertex, packed.n_gap,
         packed.reflectance, packed.sensor_z, float(packed.semi[first]), float(np.tan(shot.incidence.tilt)),
         opening.edges, opening.radius, opening.mask, opening.half, shot.incidence.axes, shot.to_pixels, shot.gain,
-        shot.weights(packed.wavelengths_nm), *canvas.scratch(),
+        shot.weights(packed.wavelengths_nm), differences, np.empty(0, dtype=np.float32),
     )  # fmt: skip
