@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from math import ceil, sqrt
@@ -131,7 +132,7 @@ def ghost_table(
     packed = pack_lens(lens, order, coatings, np.array([wavelength_nm]))
     light = incidence(field_deg)
     todo = (direct_path(lens), *ghost_paths(lens, paths))
-    with ThreadPoolExecutor(threads) as pool:
+    with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
         measured = list(pool.map(lambda path: _measure(lens, packed, path, light), todo))
     direct = measured[0]
     # a peak is told relative to the direct image's flux

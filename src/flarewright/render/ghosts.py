@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -94,13 +95,13 @@ def render_ghosts(
     GhostPass
     """
     meter = _Meter(len(paths) * (2 if quality.mode == "final" else 1), progress)
-    with ThreadPoolExecutor(threads) as pool:
+    with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
         try:
             if quality.mode == "draft":
                 return _draft(shots, paths, singles, pool, meter)
             return _final(shots, paths, quality, singles, pool, meter)
         except BaseException:
-            # Ctrl-C arrives here: let the workers end at their next path
+            # Ctrl-C arrives here: let the workers end at their next wavelength
             meter.cancelled.set()
             pool.shutdown(wait=True, cancel_futures=True)
             raise
@@ -138,7 +139,7 @@ def _final(
                 if item.region.seen_flux > 0.0:
                     # a layer of its own may be graded up, so it is drawn in full
                     visibility = float("inf") if k in alone else contrast(item, level)
-                    draw_final(item, quality, canvas, visibility)
+                    draw_final(item, quality, canvas, visibility, meter.cancelled)
             meter.step(f"ghost {found[k][0].path.name}")
         return canvas.merged()
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
+from threading import Event
 
 import numpy as np
 from numpy.typing import NDArray
@@ -84,7 +85,9 @@ def contrast(item: FinalPass, level: float) -> float:
     return item.region.brightness * item.shot.light.intensity / level if level > 0.0 else float("inf")
 
 
-def draw_final(item: FinalPass, quality: Quality, canvas: Canvas, visibility: float = float("inf")) -> None:
+def draw_final(
+    item: FinalPass, quality: Quality, canvas: Canvas, visibility: float = float("inf"), stop: Event | None = None
+) -> None:
     """Trace one path of one light and add it to a canvas.
 
     Parameters
@@ -95,6 +98,8 @@ def draw_final(item: FinalPass, quality: Quality, canvas: Canvas, visibility: fl
         Added to.
     visibility : float
         Its `contrast`: what cannot be told from its surroundings needs neither sharp edges nor many wavelengths.
+    stop : Event, optional
+        Set to leave off between two wavelengths.
     """
     detail = sum(visibility < limit for limit in DETAIL_CONTRAST)
     shot, path = item.shot, item.path
@@ -111,6 +116,8 @@ def draw_final(item: FinalPass, quality: Quality, canvas: Canvas, visibility: fl
     steps = [(w, k / n) for w, n in enumerate(pieces) for k in range(n)] + [(count - 1, 0.0)]
     fine_nm = np.interp([w + part for w, part in steps], np.arange(count), shot.packed.wavelengths_nm)
     for (w, part), rgb in zip(steps, shot.weights(fine_nm), strict=True):
+        if stop is not None and stop.is_set():
+            return
         if rgb.any():
             data = traced[w] if part == 0.0 else _between(traced[w], traced[w + 1], part)
             draw_bundle(
