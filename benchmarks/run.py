@@ -1,0 +1,354 @@
+"""Benchmarks: trace, raster, frame, start-up, memory.
+
+    python -m benchmarks [--json FILE] [--repeat N] [--only PART ...]
+
+Every number is the median of repeated runs. Machines differ, so each kernel also stands as a ratio to a yardstick taken
+in the same run: a copy of memory for the raster, a plain scalar tracer for the trace. Nothing here is part of the test
+suite, and nothing fails for being slow.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import platform
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from math import sqrt
+from pathlib import Path
+from typing import Any
+
+import numba
+import numpy as np
+
+import flarewright
+from flarewright.kernels.raster import fill_polygon
+from flarewright.model import Camera, Iris, Lens, Light, Output, Project, Quality
+from flarewright.optics.bundle import find_region, front_box, trace_points
+from flarewright.optics.pack import pack_lens
+from flarewright.optics.paraxial import first_order
+from flarewright.optics.paths import direct_path, ghost_paths
+from flarewright.render.canvas import blank
+from flarewright.render.prepare import load_lens, settle
+from flarewright.render.render import render
+from flarewright.render.shot import make_opening, make_shots
+
+PARTS = ("yardsticks", "trace", "raster", "frame", "startup", "memory")
+
+LIGHT = (10.0, 5.0)
+"""Field angles of the frames' light, degrees."""
+
+Rows = list[dict[str, Any]]
+
+
+def median_seconds(work: Callable[[], Any], repeat: int, least: float = 0.0) -> float:
+    """Time some work, once to warm up and then `repeat` times; work shorter than `least` is run in batches."""
+    work()
+    start = time.perf_counter()
+    work()
+    batch = max(1, int(least / max(time.perf_counter() - start, 1e-9)))
+    times = []
+    for _ in range(repeat):
+        start = time.perf_counter()
+        for _ in range(batch):
+            work()
+        times.append((time.perf_counter() - start) / batch)
+    return statistics.median(times)
+
+
+def row(part: str, name: str, value: float, unit: str, ratio: float | None = None, against: str = "") -> dict[str, Any]:
+    return {"part": part, "name": name, "value": value, "unit": unit, "ratio": ratio, "against": against}
+
+
+# --- yardsticks
+
+
+@numba.njit(error_model="numpy")
+def _scalar_trace(curvature, gap, index, heights):
+    """The plainest tracer: one meridional ray after the other, refraction at spheres, nothing recorded."""
+    total = 0.0
+    for y0 in heights:
+        y, z, dy, dz = y0, 0.0, 0.0, 1.0
+        for k in range(curvature.size):
+            c = curvature[k]
+            b = c * (y * dy + z * dz) - dz
+            q = c * (y * y + z * z) - 2.0 * z
+            root = sqrt(max(b * b - c * q, 0.0))
+            t = q / (root - b)
+            y, z = y + t * dy, z + t * dz
+            eta = index[k] / index[k + 1]
+            along = eta * root - sqrt(max(1.0 - eta * eta * (1.0 - root * root), 0.0))
+            dy, dz = eta * dy + along * c * y, eta * dz + along * (c * z - 1.0)
+            z -= gap[k]
+        total += y
+    return total
+
+
+def yardsticks(repeat: int) -> tuple[Rows, float, float]:
+    """Return the rows, bytes copied per second, and scalar ray-surfaces per second, both on one core."""
+    source = np.ones(8_000_000)
+    target = np.empty_like(source)
+    seconds = median_seconds(lambda: np.copyto(target, source), repeat, 0.2)
+    bandwidth = 2.0 * source.nbytes / seconds
+    curvature = np.array([0.03, -0.01, 0.002, -0.012, 0.035, 0.0, 0.031, -0.019])
+    index = np.array([1.0, 1.65, 1.6, 1.0, 1.64, 1.0, 1.58, 1.69, 1.0])
+    heights = np.linspace(-5.0, 5.0, 200_000)
+    gap = np.full(8, 4.0)
+    seconds = median_seconds(lambda: _scalar_trace(curvature, gap, index, heights), repeat, 0.2)
+    scalar = heights.size * curvature.size / seconds
+    rows = [
+        row("yardsticks", "copy of memory", bandwidth / 1e9, "GB/s"),
+        row("yardsticks", "plain scalar tracer, one core", scalar / 1e6, "M ray-surfaces/s"),
+    ]
+    return rows, bandwidth, scalar
+
+
+# --- kernels
+
+
+def _canon(f_number: float = 2.8) -> tuple[Lens, Any, Any]:
+    lens = load_lens("canon-28-80")
+    project = Project(lens=lens, f_number=f_number, iris=Iris(blades=6), lights=(Light(field_deg=LIGHT),))
+    settled = settle(project)
+    return lens, settled, make_shots(settled, make_opening(settled, None))[0]
+
+
+def trace(repeat: int, scalar: float) -> Rows:
+    """Trace the whole front of the Canon 28-80 along its 171 paths, 4096 rays each."""
+    lens, _, shot = _canon()
+    packed, tilt = shot.packed, shot.incidence.tilt
+    x0, x1, y0, y1 = front_box(packed, tilt)
+    px, py = (g.ravel() for g in np.meshgrid(np.linspace(x0, x1, 64), np.linspace(y0, y1, 64)))
+    points = np.stack([px, py], axis=1)
+    paths = ghost_paths(lens, "same-side")
+    steps = len(points) * sum(len(path.rows) for path in paths)
+
+    def one(path: Any) -> None:
+        trace_points(packed, 0, path, tilt, points)
+
+    found = []
+    for threads in sorted({1, os.cpu_count() or 1}):
+        with ThreadPoolExecutor(threads) as pool:
+            rate = steps / median_seconds(lambda pool=pool: list(pool.map(one, paths)), repeat, 0.2)  # type: ignore[misc]
+        found.append(
+            row("trace", f"171 paths, {threads} thread(s)", rate / 1e6, "M ray-surfaces/s", rate / scalar, "scalar")
+        )
+
+    def prepass() -> None:
+        for path in paths:
+            find_region(packed, 0, path, tilt, shot.opening.radius, shot.view_radius)
+
+    found.append(row("trace", "pre-pass of 171 paths, 1 thread", 1e3 * median_seconds(prepass, repeat), "ms"))
+    return found
+
+
+def raster(repeat: int, bandwidth: float) -> Rows:
+    """Draw triangles of some sizes; a fragment is a pixel of one triangle, three floats read and written."""
+    rng = np.random.default_rng(1)
+    found = []
+    plane, *scratch = blank((1280, 720)).scratch()
+    rgb = np.array([0.3, 0.6, 0.1])
+    for side, count in ((4.0, 20_000), (30.0, 4000), (300.0, 100)):
+        middles = rng.uniform([side, side], [1280 - side, 720 - side], (count, 2))
+        turn = rng.uniform(0.0, 2.0 * np.pi, count)[:, None] + 2.0 * np.pi / 3.0 * np.arange(3)
+        radius = side / sqrt(3.0)
+        corners = middles[:, None] + radius * np.stack([np.cos(turn), np.sin(turn)], axis=-1)
+        fragments = count * 0.25 * sqrt(3.0) * side**2
+
+        rate = fragments / median_seconds(lambda c=corners: _draw(c, rgb, plane, *scratch), repeat, 0.2)  # type: ignore[misc]
+        found.append(
+            row("raster", f"triangles of {side:g} px", rate / 1e6, "M fragments/s", 24.0 * rate / bandwidth, "copy")
+        )
+    return found
+
+
+@numba.njit
+def _draw(corners, rgb, plane, strip):
+    """Draw triangles without a call from Python for each."""
+    for k in range(corners.shape[0]):
+        fill_polygon(corners[k], 3, 1.0, 1e-4, 1e-4, 0.0, 2.0, rgb, plane, strip)
+
+
+# --- frames
+
+
+def canon_frame(f_number: float, iris: Iris, *, bridge: bool, size: tuple[int, int] = (1280, 720)) -> Project:
+    """The workload "Canon": 171 ghosts, 3 wavelengths, no starburst."""
+    return Project(
+        lens="canon-28-80",
+        f_number=f_number,
+        iris=iris,
+        lights=(Light(field_deg=LIGHT),),
+        camera=Camera(size_px=size),
+        quality=Quality(wavelengths=3, paths="same-side", bridge=bridge),
+        output=Output(layers="passes", starburst=False),
+    )
+
+
+def heliar_frame(mode: str, *, starburst: bool) -> Project:
+    return Project(
+        lens="heliar-tronnier",
+        f_number=8.0,
+        lights=(Light(field_deg=LIGHT),),
+        quality=Quality(mode=mode, wavelengths=3 if mode == "draft" else 7),
+        output=Output(layers="passes", starburst=starburst),
+    )
+
+
+def frame(repeat: int) -> Rows:
+    """Whole renders, lens loading included, as the command line and the library do them."""
+    found = []
+    for label, f_number, iris in (("f/8, six blades", 8.0, Iris(blades=6)), ("wide open", 2.8, Iris())):
+        for bridge in (False, True):
+            project = canon_frame(f_number, iris, bridge=bridge)
+            seconds = median_seconds(lambda project=project: render(project), repeat)  # type: ignore[misc]
+            name = f"Canon 1280x720, {label}, bridge {'on' if bridge else 'off'}"
+            found.append(row("frame", name, 1e3 * seconds, "ms"))
+    for name, project in (
+        ("Heliar draft 1280x720, ghosts", heliar_frame("draft", starburst=False)),
+        ("Heliar draft 1280x720, with starburst", heliar_frame("draft", starburst=True)),
+        ("Heliar final 1280x720, with starburst", heliar_frame("final", starburst=True)),
+    ):
+        seconds = median_seconds(lambda project=project: render(project), repeat)  # type: ignore[misc]
+        found.append(row("frame", name, 1e3 * seconds, "ms"))
+    lens = load_lens("heliar-tronnier")
+    packing = median_seconds(
+        lambda: (
+            pack_lens(lens, first_order(lens), (None,) * len(lens.rows), np.array([450.0, 540.0, 610.0])),
+            direct_path(lens),
+        ),
+        repeat,
+    )
+    found.append(row("frame", "of which packing the Heliar, 3 wavelengths", 1e3 * packing, "ms"))
+    return found
+
+
+# --- commands
+
+
+def _run(arguments: list[str], cache: str | None = None) -> float:
+    environment = dict(os.environ)
+    if cache is not None:
+        environment["NUMBA_CACHE_DIR"] = cache
+    start = time.perf_counter()
+    subprocess.run(arguments, check=True, env=environment, capture_output=True)
+    return time.perf_counter() - start
+
+
+def startup(repeat: int) -> Rows:
+    """Wall time of commands: with nothing compiled, and with everything compiled."""
+    python = sys.executable
+    command = [python, "-m", "flarewright"] if _has_main() else [str(Path(python).parent / "flarewright")]
+    found = []
+    with tempfile.TemporaryDirectory() as folder:
+        out = str(Path(folder) / "flare.exr")
+        for quality in ("draft", "final"):
+            work = [*command, "render", "heliar-tronnier", "--light", "10,5", "--quality", quality, "-o", out]
+            cold = []
+            for k in range(2):
+                cache = str(Path(folder) / f"{quality}{k}")
+                cold.append(_run(work, cache))
+            found.append(row("startup", f"cold command, {quality}", statistics.median(cold), "s"))
+            cache = str(Path(folder) / f"{quality}0")
+            warm = statistics.median(_run(work, cache) for _ in range(repeat))
+            found.append(row("startup", f"warm command, {quality}", warm, "s"))
+        lenses = statistics.median(_run([*command, "lenses"]) for _ in range(repeat))
+        found.append(row("startup", "flarewright lenses", lenses, "s"))
+        empty = statistics.median(_run([python, "-c", "pass"]) for _ in range(repeat))
+        package = statistics.median(_run([python, "-c", "import flarewright"]) for _ in range(repeat))
+        found.append(row("startup", "import flarewright", package - empty, "s"))
+    return found
+
+
+def _has_main() -> bool:
+    return (Path(flarewright.__file__).parent / "__main__.py").exists()
+
+
+MEMORY = """
+import resource, sys
+sys.path.insert(0, {root!r})
+from benchmarks.run import canon_frame, heliar_frame
+from flarewright.model import Camera, Iris
+from flarewright.render.render import render
+if {which!r} == "canon":
+    project = canon_frame(8.0, Iris(blades=6), bridge=True, size=(1920, 1080))
+else:
+    project = heliar_frame("final", starburst=True).replace(camera=Camera(size_px=(1920, 1080)))
+render(project)
+print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
+"""
+
+
+def memory() -> Rows:
+    """Peak resident memory of a process that renders one frame at 1920x1080."""
+    found = []
+    root = str(Path(__file__).parents[1])
+    for which in ("canon", "heliar"):
+        code = MEMORY.format(root=root, which=which)
+        done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
+        # kilobytes on Linux, bytes on macOS
+        scale = 1e6 if sys.platform == "darwin" else 1e3
+        found.append(row("memory", f"peak, {which} final 1920x1080", int(done.stdout.split()[-1]) / scale, "MB"))
+    return found
+
+
+def facts() -> dict[str, Any]:
+    return {
+        "flarewright": flarewright.__version__,
+        "python": platform.python_version(),
+        "numpy": np.__version__,
+        "numba": numba.__version__,
+        "machine": platform.machine(),
+        "cores": os.cpu_count(),
+        "load": os.getloadavg()[0] if hasattr(os, "getloadavg") else None,
+    }
+
+
+def show(rows: Rows) -> None:
+    """Print a table of what was measured."""
+    width = max(len(r["name"]) for r in rows)
+    part = ""
+    for r in rows:
+        if r["part"] != part:
+            part = r["part"]
+            print(f"\n{part}")
+        ratio = f"  {r['ratio']:6.2f} x {r['against']}" if r["ratio"] is not None else ""
+        print(f"  {r['name']:<{width}}  {r['value']:10.4g} {r['unit']}{ratio}")
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Run what was asked for, print it, and write it as JSON on request."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks", description="Flarewright's benchmarks.")
+    parser.add_argument("--json", metavar="FILE", help="also write the numbers to this file")
+    parser.add_argument("--repeat", type=int, default=5, help="runs per number; the median counts (5)")
+    parser.add_argument("--only", nargs="+", choices=PARTS, default=PARTS, help="parts to run")
+    asked = parser.parse_args(arguments)
+    machine = facts()
+    print("  ".join(f"{key} {value}" for key, value in machine.items()))
+    rows, bandwidth, scalar = yardsticks(asked.repeat)
+    parts: dict[str, Callable[[], Rows]] = {
+        "yardsticks": list,
+        "trace": lambda: trace(asked.repeat, scalar),
+        "raster": lambda: raster(asked.repeat, bandwidth),
+        "frame": lambda: frame(asked.repeat),
+        "startup": lambda: startup(asked.repeat),
+        "memory": memory,
+    }
+    for part in PARTS:
+        if part in asked.only:
+            rows += parts[part]()
+    show(rows)
+    if asked.json:
+        Path(asked.json).write_text(
+            json.dumps({"machine": machine, "results": rows}, indent=2) + "\n", encoding="utf-8"
+        )
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,174 @@
+"""The bundle's grid: no cracks, no overlaps, nothing that carries light left out."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import numpy as np
+import pytest
+
+from flarewright.kernels.bundle import measure_bundle
+from flarewright.kernels.trace import trace_nodes
+from flarewright.model import Iris, Light, Project
+from flarewright.optics.bundle import _arguments, find_region, front_box, trace_grid, trace_points
+from flarewright.optics.iris import blade_edges
+from flarewright.optics.paths import LightPath, ghost_path, ghost_paths
+from flarewright.render.prepare import load_lens, settle
+from flarewright.render.shot import Shot, make_opening, make_shots
+
+
+def shot_of(lens: str, field_deg, f_number: float, wavelengths: int = 3) -> Shot:
+    project = Project(
+        lens=lens,
+        f_number=f_number,
+        iris=Iris(),
+        lights=(Light(field_deg=field_deg),),
+        quality={"wavelengths": wavelengths},
+    )
+    settled = settle(project)
+    return make_shots(settled, make_opening(settled, None))[0]
+
+
+def mesh_of(shot: Shot, path: LightPath, tolerance: float = 0.25, scale: float = 10.0):
+    region = find_region(shot.packed, 1, path, shot.incidence.tilt, shot.opening.radius, shot.view_radius)
+    if region is None:
+        return None, None
+    bundle = trace_grid(
+        shot.packed, path, shot.incidence.tilt, shot.opening.radius, region.box, tolerance=tolerance, scale=scale
+    )
+    return region, bundle
+
+
+def signed_areas(pupil, triangles) -> np.ndarray:
+    a, b, c = (pupil[triangles[:, k]] for k in range(3))
+    return 0.5 * ((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0])
+
+
+MESHES = [
+    ("heliar-tronnier", (8.0, 5.0), 3.5, (4, 1)),
+    ("heliar-tronnier", (20.0, 10.0), 8.0, (8, 3)),
+    ("tessar-brendel", (8.0, 5.0), 2.8, (7, 6)),
+    ("tessar-brendel", (0.0, 0.0), 8.0, (5, 4)),
+    ("canon-28-80", (15.0, 8.0), 2.8, (26, 24)),
+    ("double-gauss-tronnier", (8.0, 5.0), 8.0, (10, 4)),
+]
+
+
+@pytest.mark.parametrize(("lens", "field", "f_number", "pair"), MESHES)
+def test_the_grid_has_no_cracks(lens, field, f_number, pair):
+    """Every edge inside belongs to two triangles that run along it in opposite directions; no node lies on an edge."""
+    shot = shot_of(lens, field, f_number)
+    region, bundle = mesh_of(shot, ghost_path(load_lens(lens), *pair))
+    if bundle is None:
+        pytest.skip("this path passes no light here")
+    pupil, triangles = bundle.pupil, bundle.triangles
+    assert len(triangles) > 32
+    assert (signed_areas(pupil, triangles) > 0.0).all()
+    directed = Counter()
+    for t in triangles:
+        for k in range(3):
+            directed[int(t[k]), int(t[(k + 1) % 3])] += 1
+    assert max(directed.values()) == 1
+    border = [edge for edge in directed if edge[::-1] not in directed]
+    # what has no partner surrounds the kept cells: each border node is entered as often as it is left
+    ins, outs = Counter(e[1] for e in border), Counter(e[0] for e in border)
+    assert ins == outs
+    # a T-junction would be a border node in the middle of a border edge that runs the other way
+    ends = {tuple(np.round(pupil[e[0]], 9)) for e in border}
+    for a, b in border:
+        middle = tuple(np.round(0.5 * (pupil[a] + pupil[b]), 9))
+        if middle in ends:
+            pytest.fail(f"a node lies on the edge from {pupil[a]} to {pupil[b]}")
+    assert region.box[0] - 1e-9 <= pupil[triangles, 0].min()
+    assert pupil[triangles, 0].max() <= region.box[1] + 1e-9
+
+
+@pytest.mark.parametrize(("lens", "field", "f_number", "pair"), MESHES)
+def test_triangles_tile_the_kept_cells(lens, field, f_number, pair):
+    """Any point of the box lies in one triangle, or in a cell that was left out and passes nothing."""
+    shot = shot_of(lens, field, f_number)
+    path = ghost_path(load_lens(lens), *pair)
+    region, bundle = mesh_of(shot, path)
+    if bundle is None:
+        pytest.skip("this path passes no light here")
+    rng = np.random.default_rng(1)
+    low, high = region.box[[0, 2]], region.box[[1, 3]]
+    points = rng.uniform(low, high, (600, 2))
+    corners = bundle.pupil[bundle.triangles]
+    edges = np.roll(corners, -1, axis=1) - corners
+    hits = np.zeros(len(points), dtype=int)
+    for k, p in enumerate(points):
+        at = p - corners
+        hits[k] = ((edges[..., 0] * at[..., 1] - edges[..., 1] * at[..., 0]) >= 0.0).all(axis=1).sum()
+    assert hits.max() <= 1
+    # the kept cells' area is that of the triangles
+    share = signed_areas(bundle.pupil, bundle.triangles).sum() / float((high - low).prod())
+    assert hits.mean() == pytest.approx(share, abs=4.0 * np.sqrt(0.25 / len(points)))
+    left_out = points[hits == 0]
+    for w in range(len(shot.packed.wavelengths_nm)):
+        data = trace_points(shot.packed, w, path, shot.incidence.tilt, left_out)
+        at_stop = data[:, 5:].reshape(len(left_out), -1, 2)
+        passing = (data[:, 4] > 0) & (data[:, 3] <= 1.0)
+        passing &= (np.hypot(at_stop[..., 0], at_stop[..., 1]) <= shot.opening.radius).all(axis=1)
+        assert passing.sum() <= 1
+
+
+def test_a_finer_tolerance_makes_a_finer_grid_and_the_same_flux():
+    shot = shot_of("heliar-tronnier", (8.0, 5.0), 3.5)
+    path = ghost_path(load_lens("heliar-tronnier"), 4, 1)
+    blades = blade_edges(Iris(), shot.packed.stop_semi)
+    found = []
+    for tolerance in (1.0, 0.25, 0.05):
+        _, bundle = mesh_of(shot, path, tolerance)
+        data = trace_points(shot.packed, 1, path, shot.incidence.tilt, bundle.pupil)
+        sums = measure_bundle(data, bundle.pupil, bundle.triangles, 1, blades, shot.incidence.axes)
+        found.append((len(bundle.triangles), sums[0]))
+    assert found[0][0] < found[1][0] < found[2][0]
+    assert found[0][1] == pytest.approx(found[2][1], rel=2e-3)
+    assert found[1][1] == pytest.approx(found[2][1], rel=1e-3)
+
+
+def dense_flux(shot: Shot, path: LightPath, w: int, n: int) -> tuple[float, float]:
+    """Flux of a dense scan of half the front, and the part of it inside a box."""
+    packed, tilt = shot.packed, shot.incidence.tilt
+    x0, x1, y0, y1 = front_box(packed, tilt)
+    hx, hy = (x1 - x0) / n, (y1 - y0) / (2 * n)
+    px, py = np.meshgrid(x0 + hx * (np.arange(n) + 0.5), y0 + hy * (np.arange(2 * n) + 0.5), indexing="ij")
+    px, py = px.ravel(), py.ravel()
+    data = np.empty((px.size, 5 + 2 * path.stop_crossings))
+    trace_nodes(*_arguments(packed, w, path, tilt), px, py, data)
+    passing = (data[:, 4] > 0) & (data[:, 3] <= 1.0)
+    for c in range(path.stop_crossings):
+        passing &= np.hypot(data[:, 5 + 2 * c], data[:, 6 + 2 * c]) <= shot.opening.radius
+    weight = np.where(passing, data[:, 2], 0.0) * hx * hy * 2.0 * shot.incidence.cosine
+    region = find_region(packed, 1, path, tilt, shot.opening.radius, shot.view_radius)
+    if region is None:
+        return float(weight.sum()), 0.0
+    b = region.box
+    inside = (px >= b[0]) & (px <= b[1]) & (py >= b[2]) & (py <= b[3])
+    return float(weight.sum()), float(weight[inside].sum())
+
+
+def missed(lens: str, field, f_number: float, which: str, n: int) -> float:
+    """The part of all ghost light that dense scans find outside what the pre-pass kept, over all wavelengths."""
+    shot = shot_of(lens, field, f_number)
+    total = kept = 0.0
+    for path in ghost_paths(load_lens(lens), which):
+        for w in range(len(shot.packed.wavelengths_nm)):
+            everything, inside = dense_flux(shot, path, w, n)
+            total, kept = total + everything, kept + inside
+    assert total > 0.0
+    return 1.0 - kept / total
+
+
+@pytest.mark.parametrize("f_number", [3.5, 8.0])
+def test_the_prepass_misses_nothing(f_number):
+    assert missed("heliar-tronnier", (12.0, 7.0), f_number, "all", 64) < 1e-4
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("field", [(3.0, 0.0), (8.0, 5.0), (20.0, 10.0), (33.0, 12.0)])
+@pytest.mark.parametrize("f_number", [2.8, 8.0, 16.0])
+def test_the_prepass_misses_nothing_of_the_zoom(field, f_number):
+    """351 paths of the Canon 28-80 against 256 x 256 rays each."""
+    assert missed("canon-28-80", field, f_number, "all", 128) < 1e-4

@@ -1,0 +1,322 @@
+"""What other flare programs get wrong (physics page, last section): one test a mistake, named after it.
+
+Each test is written so that the mistake would fail it by far more than its tolerance.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from oracle import estimate
+from prescriptions import HELIAR, TRIPLET, lens, system
+
+from flarewright.io.dotlens import read_dotlens
+from flarewright.kernels.bundle import draw_bundle, node_densities
+from flarewright.kernels.trace import ALIVE, STOP_X, WEIGHT, X, Y
+from flarewright.model import (
+    Bare,
+    Camera,
+    Everywhere,
+    Film,
+    Iris,
+    Layer,
+    Lens,
+    Light,
+    Lines,
+    Output,
+    Project,
+    Quality,
+    QuarterWave,
+    Stop,
+)
+from flarewright.optics.coatings import film_stack, stack_reflectance
+from flarewright.optics.ghosts import ghost_table
+from flarewright.optics.pack import pack_lens
+from flarewright.optics.paraxial import D_LINE_NM, first_order
+from flarewright.optics.paths import direct_path, ghost_path, ghost_paths
+from flarewright.optics.repair import repair
+from flarewright.optics.spectrum import band_weights
+from flarewright.optics.trace import trace_rays
+from flarewright.render import canvas
+from flarewright.render.compose import beauty
+from flarewright.render.display import srgb_oetf, view
+from flarewright.render.prepare import load_lens
+from flarewright.render.render import render
+
+FIELD = (8.0, 5.0)
+
+
+def rows_of(table) -> dict:
+    return {(g.first_reflection, g.second_reflection): g for g in table.ghosts}
+
+
+def rendering(a_lens, field=FIELD, *, size=(128, 72), sensor=None, **parts):
+    light = Light(field_deg=field, spectrum=parts.pop("spectrum", Lines(lines=((D_LINE_NM, 1.0),))))
+    return render(
+        Project(
+            lens=a_lens,
+            f_number=parts.pop("f_number", 8.0),
+            iris=Iris(),
+            lights=(light,),
+            camera=Camera(size_px=size, sensor_mm=sensor),
+            quality=Quality(**{k: v for k, v in parts.items() if k in Quality.model_fields}),
+            output=Output(layers="ghosts"),
+        )
+    )
+
+
+def layer(result, name):
+    return next(x for x in result.layers if x.name == name)
+
+
+def test_front_surface_skipped():
+    """Row 0 reflects: seven of the Heliar's ghosts end at it, and one of them is among its brightest."""
+    table = ghost_table(lens(HELIAR, 4.5), FIELD)
+    at_front = [g for g in table.ghosts if g.second_reflection == 0]
+    assert len(at_front) == 7
+    assert sum(g.throughput_mm2 for g in at_front) > 0.1 * sum(g.throughput_mm2 for g in table.ghosts)
+    # and light pays for entering: the direct image carries T of the front surface as of all others
+    bare = ghost_table(lens(HELIAR, 4.5), (0.0, 0.0)).direct.throughput_mm2
+    front = lens(HELIAR, 4.5)
+    perfect = front.rows[0].replace(coating=QuarterWave(center_wavelength_nm=D_LINE_NM, index="ideal"))
+    better = ghost_table(front.replace(rows=(perfect, *front.rows[1:])), (0.0, 0.0)).direct.throughput_mm2
+    r = ((1.652 - 1.0) / (1.652 + 1.0)) ** 2
+    assert bare / better == pytest.approx(1.0 - r, abs=2e-3)
+
+
+def test_stop_enumerated_as_a_mirror():
+    a_lens = lens(HELIAR, 4.5)
+    for path in ghost_paths(a_lens):
+        assert a_lens.stop_row not in (path.first_reflection, path.second_reflection)
+    assert len(ghost_paths(a_lens)) == 28  # 36 with the stop
+
+
+def test_flat_surfaces_that_neither_refract_nor_reflect():
+    """The Heliar's row 6 is flat: its ghosts carry light, and a very weak curve in its place changes nothing."""
+    flat = lens(HELIAR, 4.5)
+    curved = flat.replace(rows=tuple(r.replace(curvature=1e-9) if k == 6 else r for k, r in enumerate(flat.rows)))
+    a, b = (rows_of(ghost_table(x, FIELD)) for x in (flat, curved))
+    assert sum(path[0] == 6 or path[1] == 6 for path in a) == 7
+    for path in ((6, 4), (6, 0), (8, 6)):
+        assert a[path].throughput_mm2 > 1e-3 * max(g.throughput_mm2 for g in a.values())
+        assert b[path].throughput_mm2 == pytest.approx(a[path].throughput_mm2, rel=1e-5)
+        assert b[path].rms_radius_mm == pytest.approx(a[path].rms_radius_mm, rel=1e-5)
+    # Snell at a plane: an oblique ray leaves the glass behind it bent
+    packed = pack_lens(flat, first_order(flat), (None,) * 9, np.array([D_LINE_NM]))
+    without = packed.n_gap.copy()
+    without[0, 7] = 1.0
+    changed = type(packed)(**{**packed.__dict__, "n_gap": without})
+    rays = [trace_rays(p, direct_path(flat), np.zeros(1), np.zeros(1), (0.0, 10.0))["y"][0] for p in (packed, changed)]
+    assert abs(rays[0] - rays[1]) > 0.1
+
+
+def test_transmittances_left_out():
+    """A ghost's weight is R R times T at every other crossing: near the axis, the product from the formula."""
+    a_lens = lens(HELIAR, 4.5)
+    n = [1.0, 1.652, 1.603, 1.0, 1.643, 1.0, 1.0, 1.581, 1.694, 1.0]
+    r = [((n[k] - n[k + 1]) / (n[k] + n[k + 1])) ** 2 for k in range(9)]
+    packed = pack_lens(a_lens, first_order(a_lens), (None,) * 9, np.array([D_LINE_NM]))
+    for j, i in ((4, 1), (8, 6), (3, 0), (8, 0)):
+        path = ghost_path(a_lens, j, i)
+        expected = 1.0
+        mirrors = 0
+        for row, action in zip(path.rows, path.actions, strict=True):
+            mirrors += action == 1
+            expected *= r[row] if action == 1 else 1.0 - r[row]
+        found = trace_rays(packed, path, np.zeros(1), np.array([1e-3]), (0.0, 0.0))["weight"][0]
+        assert mirrors == 2
+        assert found == pytest.approx(expected, rel=1e-5)
+        assert expected < 0.95 * r[j] * r[i]  # leaving them out would show
+
+
+def test_one_intensity_per_ghost():
+    """A ghost near a caustic is far from even: its peak is many times its mean, and the flux still adds up."""
+    result = rendering("tessar-brendel", (12.0, 0.0), f_number=2.8, size=(320, 180), sensor=(72.0, 40.5), wavelengths=1)
+    contrasts = []
+    for single in result.layers:
+        if single.name.startswith("ghost."):
+            light = np.abs(single.pixels[..., 0])
+            lit = light[light > 1e-3 * light.max()]
+            if lit.size > 200:
+                contrasts.append(float(np.quantile(lit, 0.999) / np.median(lit)))
+    assert max(contrasts) > 5.0
+
+
+def test_folded_cells_dropped():
+    """A sheet folded upon itself: both leaves add, whatever way round their triangles lie on the sensor."""
+    n = 41
+    at = np.linspace(0.0, 1.0, n)
+    px, py = (g.ravel() for g in np.meshgrid(at, at, indexing="ij"))
+    data = np.zeros((n * n, STOP_X + 2))
+    # y runs forth and back, so the upper half of the pupil lands upside down on the lower half's place
+    data[:, X], data[:, Y] = 10.0 * px, 10.0 * np.minimum(py, 1.0 - py)
+    data[:, WEIGHT] = data[:, ALIVE] = 1.0
+    k = np.arange(n * n).reshape(n, n)
+    a, b, c, d = k[:-1, :-1].ravel(), k[1:, :-1].ravel(), k[1:, 1:].ravel(), k[:-1, 1:].ravel()
+    triangles = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
+    pupil = np.stack([px, py], axis=1)
+    plane, *scratch = canvas.blank((64, 64)).scratch()
+    draw_bundle(
+        data, pupil, triangles, node_densities(data, pupil, triangles), 1, np.zeros((0, 4)), np.ones((1, 1)), 1.0,
+        np.eye(2), np.array([32.0, 32.0, 2.0, 2.0]), 1.0, np.ones(3), plane, *scratch,
+    )  # fmt: skip
+    assert plane[0].sum(dtype=float) == pytest.approx(2.0, rel=1e-5)  # the half and its mirror image
+    inner = plane[0][34:40, 16:30]
+    assert inner.max() == pytest.approx(2.0 * 0.5 / (10.0 * 5.0) * 0.25, rel=1e-3)
+
+
+def test_tone_mapping_before_adding():
+    """Light adds, and the view comes last: two greys of 0.5 make white, not what their pictures add up to."""
+    grey = np.full((2, 2, 3), 0.5, np.float32)
+    one, two = Layer("starburst", grey, (0, 0, 2, 2)), Layer("ghosts", grey, (0, 0, 2, 2))
+    total = beauty([one, two], (2, 2))
+    np.testing.assert_array_equal(total.pixels, 1.0)
+    assert (view(total.pixels, 0.0) == 255).all()
+    assert 2.0 * srgb_oetf(np.array(0.5)) > 1.4
+    result = rendering("heliar-tronnier", wavelengths=1)
+    parts = [layer(result, "starburst"), layer(result, "ghosts")]
+    np.testing.assert_allclose(beauty(parts, (128, 72)).pixels, layer(result, "beauty").pixels, rtol=1e-6)
+
+
+def test_coating_wavelength_used_as_thickness():
+    """532 nm at index 1.38 is a film of 96.4 nm; as thick as its wavelength it would be no quarter wave at all."""
+    indices, thicknesses = film_stack(QuarterWave(center_wavelength_nm=532.0), 1.0, 1.5)
+    assert indices == (1.38,)
+    assert thicknesses[0] == pytest.approx(96.4, abs=0.05)
+    at = np.array([1.0])
+    quarter = stack_reflectance(1.0, 1.5, indices, thicknesses, 532.0, at)[0]
+    as_thick = stack_reflectance(1.0, 1.5, *film_stack(Film(index=1.38, thickness_nm=532.0), 1.0, 1.5), 532.0, at)[0]
+    assert quarter == pytest.approx(((1.5 - 1.38**2) / (1.5 + 1.38**2)) ** 2, rel=1e-9)
+    assert as_thick > 1.5 * quarter
+
+
+def test_clamped_negative_colours():
+    """A spectral cyan has a negative red: it stays in the layers, and only the view clamps it."""
+    cyan = Lines(lines=((500.0, 1.0),))
+    (weights,) = band_weights(cyan, np.array([500.0]), "rec709")
+    assert weights[0] < -0.1
+    result = rendering("heliar-tronnier", spectrum=cyan)
+    for name in ("beauty", "ghosts", "starburst"):
+        pixels = layer(result, name).pixels
+        lit = pixels[..., 1] > 0.0
+        assert lit.any()
+        assert (pixels[..., 0][lit] < 0.0).all()
+        np.testing.assert_allclose(
+            pixels[..., 0][lit].sum() / pixels[..., 1][lit].sum(), weights[0] / weights[1], rtol=1e-4
+        )
+    assert (view(layer(result, "ghosts").pixels)[..., 0] == 0).all()
+
+
+def test_tiny_triangles_lost():
+    """The same ghosts on pixels as large as the ghosts themselves: no light is lost to triangles within a pixel."""
+    fine = rendering("heliar-tronnier", size=(300, 300), sensor=(600.0, 600.0), wavelengths=1)
+    coarse = rendering("heliar-tronnier", size=(6, 6), sensor=(600.0, 600.0), wavelengths=1)
+    for single in fine.layers[3:]:
+        a = single.pixels.sum(dtype=float) * 2.0**2
+        b = layer(coarse, single.name).pixels.sum(dtype=float) * 100.0**2
+        assert b == pytest.approx(a, rel=4e-3), single.name
+
+
+def test_sensor_plane_taken_from_the_last_gap_of_the_patent():
+    """The Canon's last gap of 80 mm is not its image plane, the Heliar's printed one is 0.54 mm off."""
+    for name, printed, focus in (("canon-28-80", 80.0, 38.3787), ("heliar-tronnier", 81.857, 81.315056)):
+        a_lens = load_lens(name)
+        assert a_lens.rows[-1].thickness == pytest.approx(printed)
+        assert first_order(a_lens).sensor_distance == pytest.approx(focus, abs=1e-3)
+        assert ghost_table(a_lens, FIELD, paths="same-side").sensor_distance == pytest.approx(focus, abs=1e-3)
+
+
+def test_stop_semi_diameter_and_diameter_confused():
+    """Direct flux on the axis is pi (f / 2N)^2 T; a diameter for a semi-diameter would make it four times that."""
+    a_lens = lens(HELIAR, 4.5)
+    table = ghost_table(a_lens, (0.0, 0.0), f_number=11.0)
+    pupil = np.pi * (99.235796 / 22.0) ** 2
+    n = [1.0, 1.652, 1.603, 1.0, 1.643, 1.0, 1.0, 1.581, 1.694, 1.0]
+    through = np.prod([1.0 - ((n[k] - n[k + 1]) / (n[k] + n[k + 1])) ** 2 for k in range(9)])
+    assert table.direct.throughput_mm2 == pytest.approx(pupil * through, rel=0.01)
+    order = first_order(a_lens, 11.0)
+    assert order.stop_semi_diameter < 0.5 * order.entrance_pupil_diameter
+
+
+def test_apertures_of_a_file_taken_for_the_other_half(tmp_path):
+    """A `.lens` column of diameters is halved, told, and makes the same lens as its semi-diameters do."""
+    text = (
+        "# Some Triplet 100mm f/2.7\n#\n# Patent: US002453260\n# 7 surfaces, 3 glass elements, f/2.7\n\n"
+        "name: Some Triplet 100mm f/2.7\nfocal_length: 99.0\n\nsurfaces:\n"
+    )
+    table = [
+        (40.94, 8.74, 1.617, 55.0, 18.5), (0, 11.05, 1, 0, 18.5), (-55.65, 2.78, 1.649, 33.8, 14.0),
+        (39.75, 2.5, 1, 0, 14.0), ("stop", 5.13, 1, 0, 14.0), (107.56, 9.54, 1.617, 55.0, 15.0),
+        (-43.33, 79.34, 1, 0, 15.0),
+    ]  # fmt: skip
+    found = []
+    for factor in (1.0, 2.0):
+        path = tmp_path / f"{factor:g}.lens"
+        path.write_text(text + "".join(f"{r} {t} {n} {v} {h * factor} 0\n" for r, t, n, v, h in table))
+        a_lens, remarks = repair(read_dotlens(path))
+        assert any("diameters" in remark for remark in remarks)
+        found.append([row.semi_diameter for row in a_lens.rows if not isinstance(row, Stop)])
+    assert found[0] == pytest.approx(found[1])
+    assert found[0] == [18.5, 18.5, 14.0, 14.0, 15.0, 15.0]
+
+
+def test_dispersion_in_the_stop_plane_but_not_on_the_sensor():
+    """Red and blue land at different places: the direct image shifts with the wavelength as the matrices say."""
+    a_lens = load_lens("triplet-pestrecov")
+    order = first_order(a_lens)
+    packed = pack_lens(a_lens, order, (None,) * len(a_lens.rows), np.array([450.0, 610.0]))
+    for path in (direct_path(a_lens), *ghost_paths(a_lens)[:6]):
+        rays = [trace_rays(packed, path, np.zeros(1), np.array([1.0]), (0.0, 5.0), w=w) for w in (0, 1)]
+        on_sensor, at_stop = (abs(float(rays[0][k][0] - rays[1][k][0])) for k in ("y", "stop_y"))
+        if all(r["status"][0] for r in rays) and at_stop > 1e-4:
+            assert on_sensor > 1e-4, path.name
+    # and the analysis shows it: a ghost's blue is larger or smaller than its red
+    table = [ghost_table(a_lens, FIELD, f_number=8.0, wavelength_nm=nm) for nm in (450.0, 610.0)]
+    blue, red = (rows_of(t) for t in table)
+    shifts = [abs(blue[p].rms_radius_mm / red[p].rms_radius_mm - 1.0) for p in blue if red[p].throughput_mm2 > 0.0]
+    assert max(shifts) > 0.01
+
+
+def test_the_sign_of_the_second_mirror():
+    """The first reflection is +2/R and the second -2/R: one sign for both is wrong by more than all."""
+    a_lens = lens(TRIPLET, 5.0)
+    s = system(TRIPLET, 5.0)
+    row = rows_of(ghost_table(a_lens, (3.0, 0.0)))[(3, 2)]
+    truth = estimate(s, (3, 2), (3.0, 0.0), film_sets=[[()] * len(s.rows)], samples=4000, replicas=4)[0]
+    assert row.rms_radius_mm == pytest.approx(truth.rms_radius_mm, rel=0.03)
+
+
+def test_the_shader_that_four_codes_copy():
+    """At its design wavelength a real quarter wave reflects what the formula says, not 1.2 to 2.6 times as much."""
+    for n_glass in (1.5, 1.65, 1.8):
+        indices, thicknesses = film_stack(QuarterWave(center_wavelength_nm=550.0), 1.0, n_glass)
+        found = stack_reflectance(1.0, n_glass, indices, thicknesses, 550.0, np.array([1.0]))[0]
+        n1 = indices[0]
+        assert found == pytest.approx(((n_glass - n1**2) / (n_glass + n1**2)) ** 2, abs=1e-12)
+    # and at the edge of grazing it is finite and below 1
+    grazing = stack_reflectance(1.0, 1.5, (1.38,), (99.6,), 550.0, np.array([1e-6]))[0]
+    assert 0.99 < grazing <= 1.0
+
+
+def test_no_dispersion_assumed_in_silence(tmp_path):
+    """V_d = 0 behind a glass is unknown, and said so."""
+    path = tmp_path / "unknown.lens"
+    path.write_text(
+        "# Some Triplet 100mm f/2.7\n# 7 surfaces, 3 glass elements, f/2.7\n\nname: x\nfocal_length: 99.0\n"
+        "\nsurfaces:\n"
+        "40.94 8.74 1.617 0 18.5 0\n0 11.05 1 0 18.5 0\n-55.65 2.78 1.649 33.8 14 0\n39.75 2.5 1 0 14 0\n"
+        "stop 5.13 1 0 14 0\n107.56 9.54 1.617 55 15 0\n-43.33 79.34 1 0 15 0\n"
+    )
+    a_lens, remarks = repair(read_dotlens(path))
+    assert isinstance(a_lens, Lens)
+    assert any("1.617" in remark and ("V_d" in remark or "Abbe" in remark) for remark in remarks)
+    assert a_lens.rows[0].medium.dispersion is not None
+
+
+def test_bare_means_bare():
+    """No film equals Fresnel: asking for no coating gives the bare ghosts, brighter than any coated ones."""
+    bare, coated = (
+        ghost_table(lens(HELIAR, 4.5), FIELD, coating=Everywhere(coating=c))
+        for c in (Bare(), QuarterWave(center_wavelength_nm=D_LINE_NM))
+    )
+    assert bare.ghosts[0].throughput_mm2 > 3.0 * coated.ghosts[0].throughput_mm2
