@@ -47,14 +47,11 @@ if TYPE_CHECKING:
     from .model import Stop as Stop
     from .model import Surface as Surface
     from .model import Tabulated as Tabulated
-    from .optics.ghosts import ghost_table
-    from .render.prepare import first_order
+    from .render.analysis import ghosts as ghosts
+    from .render.analysis import paraxial as paraxial
     from .render.prepare import load_lens as load_lens
     from .render.render import Rendering as Rendering
     from .render.render import render as render
-
-    ghosts = ghost_table
-    paraxial = first_order
 
 _HOMES = {
     ".errors": ("FlarewrightError", "GlassError", "LensError", "OutputError", "ProjectError"),
@@ -65,14 +62,13 @@ _HOMES = {
     ),
     ".io.exr": ("write_exr",),
     ".io.project_file": ("read_project",),
-    ".optics.ghosts": ("ghosts",),
-    ".render.prepare": ("load_lens", "paraxial"),
+    ".render.analysis": ("ghosts", "paraxial"),
+    ".render.prepare": ("load_lens",),
     ".render.render": ("Rendering",),
     # The package itself, which may be called: a function of its name could not live beside it.
     "": ("render",),
 }  # fmt: skip
 _HOME = {name: home for home, names in _HOMES.items() for name in names}
-_NAME_THERE = {"ghosts": "ghost_table", "paraxial": "first_order"}
 
 __all__ = ["__version__", *sorted(_HOME)]  # noqa: PLE0604
 
@@ -82,7 +78,7 @@ def __getattr__(name: str) -> Any:
     if home is None:
         raise AttributeError(f"module 'flarewright' has no attribute {name!r}")
     module = import_module(home or f".{name}", __name__)
-    value = getattr(module, _NAME_THERE.get(name, name)) if home else module
+    value = getattr(module, name) if home else module
     globals()[name] = value
     return value
 

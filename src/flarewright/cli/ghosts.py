@@ -46,15 +46,12 @@ def ghosts(
     choice = parse_coating_choice(coating)
     f_number = chosen_fstop(fstop)
 
-    from ..optics.ghosts import ghost_table
-    from ..render.prepare import first_order, load_lens
+    from ..render.analysis import ghosts as analyse
+    from ..render.prepare import load_lens
 
     remarks: list[str] = []
     prescription = load_lens(lens, remarks=remarks)
-    first_order(prescription, f_number)  # Refuses an f-number that the lens does not open to.
-    table = ghost_table(
-        prescription, angles, f_number=f_number, coating=choice, wavelength_nm=wavelength_nm, paths=paths
-    )
+    table = analyse(prescription, angles, f_number=f_number, coating=choice, wavelength_nm=wavelength_nm, paths=paths)
     tell(remarks)
     if as_json:
         print_json(as_data(table, brightest))

@@ -327,7 +327,9 @@ def spike_profile(
     shadow = np.sinc(sides[0] * np.outer(q, np.sin(wings.angle))) * np.sinc(sides[1] * np.outer(q, np.cos(wings.angle)))
     seen = (shadow[:, :, None] * F[:, None, :]).reshape(len(q), -1)
     shape = (len(v), len(wings.angle), weights.shape[1])
-    cumulative, density = (table.reshape(shape).swapaxes(0, 1) for table in _transform(v, q, seen))
+    cumulative, density = (
+        table.reshape(shape).swapaxes(0, 1) for table in _transform(np.asarray(v, dtype=np.float64), q, seen)
+    )
     return SpikeProfile(
         np.ascontiguousarray((1.0 - fade) * cumulative + fade * (half_total - tail / far)),
         np.ascontiguousarray((1.0 - fade) * density + fade * tail / far**2),

@@ -199,7 +199,8 @@ def _frayed(packed: PackedLens, bundle: Bundle, data: Floats, light: Incidence) 
     t = np.concatenate([b[up] + 1.0 / 3.0, b[down] + 2.0 / 3.0]) / n
     p0, p1, p2 = (bundle.pupil[torn[:, m], None, :] for m in range(3))
     points = p0 + s[:, None] * (p1 - p0) + t[:, None] * (p2 - p0)
-    area = 0.5 * np.abs(np.cross(p1[:, 0] - p0[:, 0], p2[:, 0] - p0[:, 0])) / len(s)
+    e1, e2 = p1[:, 0] - p0[:, 0], p2[:, 0] - p0[:, 0]
+    area = 0.5 * np.abs(e1[:, 0] * e2[:, 1] - e1[:, 1] * e2[:, 0]) / len(s)
     rays = trace_points(packed, 0, bundle.path, light.tilt, points.reshape(-1, 2))
     passes = (rays[:, ALIVE] > 0.0) & (rays[:, REL] <= 1.0)
     for crossing in range(bundle.path.stop_crossings):

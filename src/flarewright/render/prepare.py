@@ -8,6 +8,7 @@ from pathlib import Path
 from ..errors import LensError, ProjectError
 from ..io.lens_file import read_lens
 from ..io.library import lens_path
+from ..io.media import complete as complete_media
 from ..model import Iris, Lens, Project, Surface
 from ..model.raw_lens import RawLens
 from ..optics.paraxial import FirstOrder
@@ -65,10 +66,13 @@ def complete_lens(lens: Lens, *, remarks: list[str] | None = None) -> Lens:
     LensError
         When the lens makes no image by itself.
     """
-    order = first_order(lens)
-    full = complete(lens)
+    known, found = complete_media(lens)
+    if remarks is not None:
+        remarks.extend(found)
+    order = first_order(known)
+    full = complete(known)
     surfaces = sum(isinstance(row, Surface) for row in full.rows)
-    estimated = [str(k) for k, row in enumerate(full.rows) if isinstance(row, Surface) and row is not lens.rows[k]]
+    estimated = [str(k) for k, row in enumerate(full.rows) if isinstance(row, Surface) and row is not known.rows[k]]
     if remarks is not None:
         if estimated:
             which = (
@@ -79,6 +83,24 @@ def complete_lens(lens: Lens, *, remarks: list[str] | None = None) -> Lens:
         if stated is not None and abs(order.efl / stated - 1.0) > 0.02:
             remarks.append(f"the focal length is {order.efl:.2f} mm, the file says {stated:g} mm")
     return full
+
+
+def as_lens(lens: Lens | str | Path, *, remarks: list[str] | None = None) -> Lens:
+    """Take a lens in whatever form a person has it.
+
+    Parameters
+    ----------
+    lens : Lens or str or Path
+        A prescription, or what `load_lens` takes.
+    remarks : list of str, optional
+        Repairs and estimates are told here.
+
+    Returns
+    -------
+    Lens
+        Complete.
+    """
+    return complete_lens(lens, remarks=remarks) if isinstance(lens, Lens) else load_lens(lens, remarks=remarks)
 
 
 def first_order(
@@ -145,10 +167,7 @@ def settle(project: Project) -> Settled:
         As `load_lens` and `first_order`.
     """
     remarks: list[str] = []
-    if isinstance(project.lens, Lens):
-        lens = complete_lens(project.lens, remarks=remarks)
-    else:
-        lens = load_lens(project.lens, remarks=remarks)
+    lens = as_lens(project.lens, remarks=remarks)
     camera = project.camera
     order = first_order(
         lens, project.f_number, sensor_distance=camera.sensor_distance, focus_distance=camera.focus_distance

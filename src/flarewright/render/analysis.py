@@ -1,0 +1,84 @@
+"""The analyses as a person calls them: any form of lens, every check made."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from ..model import CoatingChoice, Lens
+from ..optics.ghosts import GhostTable, ghost_table
+from ..optics.paraxial import D_LINE_NM, FirstOrder
+from .prepare import as_lens, first_order
+
+
+def paraxial(
+    lens: Lens | str | Path,
+    f_number: float | None = None,
+    *,
+    sensor_distance: float | None = None,
+    focus_distance: float | None = None,
+) -> FirstOrder:
+    """Compute focal length, pupils, stop and sensor position of a lens at the d line.
+
+    Parameters
+    ----------
+    lens : Lens or str or Path
+        A prescription, a shipped lens' name, or a lens file.
+    f_number : float, optional
+        None: wide open.
+    sensor_distance, focus_distance : float, optional
+        Override the lens file's, mm.
+
+    Returns
+    -------
+    FirstOrder
+
+    Raises
+    ------
+    FlarewrightError
+        When there is no such lens, it makes no image, or it does not open that far.
+    """
+    known = as_lens(lens)
+    return first_order(known, f_number, sensor_distance=sensor_distance, focus_distance=focus_distance)
+
+
+def ghosts(
+    lens: Lens | str | Path,
+    field_deg: tuple[float, float],
+    *,
+    f_number: float | None = None,
+    coating: CoatingChoice | None = None,
+    wavelength_nm: float = D_LINE_NM,
+    paths: str = "all",
+    threads: int | None = None,
+) -> GhostTable:
+    """Analyse every ghost of a lens for one distant light (`optics.ghosts.ghost_table`).
+
+    Parameters
+    ----------
+    lens : Lens or str or Path
+        A prescription, a shipped lens' name, or a lens file.
+    field_deg : tuple of float
+        (X, Y) of the light.
+    f_number : float, optional
+        None: wide open.
+    coating : CoatingChoice, optional
+        None: as the lens file says.
+    wavelength_nm : float
+    paths : {"all", "same-side"}
+    threads : int, optional
+        None: all cores; the numbers do not depend on it.
+
+    Returns
+    -------
+    GhostTable
+
+    Raises
+    ------
+    FlarewrightError
+        As `paraxial`, and for a coating that does not fit the lens.
+    """
+    known = as_lens(lens)
+    first_order(known, f_number)  # refuses an f-number that the lens does not open to
+    return ghost_table(
+        known, field_deg, f_number=f_number, coating=coating, wavelength_nm=wavelength_nm, paths=paths, threads=threads
+    )
