@@ -82,7 +82,7 @@ def draw_bundle(
     crossings, blades, axes
         As in `clip_triangle`.
     mask, mask_half
-        As in `fill_through_mask`; a mask of one texel is no mask.
+        As in `fill_through_mask`; the mask is None where the iris has blades, and its code is not compiled then.
     to_pixels : ndarray, shape (4,)
         Column of the axis, row of the axis, pixels per mm across and down.
     gain : float
@@ -120,7 +120,7 @@ def draw_bundle(
             flux, area = _triangle_flux(data, pupil, a, b, c)
             flux *= gain
             whole = inside[a] and inside[b] and inside[c]
-            if whole and mask.size == 1:
+            if whole and mask is None:
                 if left >= 0.0 and top >= 0.0 and int(left) == int(right) and int(top) == int(bottom):
                     for channel in range(3):
                         plane[channel, int(top), int(left)] += flux * rgb[channel]
@@ -141,17 +141,18 @@ def draw_bundle(
             drawn = abs(area) * pixel_area
             if drawn < SLIVER:
                 part = 1.0
-                if not whole or mask.size > 1:
+                if not whole or mask is not None:
                     part = abs(polygon_area(polygon, count, PP, PQ)) / _pupil_area(pupil, a, b, c)
-                for m in range(crossings if mask.size > 1 else 0):
-                    part *= mask_value(mask, mask_half, polygon[0, PSTOP + 2 * m], polygon[0, PSTOP + 2 * m + 1])
+                if mask is not None:
+                    for m in range(crossings):
+                        part *= mask_value(mask, mask_half, polygon[0, PSTOP + 2 * m], polygon[0, PSTOP + 2 * m + 1])
                 _splat_polygon(polygon, count, flux * part, rgb, plane)
                 continue
             for m in range(3):
                 k = triangles[t, m]
                 corner[m, 0], corner[m, 1], corner[m, 2] = spots[k, 0], spots[k, 1], densities[k]
             base, gx, gy, dense_low, dense_high = _plane_through(corner, flux / drawn, gain / pixel_area, drawn)
-            if mask.size > 1:
+            if mask is not None:
                 fill_through_mask(
                     polygon, count, crossings, mask, mask_half, base, gx, gy, dense_low, dense_high, rgb,
                     plane, strip,

@@ -99,7 +99,7 @@ def clip_triangle(data, pupil, triangle, mirror, crossings, blades, axes, polygo
         rel_high, rel_low = max(rel_high, data[k, REL]), min(rel_low, data[k, REL])
     if rel_low > 1.0:
         return 0
-    count = 3
+    count = np.int64(3)
     if rel_high > 1.0:
         for m in range(count):
             values[m] = polygon[m, PREL] - 1.0

@@ -170,7 +170,7 @@ def draw_matrix_ghosts(
                 count = _square(polygon, polygon[0, PX], polygon[0, PY])
                 area = SPOT * SPOT
             even = flux / area
-            if mask.size > 1:
+            if mask is not None:
                 fill_through_mask(
                     polygon, count, crossings[p], mask, mask_half, even, 0.0, 0.0, even, even, rgb[w],
                     plane, strip,

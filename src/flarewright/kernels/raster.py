@@ -27,7 +27,7 @@ def _share(c, la, lb, l_inverse, ra, rb, r_inverse):
     return left - _right_of(c + 1.0, ra, rb, r_inverse) + _right_of(c, ra, rb, r_inverse)
 
 
-@inlined
+@compiled
 def _step(k, way, count):
     """Walk around a polygon."""
     k += way
@@ -146,7 +146,7 @@ def fill_polygon(polygon, count, density, gx, gy, density_low, density_high, rgb
     -----
     A pixel receives exact coverage times the density at its centre; the sum over pixels is the polygon's flux.
     """
-    top, bottom = 0, 0
+    top, bottom = np.int64(0), np.int64(0)
     twice_area = 0.0
     for k in range(count):
         if polygon[k, PY] < polygon[top, PY]:

@@ -27,9 +27,6 @@ PEAK_GRID = 256
 # rays spent on the torn edge of a bundle
 MOST_FRAYED = 300_000
 
-# the kernels take a mask of one texel for none
-NO_MASK = np.ones((1, 1))
-
 
 @dataclass(frozen=True)
 class GhostRow:
@@ -229,7 +226,7 @@ def _peak(
     to_pixels = np.array([side / 2 - centre[0] / patch, side / 2 + centre[1] / patch, 1.0 / patch, 1.0 / patch])
     densities = node_densities(data, bundle.pupil, bundle.triangles)
     draw_bundle(
-        data, bundle.pupil, bundle.triangles, densities, bundle.path.stop_crossings, blades, NO_MASK, 1.0, light.axes,
+        data, bundle.pupil, bundle.triangles, densities, bundle.path.stop_crossings, blades, None, 1.0, light.axes,
         to_pixels, light.cosine, np.array([1.0, 0.0, 0.0]), plane, np.empty(side + 1, dtype=np.float32),
     )  # fmt: skip
     return float(plane[0].max()) / patch**2, patch

@@ -33,8 +33,8 @@ class Opening:
         The same opening by straight edges.
     radius : float
         Circle around the opening, mm.
-    mask : ndarray, shape (A, B)
-        Transmittance image; one texel for none.
+    mask : ndarray, shape (A, B), or None
+        Transmittance image, if the iris is one.
     half : float
         The mask spans [-half, half], mm.
     """
@@ -42,13 +42,13 @@ class Opening:
     blades: Floats
     edges: Floats
     radius: float
-    mask: Floats
+    mask: Floats | None
     half: float
 
     @property
     def mean_transmittance(self) -> float:
         """Mean of the mask over the square that it spans; 1 without a mask."""
-        return float(self.mask.mean())
+        return 1.0 if self.mask is None else float(self.mask.mean())
 
 
 @dataclass(frozen=True)
@@ -127,7 +127,7 @@ def make_opening(settled: Settled, mask: Floats | None) -> Opening:
         blades=blade_edges(iris, semi),
         edges=_straight(border),
         radius=float(np.hypot(border[:, 0], border[:, 1]).max()),
-        mask=np.ones((1, 1)),
+        mask=None,
         half=1.0,
     )
 
