@@ -46,7 +46,7 @@ def signed_areas(pupil, triangles) -> np.ndarray:
 
 MESHES = [
     ("heliar-tronnier", (8.0, 5.0), 3.5, (4, 1)),
-    ("heliar-tronnier", (20.0, 10.0), 8.0, (8, 3)),
+    ("heliar-tronnier", (12.0, 6.0), 8.0, (8, 3)),
     ("tessar-brendel", (8.0, 5.0), 2.8, (7, 6)),
     ("tessar-brendel", (0.0, 0.0), 8.0, (5, 4)),
     ("canon-28-80", (15.0, 8.0), 2.8, (26, 24)),
@@ -59,8 +59,6 @@ def test_the_grid_has_no_cracks(lens, field, f_number, pair):
     """Every edge inside belongs to two triangles that run along it in opposite directions; no node lies on an edge."""
     shot = shot_of(lens, field, f_number)
     region, bundle = mesh_of(shot, ghost_path(load_lens(lens), *pair))
-    if bundle is None:
-        pytest.skip("this path passes no light here")
     pupil, triangles = bundle.pupil, bundle.triangles
     assert len(triangles) > 32
     assert (signed_areas(pupil, triangles) > 0.0).all()
@@ -89,8 +87,6 @@ def test_triangles_tile_the_kept_cells(lens, field, f_number, pair):
     shot = shot_of(lens, field, f_number)
     path = ghost_path(load_lens(lens), *pair)
     region, bundle = mesh_of(shot, path)
-    if bundle is None:
-        pytest.skip("this path passes no light here")
     rng = np.random.default_rng(1)
     low, high = region.box[[0, 2]], region.box[[1, 3]]
     points = rng.uniform(low, high, (600, 2))
