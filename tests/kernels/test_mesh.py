@@ -46,7 +46,7 @@ def signed_areas(pupil, triangles) -> np.ndarray:
 
 MESHES = [
     ("heliar-tronnier", (8.0, 5.0), 3.5, (4, 1)),
-    ("heliar-tronnier", (12.0, 6.0), 8.0, (8, 3)),
+    ("heliar-tronnier", (8.0, 5.0), 8.0, (8, 3)),
     ("tessar-brendel", (8.0, 5.0), 2.8, (7, 6)),
     ("tessar-brendel", (0.0, 0.0), 8.0, (5, 4)),
     ("canon-28-80", (15.0, 8.0), 2.8, (26, 24)),
