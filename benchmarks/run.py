@@ -142,7 +142,7 @@ def trace(repeat: int, scalar: float) -> Rows:
 
     def prepass() -> None:
         for path in paths:
-            find_region(packed, 0, path, tilt, shot.opening.radius, shot.view_radius)
+            find_region(packed, path, tilt, shot.opening.radius, shot.view_radius)
 
     found.append(row("trace", "pre-pass of 171 paths, 1 thread", 1e3 * median_seconds(prepass, repeat), "ms"))
     return found

@@ -30,12 +30,13 @@ def shot_of(lens: str, field_deg, f_number: float, wavelengths: int = 3) -> Shot
 
 
 def mesh_of(shot: Shot, path: LightPath, tolerance: float = 0.25, scale: float = 10.0):
-    region = find_region(shot.packed, 1, path, shot.incidence.tilt, shot.opening.radius, shot.view_radius)
+    region = find_region(shot.packed, path, shot.incidence.tilt, shot.opening.radius, shot.view_radius)
     if region is None:
         return None, None
     bundle = trace_grid(
-        shot.packed, path, shot.incidence.tilt, shot.opening.radius, region.box, tolerance=tolerance, scale=scale
-    )
+        shot.packed, path, shot.incidence.tilt, (shot.opening.radius, shot.opening.inner), region,
+        tolerance=tolerance, scale=scale,
+    )  # fmt: skip
     return region, bundle
 
 
@@ -137,8 +138,7 @@ def dense_flux(shot: Shot, path: LightPath, w: int, n: int) -> tuple[float, floa
     for c in range(path.stop_crossings):
         passing &= np.hypot(data[:, 5 + 2 * c], data[:, 6 + 2 * c]) <= shot.opening.radius
     weight = np.where(passing, data[:, 2], 0.0) * hx * hy * 2.0 * shot.incidence.cosine
-    middle = (len(packed.wavelengths_nm) - 1) // 2
-    region = find_region(packed, middle, path, tilt, shot.opening.radius, shot.view_radius)
+    region = find_region(packed, path, tilt, shot.opening.radius, shot.view_radius)
     if region is None:
         return float(weight.sum()), 0.0
     b = region.box
@@ -163,15 +163,16 @@ def test_the_prepass_misses_nothing(f_number):
     assert missed("heliar-tronnier", (12.0, 7.0), f_number, "all", 64) < 1e-4
 
 
+# a sliver beside the main region of path 25-21, for a light far outside the picture
+SLIVER = pytest.mark.xfail(strict=True, reason="2e-4 of the ghost light of a stopped-down zoom at 35 degrees is missed")
 FIELDS = [(3.0, 0.0), (8.0, 5.0), (20.0, 10.0), (33.0, 12.0)]
-BEYOND = pytest.mark.xfail(strict=True, reason="path 25-21 of a light outside the picture: 1.7e-4 of all ghost light")
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("field", "f_number"),
     [
-        pytest.param(field, n, marks=BEYOND if (field, n) == ((33.0, 12.0), 16.0) else ())
+        pytest.param(field, n, marks=SLIVER if (field, n) == ((33.0, 12.0), 16.0) else ())
         for field in FIELDS
         for n in (2.8, 8.0, 16.0)
     ],
@@ -182,10 +183,15 @@ def test_the_prepass_misses_nothing_of_the_zoom(field, f_number):
 
 
 @pytest.mark.slow
-@pytest.mark.xfail(strict=True, reason="the pre-pass looks at the middle wavelength; blue and red may pass elsewhere")
 @pytest.mark.parametrize(
     ("field", "f_number"),
-    [((33.0, 12.0), 2.8), ((20.0, 10.0), 8.0), ((33.0, 12.0), 8.0), ((20.0, 10.0), 16.0), ((33.0, 12.0), 16.0)],
+    [
+        ((33.0, 12.0), 2.8),
+        ((20.0, 10.0), 8.0),
+        ((33.0, 12.0), 8.0),
+        ((20.0, 10.0), 16.0),
+        pytest.param((33.0, 12.0), 16.0, marks=SLIVER),
+    ],
 )
 def test_the_prepass_misses_no_colour(field, f_number):
     assert missed("canon-28-80", field, f_number, "all", 128) < 1e-4

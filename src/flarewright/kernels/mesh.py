@@ -15,7 +15,9 @@ RIM_LEVEL = 2
 
 
 @compiled
-def _judge(data, nodes, crossings, iris_radius, level, max_level, h, tolerance, flux_tolerance, scale, view_radius):
+def _judge(
+    data, nodes, crossings, iris_radius, iris_inner, level, max_level, h, tolerance, flux_tolerance, scale, view_radius,
+):  # fmt: skip
     """Decide whether a cell of 3 x 3 nodes is EMPTY, to be SPLIT, a LEAF, or a FLAT one.
 
     The fan of a LEAF uses the middles of its edges, which leaves a quarter of the measured error.
@@ -41,12 +43,13 @@ def _judge(data, nodes, crossings, iris_radius, level, max_level, h, tolerance, 
     # the rim of the bundle decides its flux, so it is resolved however small the ghost is
     for limit in range(1 + crossings):
         low, high, bend = _limit_range(data, nodes, limit, iris_radius)
-        if low < 1.0 < high:
+        # between the circles in and around the iris run its blades
+        if low < 1.0 and high > (1.0 if limit == 0 else iris_inner / iris_radius):
             # a rim met by several surfaces has corners that a coarse cell cannot tell
             if level < RIM_LEVEL:
                 return SPLIT
             at_rim = True
-            part = bend / (high - low)
+            part = bend / max(high - low, 1e-12)
             error = max(error, part * h / flux_tolerance, part * extent / tolerance)
     if extent >= 1.0:
         bend_x, bend_y = _bend(data, nodes, np.int64(X)), _bend(data, nodes, np.int64(Y))
@@ -113,7 +116,7 @@ def _fan_areas(data, nodes):
 @compiled
 def build_mesh(
     rows, actions, curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, tilt,
-    crossings, iris_radius, box, nx, ny, max_level, tolerance, flux_tolerance, scale, view_radius,
+    crossings, iris_radius, iris_inner, box, nx, ny, max_level, tolerance, flux_tolerance, scale, view_radius,
 ):  # fmt: skip
     """Trace a path on a grid that is refined where the map bends, folds or is cut, and triangulate it without cracks.
 
@@ -122,6 +125,8 @@ def build_mesh(
     rows ... iris_radius
         As in `kernels.prepass.find_box`, but `n_gap` (V, K + 1) and `reflectance` (V, K, M) at the few wavelengths
         that the grid shall fit: a cell is left out when none of them passes and refined when one of them asks for it.
+    iris_inner : float
+        Radius of the circle within the iris, mm.
     box : ndarray, shape (4,)
         Pupil region, mm.
     nx, ny : int
@@ -178,7 +183,7 @@ def build_mesh(
             verdict = EMPTY
             for v in range(n_gap.shape[0]):
                 found = _judge(
-                    data[v], nodes, crossings, iris_radius, level, max_level, h,
+                    data[v], nodes, crossings, iris_radius, iris_inner, level, max_level, h,
                     tolerance, flux_tolerance, scale, view_radius,
                 )  # fmt: skip
                 if found == SPLIT:

@@ -78,9 +78,10 @@ def find_box(
     -------
     found : ndarray, shape (4,)
         The box of all cells that may pass light; x1 < x0 when there is none.
-    sums : ndarray, shape (4,)
+    sums : ndarray, shape (6,)
         Rough estimates from the cells that may pass, both halves, per unit irradiance: flux; flux that lands within
-        `view_radius`; the integral of flux times irradiance; cells that may touch the view.
+        `view_radius`; the integral of flux times irradiance; cells that may touch the view; cells that may pass; pupil
+        area whose samples pass, mm^2.
 
     Notes
     -----
@@ -99,7 +100,7 @@ def find_box(
     data = np.empty((count, STOP_X + 2 * crossings))
     trace_nodes(rows, actions, curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, tilt, px, py, data)
     found = np.array([np.inf, -np.inf, np.inf, -np.inf])
-    sums = np.zeros(4)
+    sums = np.zeros(6)
     nodes = np.empty(4, dtype=np.int64)
     share = hx * hy * np.cos(tilt)
     accepted = 0
@@ -114,6 +115,7 @@ def find_box(
                 found[2], found[3] = min(found[2], box[2] + b * hy), max(found[3], box[2] + (b + 1) * hy)
                 _weigh(data, nodes, share, view_radius, sums)
                 accepted += 1
+                sums[4] += 1.0
             elif _doubtful(data, nodes, nx, ny, crossings, iris_radius):
                 doubtful[n_doubtful] = a * ny + b
                 n_doubtful += 1
@@ -127,6 +129,9 @@ def find_box(
             rows, actions, curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, tilt,
             crossings, iris_radius, corners, hx, hy, found, sums,
         )  # fmt: skip
+    for k in range(count):
+        if _passes(data, k, crossings, iris_radius):
+            sums[5] += hx * hy
     # the pre-pass sees one wavelength and straight cells: leave a cell of room around
     for m in range(2):
         step = hx if m == 0 else hy
@@ -164,6 +169,18 @@ def _doubtful(data, nodes, nx, ny, crossings, iris_radius):
 
 
 @compiled
+def _passes(data, k, crossings, iris_radius):
+    """Tell whether a ray passes every rim, and the circle around the iris at each crossing."""
+    if data[k, ALIVE] == 0.0 or data[k, REL] > 1.0:
+        return False
+    for c in range(crossings):
+        u, v = data[k, STOP_X + 2 * c], data[k, STOP_X + 2 * c + 1]
+        if u * u + v * v > iris_radius * iris_radius:
+            return False
+    return True
+
+
+@compiled
 def _probe(
     rows, actions, curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, tilt,
     crossings, iris_radius, corners, hx, hy, found, sums,
@@ -178,11 +195,7 @@ def _probe(
     data = np.empty((px.size, STOP_X + 2 * crossings))
     trace_nodes(rows, actions, curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, tilt, px, py, data)
     for k in range(px.size):
-        passes = data[k, ALIVE] > 0.0 and data[k, REL] <= 1.0
-        for c in range(crossings):
-            u, v = data[k, STOP_X + 2 * c], data[k, STOP_X + 2 * c + 1]
-            passes = passes and u * u + v * v <= iris_radius * iris_radius
-        if passes:
+        if _passes(data, k, crossings, iris_radius):
             found[0], found[1] = min(found[0], px[k] - hx / PROBES), max(found[1], px[k] + hx / PROBES)
             found[2], found[3] = min(found[2], py[k] - hy / PROBES), max(found[3], py[k] + hy / PROBES)
             sums[0] += 2.0 * data[k, WEIGHT] * hx * hy / each * np.cos(tilt)

@@ -146,7 +146,7 @@ def fill_polygon(polygon, count, density, gx, gy, density_low, density_high, rgb
     -----
     A pixel receives exact coverage times the density at its centre; the sum over pixels is the polygon's flux.
     """
-    top, bottom = np.int64(0), np.int64(0)
+    top = bottom = count - count  # zeros of the type of `count`, not literals
     twice_area = 0.0
     for k in range(count):
         if polygon[k, PY] < polygon[top, PY]:

@@ -19,6 +19,8 @@ Floats = NDArray[np.float64]
 
 # cells of the pre-pass over half the pupil: 64 across the whole
 PREPASS = (32, 64)
+# regions of fewer cells than this are looked for at every colour
+SMALL_REGION = 64
 # coarsest cells of a bundle's grid over half its region, and how often each may be halved
 GRID = (4, 8)
 MAX_LEVEL = 6
@@ -115,17 +117,19 @@ class Region:
         The part of it that may land in the picture; 0 when the path passes it by.
     brightness : float
         Irradiance on the sensor, weighted by flux.
+    share : float
+        Part of the box that passes light.
     """
 
     box: Floats
     flux: float
     seen_flux: float
     brightness: float
+    share: float
 
 
 def find_region(
     packed: PackedLens,
-    w: int,
     path: LightPath,
     tilt: float,
     iris_radius: float,
@@ -136,8 +140,6 @@ def find_region(
     Parameters
     ----------
     packed : PackedLens
-    w : int
-        Which wavelength.
     path : LightPath
     tilt : float
     iris_radius : float
@@ -150,40 +152,84 @@ def find_region(
     Region or None
         None when nothing passes.
     """
-    arguments = (*_arguments(packed, w, path, tilt), path.stop_crossings, iris_radius, view_radius)
+    middle, *others = _fitted(packed)
     box, cells = front_box(packed, tilt), PREPASS
+    small = False
     for _ in range(4):
-        found, sums = find_box(*arguments, box, *cells)
+        found, sums = _scan(packed, middle, path, tilt, iris_radius, view_radius, box, cells)
+        # a large region leaves a cell of room for other colours; a small one may lie elsewhere for them
+        small = small or sums[4] < SMALL_REGION
+        if small:
+            # the whole front is too much to scan thrice where one colour has shown the place
+            near, few = (_around(found, box, cells), (16, 32)) if cells == PREPASS and sums[4] > 0.0 else (box, cells)
+            for w in others:
+                elsewhere, more = _scan(packed, w, path, tilt, iris_radius, view_radius, near, few)
+                found[0::2] = np.minimum(found[0::2], elsewhere[0::2])
+                found[1::2] = np.maximum(found[1::2], elsewhere[1::2])
+                sums = np.maximum(sums, more)
         if found[1] <= found[0] or sums[0] <= 0.0:
             return None
-        shrunk = (found[1] - found[0]) * (found[3] - found[2]) < 0.3 * (box[1] - box[0]) * (box[3] - box[2])
+        area = float((found[1] - found[0]) * (found[3] - found[2]))
+        shrunk = area < 0.3 * (box[1] - box[0]) * (box[3] - box[2])
         box, cells = found, (16, 32)
         if not shrunk:
             break
     seen = float(sums[1]) if sums[3] > 0.0 else 0.0
-    return Region(box, float(sums[0]), seen, float(sums[2] / sums[0]))
+    return Region(box, float(sums[0]), seen, float(sums[2] / sums[0]), float(np.clip(sums[5] / area, 1e-3, 1.0)))
+
+
+def _around(found: Floats, box: Floats, cells: tuple[int, int]) -> Floats:
+    """Widen a region to three times its size and by four cells of the scan that found it, within the scan's box."""
+    wide = max(found[1] - found[0], 4.0 * (box[1] - box[0]) / cells[0])
+    high = max(found[3] - found[2], 4.0 * (box[3] - box[2]) / cells[1])
+    grown = found + np.array([-wide, wide, -high, high])
+    return np.array([max(grown[0], box[0]), min(grown[1], box[1]), max(grown[2], box[2]), min(grown[3], box[3])])
+
+
+def _fitted(packed: PackedLens) -> list[int]:
+    """Choose the wavelengths that stand for all: the middle one, then the ends."""
+    last = len(packed.wavelengths_nm) - 1
+    return [last // 2, *(w for w in (0, last) if w != last // 2)]
+
+
+def _scan(
+    packed: PackedLens,
+    w: int,
+    path: LightPath,
+    tilt: float,
+    iris_radius: float,
+    view_radius: float,
+    box: Floats,
+    cells: tuple[int, int],
+) -> tuple[Floats, Floats]:
+    """Run the pre-pass over a box at one wavelength."""
+    arguments = (*_arguments(packed, w, path, tilt), path.stop_crossings, iris_radius, view_radius)
+    found, sums = find_box(*arguments, box, *cells)
+    return found, sums
 
 
 def trace_grid(
     packed: PackedLens,
     path: LightPath,
     tilt: float,
-    iris_radius: float,
-    box: Floats,
+    iris: tuple[float, float],
+    region: Region,
     *,
     tolerance: float,
     scale: float,
     view_radius: float = float("inf"),
-    flux_tolerance: float = 5e-4,
+    flux_tolerance: float = 3e-4,
 ) -> Bundle:
     """Build the adaptive grid of a path.
 
     Parameters
     ----------
-    packed, path, tilt, iris_radius
+    packed, path, tilt
         As in `find_region`; the grid fits the first, middle and last wavelength.
-    box : ndarray, shape (4,)
-        Of the region found.
+    iris : tuple of float
+        Radii of the circles around and within the iris, mm.
+    region : Region
+        From `find_region`.
     tolerance : float
         Largest interpolation error, pixels.
     scale : float
@@ -197,11 +243,12 @@ def trace_grid(
     -------
     Bundle
     """
-    last = len(packed.wavelengths_nm) - 1
-    fitted = sorted({0, last // 2, last})
+    fitted = sorted(_fitted(packed))
+    # the rim's error adds up along the rim of what passes, which may be little of the box
+    rim_tolerance = flux_tolerance * sqrt(region.share)
     pupil, data, triangles = build_mesh(
-        *_arguments(packed, fitted, path, tilt), path.stop_crossings, iris_radius,
-        box, *GRID, MAX_LEVEL, tolerance, flux_tolerance, scale, view_radius,
+        *_arguments(packed, fitted, path, tilt), path.stop_crossings, *iris,
+        region.box, *GRID, MAX_LEVEL, tolerance, rim_tolerance, scale, view_radius,
     )  # fmt: skip
     return Bundle(path, pupil, triangles, dict(zip(fitted, data, strict=True)))
 

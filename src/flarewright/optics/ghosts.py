@@ -156,7 +156,7 @@ def _relative(row: GhostRow, unit: float) -> GhostRow:
 def _measure(lens: Lens, packed: PackedLens, path: LightPath, light: Incidence) -> GhostRow:
     bounded_by, focus = _paraxial_facts(lens, packed, path)
     blades = blade_edges(Iris(), packed.stop_semi)
-    region = find_region(packed, 0, path, light.tilt, packed.stop_semi)
+    region = find_region(packed, path, light.tilt, packed.stop_semi)
     j, i = path.first_reflection, path.second_reflection
     nothing = GhostRow(j, i, 0.0, (0.0, 0.0), 0.0, 0.0, 0.0, bounded_by, focus)
     if region is None:
@@ -164,7 +164,9 @@ def _measure(lens: Lens, packed: PackedLens, path: LightPath, light: Incidence) 
     scale = 1e-6
     # first only the rim, to learn the size; then fine enough for that size
     for _ in range(2):
-        bundle = trace_grid(packed, path, light.tilt, packed.stop_semi, region.box, tolerance=0.25, scale=scale)
+        bundle = trace_grid(
+            packed, path, light.tilt, (packed.stop_semi, packed.stop_semi), region, tolerance=0.25, scale=scale
+        )
         data = trace_bundle(packed, 0, bundle, light.tilt)
         sums = measure_bundle(data, bundle.pupil, bundle.triangles, path.stop_crossings, blades, light.axes)
         sums[:4] += _frayed(packed, bundle, data, light)

@@ -60,11 +60,11 @@ def direct_image(lens: Lens, shot: Shot) -> DirectImage:
     packed, opening = shot.packed, shot.opening
     count = len(packed.wavelengths_nm)
     middle = (count - 1) // 2
-    region = find_region(packed, middle, path, tilt, opening.radius)
+    region = find_region(packed, path, tilt, opening.radius)
     if region is None:
         ideal = -packed.first_order.efl * np.tan(tilt) * axes[1]
         return DirectImage(np.zeros(count), (float(ideal[0]), float(ideal[1])), 0.0)
-    bundle = trace_grid(packed, path, tilt, opening.radius, region.box, tolerance=0.25, scale=_SCALE)
+    bundle = trace_grid(packed, path, tilt, (opening.radius, opening.inner), region, tolerance=0.25, scale=_SCALE)
     flux = np.zeros(count)
     place, mean = (0.0, 0.0), 0.0
     for w in range(count):

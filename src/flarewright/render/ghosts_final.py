@@ -64,8 +64,7 @@ def find_final(shot: Shot, path: LightPath) -> FinalPass | None:
     -------
     FinalPass or None
     """
-    middle = (len(shot.packed.wavelengths_nm) - 1) // 2
-    region = find_region(shot.packed, middle, path, shot.incidence.tilt, shot.opening.radius, shot.view_radius)
+    region = find_region(shot.packed, path, shot.incidence.tilt, shot.opening.radius, shot.view_radius)
     return None if region is None else FinalPass(shot, path, region)
 
 
@@ -107,7 +106,7 @@ def draw_final(
     to_pixels = shot.to_pixels / 2.0**detail
     scale = float(max(to_pixels[2], to_pixels[3]))
     bundle = trace_grid(
-        shot.packed, path, tilt, opening.radius, item.region.box,
+        shot.packed, path, tilt, (opening.radius, opening.inner), item.region,
         tolerance=quality.tolerance_px, scale=scale, view_radius=shot.view_radius,
     )  # fmt: skip
     count = len(shot.packed.wavelengths_nm)

@@ -31,8 +31,8 @@ class Opening:
         Curved edges (`optics.iris.blade_edges`); the border of a mask image.
     edges : ndarray, shape (E, 4)
         The same opening by straight edges.
-    radius : float
-        Circle around the opening, mm.
+    radius, inner : float
+        Circles around and within the opening, mm; half of it for a mask, whose inside is unknown.
     mask : ndarray, shape (A, B), or None
         Transmittance image, if the iris is one.
     half : float
@@ -42,6 +42,7 @@ class Opening:
     blades: Floats
     edges: Floats
     radius: float
+    inner: float
     mask: Floats | None
     half: float
 
@@ -115,18 +116,21 @@ def make_opening(settled: Settled, mask: Floats | None) -> Opening:
         # the mask ends at its own border, so the border cuts as four blades
         sides = ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))
         square = np.array([[x, y, semi, 0.0] for x, y in sides])
-        return Opening(square, square, float(np.sqrt(2.0) * semi), np.ascontiguousarray(mask, dtype=np.float64), semi)
+        image = np.ascontiguousarray(mask, dtype=np.float64)
+        return Opening(square, square, float(np.sqrt(2.0) * semi), 0.5 * semi, image, semi)
     iris = settled.iris
     curved = iris.blades == 0 or iris.rounding > 0.0
+    edges = blade_edges(iris, semi)
     border = outline(iris, semi, DRAFT_EDGES if curved else iris.blades)
     if curved:
         # chords lose a little of the arc's area; give it back
         step = 2.0 * np.pi / DRAFT_EDGES
         border = border * float(np.sqrt(step / np.sin(step)))
     return Opening(
-        blades=blade_edges(iris, semi),
+        blades=edges,
         edges=_straight(border),
         radius=float(np.hypot(border[:, 0], border[:, 1]).max()),
+        inner=float(edges[:, 2].min()),
         mask=None,
         half=1.0,
     )
