@@ -40,7 +40,8 @@ def trace_rays(
     """
     light = incidence(field_deg)
     data = trace_points(packed, w, path, light.tilt, np.stack([x, y], axis=1) @ light.axes.T)
-    on_sensor, at_stop = data[:, 0:2] @ light.axes, data[:, -2:] @ light.axes
+    with np.errstate(invalid="ignore"):  # rays that ended hold whatever their last step left
+        on_sensor, at_stop = data[:, 0:2] @ light.axes, data[:, -2:] @ light.axes
     return {
         "x": on_sensor[:, 0],
         "y": on_sensor[:, 1],
