@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,10 +31,10 @@ class Canvas:
     """
 
     size_px: tuple[int, int]
-    planes: list[NDArray[np.float32] | None]
+    planes: list[Plane | None]
     strip: NDArray[np.float32]
 
-    def scratch(self, detail: int = 0) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    def scratch(self, detail: int = 0) -> tuple[Plane, NDArray[np.float32]]:
         """Return plane and scratch in the order in which kernels take them; `detail` halves the resolution."""
         plane = self.planes[detail]
         if plane is None:
@@ -41,21 +42,36 @@ class Canvas:
             plane = self.planes[detail] = np.zeros((3, height, width), dtype=np.float32)
         return plane, self.strip
 
-    def merged(self) -> NDArray[np.float32]:
-        """Return the light of all resolutions at full resolution, shape (3, H, W)."""
-        width, height = self.size_px
-        total = self.scratch()[0]
-        for detail in range(1, DETAILS):
-            plane = self.planes[detail]
-            if plane is not None:
-                fine = plane
-                for _ in range(detail):
-                    fine = _double(_double(fine, 1), 2)
-                total = total + fine[:, :height, :width]
-        return total
+
+def merge(planes: Sequence[Plane | None], size_px: tuple[int, int]) -> Plane:
+    """Bring the light of all resolutions to full resolution.
+
+    Parameters
+    ----------
+    planes : sequence of ndarray or None
+        As `Canvas.planes`.
+    size_px : tuple of int
+        Width and height.
+
+    Returns
+    -------
+    ndarray, shape (3, H, W)
+        Flux per pixel; black when nothing was drawn.
+    """
+    width, height = size_px
+    total = planes[0]
+    if total is None:
+        total = np.zeros((3, height, width), dtype=np.float32)
+    for detail, plane in enumerate(planes):
+        if detail > 0 and plane is not None:
+            fine = plane
+            for _ in range(detail):
+                fine = _double(_double(fine, 1), 2)
+            total = total + fine[:, :height, :width]
+    return total
 
 
-def _double(plane: NDArray[np.float32], axis: int) -> NDArray[np.float32]:
+def _double(plane: Plane, axis: int) -> NDArray[np.float32]:
     """Double the resolution along an axis by linear interpolation of irradiance; the flux stays."""
     plane = np.moveaxis(plane, axis, -1)
     padded = np.concatenate([plane[..., :1], plane, plane[..., -1:]], axis=-1)

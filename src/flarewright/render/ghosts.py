@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ..kernels.raster import sum_rows
 from ..model import Layer, Quality
 from ..optics.paths import LightPath
-from .canvas import Plane, blank, to_layer
+from .canvas import DETAILS, Plane, blank, merge, to_layer
 from .ghosts_draft import draw_draft
 from .ghosts_final import FinalPass, contrast, draw_final, find_final
 from .shot import Shot
@@ -130,7 +130,7 @@ def _final(
 
     alone = set(order if singles is None else order[:singles])
 
-    def draw(group: list[int]) -> Plane:
+    def draw(group: list[int]) -> list[Plane | None]:
         canvas = blank(shots[0].size_px)
         for k in group:
             if meter.cancelled.is_set():
@@ -141,7 +141,7 @@ def _final(
                     visibility = float("inf") if k in alone else contrast(item, level)
                     draw_final(item, quality, canvas, visibility, meter.cancelled)
             meter.step(f"ghost {found[k][0].path.name}")
-        return canvas.merged()
+        return canvas.planes
 
     named = [found[k][0].path for k in order]
     total, layers = _collect(shots, [[k] for k in order], named, singles, draw, pool)
@@ -156,7 +156,7 @@ def _draft(
     pool: ThreadPoolExecutor,
     meter: _Meter,
 ) -> GhostPass:
-    def draw(group: list[int]) -> Plane:
+    def draw(group: list[int]) -> list[Plane | None]:
         width, height = shots[0].size_px
         picture = np.zeros((3, height, width))
         for shot in shots:
@@ -164,7 +164,7 @@ def _draft(
         sum_rows(picture)
         for k in group:
             meter.step(f"ghost {paths[k].name}")
-        return picture
+        return [picture]
 
     order = list(range(len(paths))) if singles == 0 else _rank_draft(shots, paths)
     named = [paths[k] for k in order]
@@ -210,7 +210,7 @@ def _collect(
     items: list[list[int]],
     named: Sequence[LightPath],
     singles: int | None,
-    draw: Callable[[list[int]], Plane],
+    draw: Callable[[list[int]], list[Plane | None]],
     pool: ThreadPoolExecutor,
 ) -> tuple[Layer, tuple[Layer, ...]]:
     """Draw the first `singles` items by themselves and the others in a fixed number of groups; add all in order."""
@@ -221,15 +221,25 @@ def _collect(
     most = next((n for size, n in _CHUNKS if width * height <= size), 2)
     chunks = max(1, min(most, (len(items) - alone) // _PATHS_A_CHUNK))
     rest = [[k for item in items[alone + c :: chunks] for k in item] for c in range(chunks)]
-    total: Plane | None = None
+    totals: list[Plane | None] = [None] * DETAILS
     layers = []
-    for k, plane in enumerate(pool.map(draw, items[:alone])):
-        total = plane.copy() if total is None else np.add(total, plane, out=total)
-        path = named[k]
+    for k, planes in enumerate(pool.map(draw, items[:alone])):
+        path, plane = named[k], merge(planes, shot.size_px)
         about: dict[str, str | float] = {"path": path.name, "flux_mm2": float(plane.sum(dtype=np.float64) / 3.0)}
         layers.append(to_layer(f"ghost.{path.name}", plane, pixel_area, about))
-    for plane in pool.map(draw, [group for group in rest if group]):
-        total = plane if total is None else np.add(total, plane, out=total)
-    if total is None:
-        total = np.zeros((3, height, width), dtype=np.float32)
+        # the layer has its own copy by now
+        totals = _added(totals, planes)
+    for planes in pool.map(draw, [group for group in rest if group]):
+        totals = _added(totals, planes)
+    total = merge(totals, shot.size_px)
     return to_layer("ghosts", total, pixel_area, {}), tuple(layers)
+
+
+def _added(totals: Sequence[Plane | None], planes: Sequence[Plane | None]) -> list[Plane | None]:
+    """Add pictures resolution by resolution; the memory of `totals`, which nobody else holds, is used again."""
+    sums = list(totals)
+    for k, plane in enumerate(planes):
+        held = sums[k]
+        if plane is not None:
+            sums[k] = plane if held is None else np.add(held, plane, out=held)
+    return sums

@@ -28,7 +28,7 @@ Floats = NDArray[np.float64]
 BRIDGE_PX = 2.0
 SHIFT_QUANTILE = 0.9
 # ghosts fainter than these parts of the picture's mean are drawn at a half and a quarter of the resolution
-DETAIL_CONTRAST = (4e-3, 1e-3)
+DETAIL_CONTRAST = (1.5e-2, 4e-3)
 # a step of colour fainter than this part of the picture's mean is not seen
 STEP_CONTRAST = 2e-3
 # never more drawings than this between two traced wavelengths
