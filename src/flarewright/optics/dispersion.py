@@ -101,17 +101,17 @@ def abbe_number(dispersion: Dispersion) -> float:
     return float((n_d - 1.0) / (n_F - n_C))
 
 
-def _check_range(dispersion: Dispersion, wavelength: NDArray[np.float64]) -> None:
+def _check_range(dispersion: Dispersion, wavelength_nm: NDArray[np.float64]) -> None:
     low, high = dispersion.range_nm
     low = min(low * (1.0 - _STRETCH), _VISIBLE_NM[0])
     high = max(high * (1.0 + _STRETCH), _VISIBLE_NM[1])
-    if wavelength.size and not bool(np.all((wavelength >= low) & (wavelength <= high))):
+    if wavelength_nm.size and not bool(np.all((wavelength_nm >= low) & (wavelength_nm <= high))):
         raise GlassError(
             f"{dispersion.glass} is known from {dispersion.range_nm[0]:g} to {dispersion.range_nm[1]:g} nm, "
-            f"not at {_span(wavelength)} nm: keep the wavelengths between {low:.0f} and {high:.0f} nm"
+            f"not at {_span(wavelength_nm)} nm: keep the wavelengths between {low:.0f} and {high:.0f} nm"
         )
 
 
-def _span(wavelength: NDArray[np.float64]) -> str:
-    low, high = float(np.min(wavelength)), float(np.max(wavelength))
+def _span(wavelength_nm: NDArray[np.float64]) -> str:
+    low, high = float(np.min(wavelength_nm)), float(np.max(wavelength_nm))
     return f"{low:g}" if low == high else f"{low:g} to {high:g}"

@@ -207,13 +207,13 @@ def _draw_fans(
         fans.append((angle, ghost, _GHOST_RAYS))
     elif angle:
         fans.append((angle, None, _FIELD_RAYS))
-    for degrees, path, colour in fans:
-        rays = _fan(lens, order, degrees, path)
+    for angle_deg, path, colour in fans:
+        rays = _fan(lens, order, angle_deg, path)
         if not len(rays):
             what = f"the ghost {path[0]}-{path[1]}" if path else "the direct path"
-            remarks.append(f"no ray of {what} gets through at {degrees:g} degrees, so none is drawn")
+            remarks.append(f"no ray of {what} gets through at {angle_deg:g} degrees, so none is drawn")
         for points in rays:
-            direction = np.array([cos(radians(degrees)), -sin(radians(degrees))])
+            direction = np.array([cos(radians(angle_deg)), -sin(radians(angle_deg))])
             before = points[0] - direction * (points[0, 0] + lead) / direction[0]
             sheet.line(
                 np.vstack([before, points]),
@@ -222,7 +222,7 @@ def _draw_fans(
     return remarks
 
 
-def _fan(lens: Lens, order: FirstOrder, degrees: float, ghost: tuple[int, int] | None) -> list[Floats]:
+def _fan(lens: Lens, order: FirstOrder, angle_deg: float, ghost: tuple[int, int] | None) -> list[Floats]:
     """Return the polylines (z, y) of a few rays that get through, spread over the opening."""
     from ..optics.paths import direct_path, ghost_path
     from ..optics.trace import trace_polylines
@@ -231,9 +231,9 @@ def _fan(lens: Lens, order: FirstOrder, degrees: float, ghost: tuple[int, int] |
     first = lens.rows[0]
     limit = _semi(first, order)
     # Rays start on the plane of the first vertex; a bulging front lets oblique ones in from further out.
-    reach = limit * (1.0 + abs(tan(radians(degrees))))
+    reach = limit * (1.0 + abs(tan(radians(angle_deg))))
     y = np.linspace(-reach, reach, _CANDIDATES)
-    hits = trace_polylines(lens, ghost, np.zeros_like(y), y, -radians(degrees), sensor_distance=order.sensor_distance)
+    hits = trace_polylines(lens, ghost, np.zeros_like(y), y, -radians(angle_deg), sensor_distance=order.sensor_distance)
     semi = np.array([_semi(lens.rows[row], order) for row in path.rows])
     radius = np.hypot(hits[:, 1:-1, 0], hits[:, 1:-1, 1])
     with np.errstate(invalid="ignore"):
