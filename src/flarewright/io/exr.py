@@ -12,6 +12,7 @@ least) puts it into the picture's corner, for which `full_windows=True` writes e
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from os import PathLike
@@ -126,6 +127,10 @@ def write_exr(
         if k == 0:
             header |= {f"{_PREFIX}{name}": text for name, text in metadata.items()}
         parts.append(OpenEXR.Part(header, channels, layer.name))
+
+    # the library compresses on one thread unless it is told otherwise; its oldest releases cannot be told
+    if hasattr(OpenEXR, "set_global_thread_count"):
+        OpenEXR.set_global_thread_count(max(OpenEXR.global_thread_count(), os.cpu_count() or 1))
 
     def write(temporary: Path) -> None:
         try:
