@@ -227,7 +227,7 @@ def test_ghosts_json_is_the_promised_contract(capsys):
     assert set(data["direct"]) == {"throughput_mm2", "centroid_mm", "rms_radius_mm"}
     assert len(data["ghosts"]) == 28
     wanted = {"first_reflection", "second_reflection", "throughput_mm2", "centroid_mm", "rms_radius_mm"}
-    assert wanted | {"peak_irradiance", "bounded_by", "focus_distance_mm"} == set(data["ghosts"][0])
+    assert wanted | {"peak_irradiance", "peak_patch_mm", "bounded_by", "focus_distance_mm"} == set(data["ghosts"][0])
     flux = [row["throughput_mm2"] for row in data["ghosts"]]
     assert flux == sorted(flux, reverse=True)
     assert all(row["first_reflection"] > row["second_reflection"] for row in data["ghosts"])

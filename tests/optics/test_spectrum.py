@@ -13,7 +13,6 @@ from flarewright.optics.color import xyz_to_rgb_matrix
 from flarewright.optics.spectrum import (
     band_weights,
     cie_1931,
-    fine_weights,
     planck,
     spectral_power,
     spectrum_xyz,
@@ -53,14 +52,14 @@ def test_every_light_has_luminance_one():
 @settings(deadline=None)
 @given(st.integers(1, 81), st.sampled_from([D65(), BlackBody(temperature_k=3000), SODIUM]))
 def test_the_sum_does_not_depend_on_the_sampling(count, light):
-    fine = fine_weights(light, np.arange(360, 831, 5), "acescg").sum(axis=0)
+    fine = band_weights(light, np.arange(360, 831, 5), "acescg").sum(axis=0)
     np.testing.assert_allclose(band_weights(light, traced_wavelengths(count), "acescg").sum(axis=0), fine, atol=1e-12)
 
 
 def test_weights_integrate_what_is_linear_between_the_nodes():
     nodes = traced_wavelengths(5)
     slope = np.interp(np.arange(360, 831), nodes, nodes)
-    direct = slope @ fine_weights(EqualEnergy(), np.arange(360, 831), "rec709")
+    direct = slope @ band_weights(EqualEnergy(), np.arange(360, 831), "rec709")
     np.testing.assert_allclose(nodes @ band_weights(EqualEnergy(), nodes, "rec709"), direct, rtol=1e-12)
 
 

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from prescriptions import CANON, HELIAR, TESSAR, TRIPLET, lens
 
-from flarewright.model import Everywhere, Lens, QuarterWave, Stop
+from flarewright.model import Everywhere, Lens, Medium, QuarterWave, Stop, Surface
 from flarewright.optics import ghosts
+from flarewright.render.analysis import ghosts as analyse
 
 FIELD = (8.0, 5.0)
 
@@ -151,3 +152,19 @@ def test_a_coating_dims_ghosts_and_brightens_the_image():
     both = [(p, g, by_path(coated)[p]) for p, g in carrying(bare).items() if p is not None]
     cemented = {1, 7}
     assert all(h.throughput_mm2 < g.throughput_mm2 for p, g, h in both if not cemented & set(p))
+
+
+def test_a_stop_in_front_of_the_first_surface_on_either_side():
+    """A negative gap behind the stop puts the glass in front of it; the oblique beam is still found whole."""
+    glass = Medium(glass=None, n_d=1.5168, v_d=64.2)
+    direct = []
+    for gap in (-3.0, 3.0):
+        rows = (
+            Stop(thickness=gap),
+            Surface(curvature=0.01, thickness=4.0, medium=glass, semi_diameter=15.0),
+            Surface(curvature=-0.01, semi_diameter=15.0),
+        )
+        singlet = Lens(name="singlet", f_number=12.0, rows=rows)
+        direct.append(analyse(singlet, (20.0, 0.0)).direct.throughput_mm2)
+    # the stop alone limits the beam, whichever side it is on
+    assert direct[0] == pytest.approx(direct[1], rel=0.02)

@@ -28,6 +28,10 @@ def ghosts(
     ] = "lens",
     fstop: Annotated[float | None, typer.Option(help="f-number; wide open when left out.")] = None,
     paths: Annotated[str, typer.Option(help="all, or same-side of the stop.")] = "all",
+    focus: Annotated[
+        float | None, typer.Option(help="Distance of the plane in focus, mm; infinity when left out.")
+    ] = None,
+    sensor_distance: Annotated[float | None, typer.Option(help="Last vertex to sensor, mm.")] = None,
     brightest: Annotated[int | None, typer.Option(min=1, help="List only so many.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
@@ -51,7 +55,19 @@ def ghosts(
 
     remarks: list[str] = []
     prescription = load_lens(lens, remarks=remarks)
-    table = analyse(prescription, angles, f_number=f_number, coating=choice, wavelength_nm=wavelength_nm, paths=paths)
+    for name, value in (("--focus", focus), ("--sensor-distance", sensor_distance)):
+        if value is not None and not (math.isfinite(value) and value > 0.0):
+            raise ProjectError(f"{name} {value:g} is no distance; give millimetres above 0")
+    table = analyse(
+        prescription,
+        angles,
+        f_number=f_number,
+        coating=choice,
+        wavelength_nm=wavelength_nm,
+        paths=paths,
+        sensor_distance=sensor_distance,
+        focus_distance=focus,
+    )
     tell(remarks)
     if as_json:
         print_json(as_data(table, brightest))
@@ -81,6 +97,7 @@ def as_data(table: GhostTable, brightest: int | None = None) -> dict[str, Any]:
                 "centroid_mm": list(row.centroid_mm),
                 "rms_radius_mm": row.rms_radius_mm,
                 "peak_irradiance": row.peak_irradiance,
+                "peak_patch_mm": row.peak_patch_mm,
                 "bounded_by": row.bounded_by,
                 "focus_distance_mm": row.focus_distance_mm,
             }

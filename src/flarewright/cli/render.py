@@ -145,7 +145,9 @@ def render(
         wavelengths=wavelengths, paths=paths, layers=layers, brightest=brightest, no_starburst=no_starburst,
         colorspace=colorspace, half=half,
     )  # fmt: skip
-    rendering = _render(build_project(flags), threads)
+    settings = build_project(flags)
+    _keep_inputs(settings, project, [output] if no_png else [output, output.with_suffix(".png")])
+    rendering = _render(settings, threads)
     files, remarks = _write(rendering, output, full_windows, None if no_png else (exposure, view))
     remarks = [*rendering.remarks, *remarks]
     tell(remarks)
@@ -153,6 +155,16 @@ def render(
         print_json({**rendering.summary, **files, "remarks": remarks})
     else:
         tell(f"wrote {name}" for name in (files["output"], files.get("preview")) if name)
+
+
+def _keep_inputs(settings: Project, project_file: Path | None, outputs: list[Path]) -> None:
+    """Refuse to write over a file that this render reads."""
+    read = [project_file, settings.lens if isinstance(settings.lens, str) else None]
+    read.append(settings.iris.mask if settings.iris is not None else None)
+    for source in read:
+        for output in outputs:
+            if source is not None and Path(source).exists() and output.exists() and output.samefile(source):
+                raise ProjectError(f"{output} would replace the file it is made from; choose another name for -o")
 
 
 def _render(project: Project, threads: int | None) -> Rendering:

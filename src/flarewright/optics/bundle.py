@@ -94,12 +94,12 @@ def _arguments(packed: PackedLens, w: int | list[int], path: LightPath, tilt: fl
 
 def front_box(packed: PackedLens, tilt: float) -> Floats:
     """Return the half of the first vertex' plane through which light can reach the first surface: x0, x1, y0, y1."""
-    first = int(np.flatnonzero(packed.inv_semi)[0])
+    first = packed.first_surface
     semi, c = packed.semi[first], packed.curvature[first]
     sag = c * semi**2 / (1.0 + sqrt(max(1.0 - (1.0 + packed.conic[first]) * (c * semi) ** 2, 0.0)))
     # a rim at z = sag is met by rays that cross z = 0 displaced by sag tan(tilt)
     low, high = -semi - max(0.0, sag * tan(tilt)), semi + max(0.0, -sag * tan(tilt))
-    lead = packed.z_vertex[first] * abs(tan(tilt))
+    lead = abs(packed.z_vertex[first] * tan(tilt))
     return np.array([0.0, semi, low - lead, high + lead]) * (1.0 + 1e-9)
 
 

@@ -23,7 +23,7 @@ _PRIMARIES = {
 }
 _BRADFORD = np.array([[0.8951, 0.2664, -0.1614], [-0.7502, 1.7135, 0.0367], [0.0389, -0.0685, 1.0296]])
 
-__all__ = ["ACES_WHITE", "D65_WHITE", "xyz_to_rgb_matrix"]
+__all__ = ["ACES_WHITE", "D65_WHITE", "luminance_weights", "xyz_to_rgb_matrix"]
 
 
 @lru_cache
@@ -73,3 +73,14 @@ def _bradford(source: tuple[float, float], target: tuple[float, float]) -> Float
     gain = (_BRADFORD @ _xyz(target)) / (_BRADFORD @ _xyz(source))
     adapted: Floats = np.linalg.inv(_BRADFORD) @ np.diag(gain) @ _BRADFORD
     return adapted
+
+
+def luminance_weights(colorspace: Colorspace) -> NDArray[np.float64]:
+    """Return what a unit of each channel adds to the luminance Y, shape (3,).
+
+    Parameters
+    ----------
+    colorspace : {"rec709", "acescg"}
+    """
+    weights: NDArray[np.float64] = np.linalg.inv(xyz_to_rgb_matrix(colorspace))[1]
+    return weights

@@ -43,10 +43,12 @@ class GhostRow:
         Root mean square distance from the centroid, weighted by flux. It has no limit where a path's light leaves the
         last surface at grazing angles without losing all its flux: such rays land arbitrarily far out on the plane.
     peak_irradiance : float
-        Largest irradiance, averaged over a square of side `peak_patch_mm`, per flux of the direct image, 1/mm^2.
+        Largest irradiance, averaged over a square of side `peak_patch_mm`, per flux of the direct image, 1/mm^2; 0 when
+        the direct image is dark.
     peak_patch_mm : float
     bounded_by : {"stop", "entrance"}
-        Which edge shapes the ghost: the smaller of the two as projected to the entrance (docs/physics.md).
+        Which edge shapes the ghost on the axis: the smaller of the two as projected to the entrance by matrices
+        (docs/physics.md).
     focus_distance_mm : float or None
         Where the path focuses a distant light, mm behind the sensor (negative: in front); None for an afocal path.
     """
@@ -95,6 +97,8 @@ def ghost_table(
     coating: CoatingChoice | None = None,
     wavelength_nm: float = D_LINE_NM,
     paths: str = "all",
+    sensor_distance: float | None = None,
+    focus_distance: float | None = None,
     threads: int | None = None,
 ) -> GhostTable:
     """Analyse every ghost of a lens for one distant light.
@@ -111,6 +115,8 @@ def ghost_table(
         None: as the lens file says.
     wavelength_nm : float
     paths : {"all", "same-side"}
+    sensor_distance, focus_distance : float, optional
+        Override the lens file's, mm.
     threads : int, optional
         None: all cores; the numbers do not depend on it.
 
@@ -124,7 +130,7 @@ def ghost_table(
     at each crossing; R and T are the means of s and p, multiplied along the path. Judged by a plain Monte Carlo tracer
     in `tests/physics`. The stop and the sensor are placed at the d line whatever the wavelength.
     """
-    order = first_order(lens, f_number)
+    order = first_order(lens, f_number, sensor_distance=sensor_distance, focus_distance=focus_distance)
     coatings = resolve_coatings(lens, AsLens() if coating is None else coating)
     packed = pack_lens(lens, order, coatings, np.array([wavelength_nm]))
     light = incidence(field_deg)
@@ -132,8 +138,8 @@ def ghost_table(
     with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
         measured = list(pool.map(lambda path: _measure(lens, packed, path, light), todo))
     direct = measured[0]
-    # a peak is told relative to the direct image's flux
-    unit = direct.throughput_mm2 if direct.throughput_mm2 > 0.0 else 1.0
+    # a peak is told relative to the direct image's flux, and not at all when that is dark
+    unit = direct.throughput_mm2 if direct.throughput_mm2 > 0.0 else float("inf")
     rows = [_relative(row, unit) for row in measured]
     ghosts = sorted(rows[1:], key=lambda row: -row.throughput_mm2)
     return GhostTable(
@@ -175,7 +181,11 @@ def _measure(lens: Lens, packed: PackedLens, path: LightPath, light: Incidence) 
         x, y = sums[1] / sums[0], sums[2] / sums[0]
         rms = sqrt(max(sums[3] / sums[0] - x * x - y * y, 0.0))
         scale = RESOLUTION / max(rms, 1e-4)
-    peak, patch = _peak(bundle, data, blades, light, (x, y), min(4.0 * rms, _extent(sums)))
+    # the whole ghost if it is compact, else the part around its centroid
+    middle, reach = -0.5 * (sums[6] + sums[7]) * light.axes[1], _extent(sums)
+    if reach > 4.0 * rms:
+        middle, reach = np.array([x, y]), 4.0 * rms
+    peak, patch = _peak(bundle, data, blades, light, (float(middle[0]), float(middle[1])), reach)
     flux = float(sums[0] * light.cosine)
     return GhostRow(j, i, flux, (float(x), float(y)), rms, peak, patch, bounded_by, focus)
 
@@ -221,7 +231,7 @@ def _extent(sums: Floats) -> float:
 def _peak(
     bundle: Bundle, data: Floats, blades: Floats, light: Incidence, centre: tuple[float, float], reach: float
 ) -> tuple[float, float]:
-    """Draw the bundle around its centroid; return the brightest pixel's irradiance per unit light, and its side."""
+    """Draw the bundle around a place; return the brightest pixel's irradiance per unit light, and its side."""
     patch = max(2.0 * reach / PEAK_GRID, 0.01)
     side = min(PEAK_GRID, max(4, ceil(2.0 * reach / patch) + 2))
     plane = np.zeros((3, side, side), dtype=np.float32)
@@ -237,7 +247,7 @@ def _peak(
 def _paraxial_facts(lens: Lens, packed: PackedLens, path: LightPath) -> tuple[str, float | None]:
     """Tell which edge bounds a ghost, and where the path focuses (docs/physics.md, "Ray transfer matrices")."""
     to_stop, total = path_matrices(lens, path, float(packed.wavelengths_nm[0]), packed.sensor_z)
-    entrance = packed.semi[0] if packed.inv_semi[0] > 0.0 else packed.semi[1]
+    entrance = packed.semi[packed.first_surface]
     stop_height = min((packed.stop_semi / max(abs(Ma[0, 0]), 1e-12)) for Ma in to_stop)
     bounded_by = "stop" if stop_height < entrance else "entrance"
     if abs(total[1, 0]) < 1e-12:

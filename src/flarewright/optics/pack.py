@@ -46,6 +46,11 @@ class PackedLens:
     stop_semi: float
     first_order: FirstOrder
 
+    @property
+    def first_surface(self) -> int:
+        """Row of the first surface; the stop may stand in front of it."""
+        return int(np.flatnonzero(self.inv_semi)[0])
+
 
 def resolve_coatings(lens: Lens, choice: CoatingChoice) -> tuple[Coating | None, ...]:
     """Decide the coating of every row.

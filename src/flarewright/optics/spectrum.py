@@ -26,7 +26,6 @@ __all__ = [
     "LAST_NM",
     "band_weights",
     "cie_1931",
-    "fine_weights",
     "planck",
     "spectral_power",
     "spectrum_xyz",
@@ -200,21 +199,6 @@ def band_weights(spectrum: Spectrum, wavelengths_nm: ArrayLike, colorspace: Colo
     hats = np.stack([np.interp(wave, nodes, row) for row in identity])
     weights: Floats = hats @ xyz @ xyz_to_rgb_matrix(colorspace).T
     return weights
-
-
-def fine_weights(spectrum: Spectrum, wavelengths_nm: ArrayLike, colorspace: Colorspace) -> Floats:
-    """RGB weight of each wavelength of a fine grid (5 nm for diffraction); the same integral as `band_weights`.
-
-    Parameters
-    ----------
-    spectrum, wavelengths_nm, colorspace
-        As in `band_weights`.
-
-    Returns
-    -------
-    ndarray, shape (N, 3)
-    """
-    return band_weights(spectrum, wavelengths_nm, colorspace)
 
 
 def _table_nm() -> Floats:

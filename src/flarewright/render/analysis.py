@@ -49,6 +49,8 @@ def ghosts(
     coating: CoatingChoice | None = None,
     wavelength_nm: float = D_LINE_NM,
     paths: str = "all",
+    sensor_distance: float | None = None,
+    focus_distance: float | None = None,
     threads: int | None = None,
 ) -> GhostTable:
     """Analyse every ghost of a lens for one distant light (`optics.ghosts.ghost_table`).
@@ -65,6 +67,8 @@ def ghosts(
         None: as the lens file says.
     wavelength_nm : float
     paths : {"all", "same-side"}
+    sensor_distance, focus_distance : float, optional
+        Override the lens file's, mm.
     threads : int, optional
         None: all cores; the numbers do not depend on it.
 
@@ -80,5 +84,13 @@ def ghosts(
     known = as_lens(lens)
     first_order(known, f_number)  # refuses an f-number that the lens does not open to
     return ghost_table(
-        known, field_deg, f_number=f_number, coating=coating, wavelength_nm=wavelength_nm, paths=paths, threads=threads
+        known,
+        field_deg,
+        f_number=f_number,
+        coating=coating,
+        wavelength_nm=wavelength_nm,
+        paths=paths,
+        sensor_distance=sensor_distance,
+        focus_distance=focus_distance,
+        threads=threads,
     )

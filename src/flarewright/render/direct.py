@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernels.bundle import measure_bundle
+from ..kernels.bundle import draw_bundle, measure_bundle, node_densities
 from ..model import Layer, Lens, Lines
-from ..optics.bundle import find_region, trace_bundle, trace_grid
+from ..optics.bundle import Bundle, find_region, trace_bundle, trace_grid
 from ..optics.paths import direct_path
 from .prepare import Settled
 from .shot import Shot
@@ -70,10 +70,28 @@ def direct_image(lens: Lens, shot: Shot) -> DirectImage:
     for w in range(count):
         data = trace_bundle(packed, w, bundle, tilt)
         sums = measure_bundle(data, bundle.pupil, bundle.triangles, 1, opening.blades, axes)
-        flux[w] = sums[0] * shot.incidence.cosine * opening.mean_transmittance
+        flux[w] = sums[0] * shot.incidence.cosine
+        if opening.mask is not None and sums[0] > 0.0:
+            flux[w] = _through_mask(shot, bundle, data, sums)
         if w == middle and sums[0] > 0.0:
             place, mean = (float(sums[1] / sums[0]), float(sums[2] / sums[0])), float(sums[0] / sums[4])
     return DirectImage(flux, place, mean)
+
+
+def _through_mask(shot: Shot, bundle: Bundle, data: Floats, sums: Floats) -> float:
+    """Flux of the direct image through a mask: drawn large enough to look the mask up, and added up."""
+    side = 128
+    zoom = 0.4 * side / max(sums[5], 0.5 * (sums[7] - sums[6]), 1e-9)
+    centre = -0.5 * (sums[6] + sums[7]) * shot.incidence.axes[1]
+    plane = np.zeros((3, side, side), dtype=np.float32)
+    to_pixels = np.array([side / 2 - centre[0] * zoom, side / 2 + centre[1] * zoom, zoom, zoom])
+    opening, densities = shot.opening, node_densities(data, bundle.pupil, bundle.triangles)
+    draw_bundle(
+        data, bundle.pupil, bundle.triangles, densities, bundle.path.stop_crossings, opening.blades, opening.mask,
+        opening.half, shot.incidence.axes, to_pixels, shot.incidence.cosine, np.array([1.0, 0.0, 0.0]), plane,
+        np.empty(side + 1, dtype=np.float32),
+    )  # fmt: skip
+    return float(plane[0].sum(dtype=np.float64))
 
 
 def starburst_of(settled: Settled, shots: Sequence[Shot], images: Sequence[DirectImage], mask: Floats | None) -> Layer:

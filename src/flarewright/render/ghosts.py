@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ..kernels.raster import sum_rows
 from ..model import Layer, Quality
+from ..optics.color import luminance_weights
 from ..optics.paths import LightPath
 from .canvas import DETAILS, Plane, blank, merge, to_layer
 from .ghosts_draft import draw_draft
@@ -36,8 +37,10 @@ class GhostPass:
         All ghosts.
     singles : tuple of Layer
         One layer a path, brightest first, when asked for.
-    drawn, dark : int
-        Paths drawn, and paths that pass no light.
+    drawn : int
+        Paths drawn.
+    dark : int or None
+        Paths that pass no light; draft quality does not look.
     culled : int
         Paths left out on purpose.
     culled_share : float
@@ -47,7 +50,7 @@ class GhostPass:
     total: Layer
     singles: tuple[Layer, ...]
     drawn: int
-    dark: int
+    dark: int | None
     culled: int
     culled_share: float
 
@@ -123,7 +126,8 @@ def _final(
         return found
 
     found = [items for items in pool.map(find, paths) if items]
-    flux = np.array([sum(item.region.flux * item.shot.light.intensity for item in items) for items in found])
+    # what lands beside the picture is neither bright nor worth keeping
+    flux = np.array([sum(item.region.seen_flux * item.shot.light.intensity for item in items) for items in found])
     level = _level(found)
     keep = _worth_drawing(flux, quality.cull)
     order = [int(k) for k in np.argsort(-flux, kind="stable") if keep[k]]
@@ -144,7 +148,7 @@ def _final(
         return canvas.planes
 
     named = [found[k][0].path for k in order]
-    total, layers = _collect(shots, [[k] for k in order], named, singles, draw, pool)
+    total, layers = _collect(shots, order, named, singles, draw, pool)
     share = float(flux[~keep].sum() / flux.sum()) if flux.sum() > 0.0 else 0.0
     return GhostPass(total, layers, len(order), len(paths) - len(found), int((~keep).sum()), share)
 
@@ -168,8 +172,8 @@ def _draft(
 
     order = list(range(len(paths))) if singles == 0 else _rank_draft(shots, paths)
     named = [paths[k] for k in order]
-    total, layers = _collect(shots, [[k] for k in order], named, singles, draw, pool)
-    return GhostPass(total, layers, len(paths), 0, 0, 0.0)
+    total, layers = _collect(shots, order, named, singles, draw, pool)
+    return GhostPass(total, layers, len(paths), None, 0, 0.0)
 
 
 def _rank_draft(shots: Sequence[Shot], paths: Sequence[LightPath]) -> list[int]:
@@ -184,7 +188,7 @@ def _rank_draft(shots: Sequence[Shot], paths: Sequence[LightPath]) -> list[int]:
             picture = np.zeros((3, shot.size_px[1], shot.size_px[0]))
             draw_draft(shot, [path], picture)
             sum_rows(picture)
-            flux[k] += picture.sum()
+            flux[k] += luminance_weights(shot.colorspace) @ picture.sum(axis=(1, 2))
     return [int(k) for k in np.argsort(-flux, kind="stable")]
 
 
@@ -200,14 +204,15 @@ def _level(found: list[list[FinalPass]]) -> float:
 def _worth_drawing(flux: NDArray[np.float64], cull: float) -> NDArray[np.bool_]:
     """Keep the brightest paths so that those left out carry no more than `cull` of all flux."""
     keep = np.ones(len(flux), dtype=np.bool_)
-    order = np.argsort(flux, kind="stable")
-    keep[order[np.cumsum(flux[order]) <= cull * flux.sum()]] = False
-    return keep if cull > 0.0 else np.ones(len(flux), dtype=np.bool_)
+    if cull > 0.0:
+        order = np.argsort(flux, kind="stable")
+        keep[order[np.cumsum(flux[order]) <= cull * flux.sum()]] = False
+    return keep
 
 
 def _collect(
     shots: Sequence[Shot],
-    items: list[list[int]],
+    items: list[int],
     named: Sequence[LightPath],
     singles: int | None,
     draw: Callable[[list[int]], list[Plane | None]],
@@ -217,15 +222,19 @@ def _collect(
     shot = shots[0]
     width, height = shot.size_px
     pixel_area = 1.0 / float(shot.to_pixels[2] * shot.to_pixels[3])
+    luminance = luminance_weights(shot.colorspace)
     alone = len(items) if singles is None else min(singles, len(items))
     most = next((n for size, n in _CHUNKS if width * height <= size), 2)
     chunks = max(1, min(most, (len(items) - alone) // _PATHS_A_CHUNK))
-    rest = [[k for item in items[alone + c :: chunks] for k in item] for c in range(chunks)]
+    rest = [items[alone + c :: chunks] for c in range(chunks)]
     totals: list[Plane | None] = [None] * DETAILS
     layers = []
-    for k, planes in enumerate(pool.map(draw, items[:alone])):
+    for k, planes in enumerate(pool.map(draw, [[k] for k in items[:alone]])):
         path, plane = named[k], merge(planes, shot.size_px)
-        about: dict[str, str | float] = {"path": path.name, "flux_mm2": float(plane.sum(dtype=np.float64) / 3.0)}
+        about: dict[str, str | float] = {
+            "path": path.name,
+            "flux_mm2": float(luminance @ plane.sum(axis=(1, 2), dtype=np.float64)),
+        }
         layers.append(to_layer(f"ghost.{path.name}", plane, pixel_area, about))
         # the layer has its own copy by now
         totals = _added(totals, planes)

@@ -30,7 +30,7 @@ def draw_draft(shot: Shot, paths: Sequence[LightPath], differences: NDArray[np.f
         return
     packed, opening = shot.packed, shot.opening
     starts = np.cumsum([0, *(len(path.rows) for path in paths)])
-    first = int(np.flatnonzero(packed.inv_semi)[0])
+    first = packed.first_surface
     draw_matrix_ghosts(
         np.concatenate([path.rows for path in paths]), np.concatenate([path.actions for path in paths]), starts,
         np.array([path.stop_crossings for path in paths]), packed.curvature, packed.z_vertex, packed.n_gap,

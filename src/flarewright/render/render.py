@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from math import pi
+from dataclasses import dataclass, replace
+from math import isfinite, pi
 from typing import Any
 
 from ..io.mask_image import read_mask
 from ..model import Layer, Project
+from ..optics.bundle import incidence
 from ..optics.paths import ghost_paths
 from .compose import beauty
 from .direct import DirectImage, direct_image, starburst_of
@@ -75,20 +76,46 @@ def render(project: Project, *, threads: int | None = None, progress: Progress |
         passes.insert(0, starburst_of(settled, shots, images, mask))
     whole = beauty(passes, project.camera.size_px)
     layers = (whole,) if project.output.layers == "beauty" else (whole, *passes, *ghosts.singles)
-    return Rendering(project, layers, _summary(settled, shots, images, ghosts), (*settled.remarks, *_remarks(ghosts)))
+    return Rendering(
+        project,
+        layers,
+        _summary(settled, shots, images, ghosts),
+        (*settled.remarks, *_remarks(settled, shots[0], ghosts)),
+    )
 
 
-def _remarks(ghosts: GhostPass) -> tuple[str, ...]:
-    if not ghosts.culled:
-        return ()
-    return (f"{ghosts.culled} ghosts that carry {ghosts.culled_share:.2e} of the ghost light were left out",)
+def _remarks(settled: Settled, shot: Shot, ghosts: GhostPass) -> tuple[str, ...]:
+    told = []
+    if ghosts.culled:
+        told.append(f"{ghosts.culled} ghosts that carry {ghosts.culled_share:.2e} of the ghost light were left out")
+    order = settled.order
+    blur_px = abs(order.sensor_distance - order.bfl) / order.f_number * float(shot.to_pixels[2])
+    if settled.project.output.starburst and blur_px > 1.0:
+        told.append(
+            f"a distant light is out of focus by {blur_px:.1f} pixels; the starburst is drawn as if it were in focus"
+        )
+    return tuple(told)
+
+
+def _scene_scale(settled: Settled, shot: Shot) -> float:
+    """Irradiance on the sensor's middle per radiance of an extended scene: pi T (r / d)^2 of the exit pupil.
+
+    Layers divided by it are in the unit of the plate (docs/physics.md, "Radiometry"). In focus at infinity r / d is
+    1 / (2 N), and it shrinks as the sensor moves away for a near plane.
+    """
+    order = settled.order
+    on_axis = direct_image(settled.lens, replace(shot, incidence=incidence((0.0, 0.0))))
+    sensor_z = shot.packed.sensor_z
+    slope = 0.5 / order.f_number
+    if isfinite(order.exit_pupil_z):
+        slope = 0.5 * order.exit_pupil_diameter / abs(sensor_z - order.exit_pupil_z)
+    # a mask spans a square, of which the round opening is pi / 4
+    opened = shot.opening.mean_transmittance * (1.0 if shot.opening.mask is None else 4.0 / pi)
+    return float(pi * on_axis.transmittance * opened * slope**2)
 
 
 def _summary(settled: Settled, shots: tuple[Shot, ...], images: list[DirectImage], ghosts: GhostPass) -> dict[str, Any]:
     order, project = settled.order, settled.project
-    # an extended scene of radiance L images as L times this (docs/physics.md, "Radiometry"): layers divided by it are
-    # in the unit of the plate
-    scene = pi * images[0].transmittance / (4.0 * order.f_number**2)
     return {
         "lens": settled.lens.name,
         "efl_mm": order.efl,
@@ -100,7 +127,7 @@ def _summary(settled: Settled, shots: tuple[Shot, ...], images: list[DirectImage
         "sensor_mm": list(project.camera.sensor),
         "quality": project.quality.mode,
         "wavelengths_nm": [float(w) for w in shots[0].packed.wavelengths_nm],
-        "scene_irradiance_per_radiance": scene,
+        "scene_irradiance_per_radiance": _scene_scale(settled, shots[0]),
         "lights": [
             {
                 "name": shot.light.name,

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..model import Light, Project
+from ..model.camera import Colorspace
 from ..optics.bundle import Incidence, incidence
 from ..optics.iris import blade_edges, outline
 from ..optics.pack import PackedLens, pack_lens, resolve_coatings
@@ -66,7 +67,7 @@ class Shot:
     to_pixels : ndarray, shape (4,)
         Column and row of the axis, pixels per mm across and down.
     size_px : tuple of int
-    colorspace : str
+    colorspace : {"rec709", "acescg"}
     """
 
     light: Light
@@ -75,7 +76,7 @@ class Shot:
     opening: Opening
     to_pixels: Floats
     size_px: tuple[int, int]
-    colorspace: str
+    colorspace: Colorspace
 
     @property
     def gain(self) -> float:
@@ -94,8 +95,8 @@ class Shot:
 
 
 @lru_cache(maxsize=64)
-def _weights(light: Light, wavelengths_nm: tuple[float, ...], colorspace: str) -> Floats:
-    return band_weights(light.spectrum, np.array(wavelengths_nm), colorspace)  # type: ignore[arg-type]
+def _weights(light: Light, wavelengths_nm: tuple[float, ...], colorspace: Colorspace) -> Floats:
+    return band_weights(light.spectrum, np.array(wavelengths_nm), colorspace)
 
 
 def make_opening(settled: Settled, mask: Floats | None) -> Opening:
