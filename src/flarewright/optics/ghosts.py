@@ -26,6 +26,8 @@ RESOLUTION = 100.0
 PEAK_GRID = 256
 # rays spent on the torn edge of a bundle
 MOST_FRAYED = 300_000
+# part of a ghost's flux whose place is not asked for
+FARTHEST = 1e-5
 
 
 @dataclass(frozen=True)
@@ -41,7 +43,8 @@ class GhostRow:
     centroid_mm : tuple of float
     rms_radius_mm : float
         Root mean square distance from the centroid, weighted by flux. It has no limit where a path's light leaves the
-        last surface at grazing angles without losing all its flux: such rays land arbitrarily far out on the plane.
+        last surface at grazing angles without losing all its flux: such rays land arbitrarily far out on the plane. The
+        farthest 1e-5 of the flux at such an edge is left out.
     peak_irradiance : float
         Largest irradiance, averaged over a square of side `peak_patch_mm`, per flux of the direct image, 1/mm^2; 0 when
         the direct image is dark.
@@ -175,7 +178,7 @@ def _measure(lens: Lens, packed: PackedLens, path: LightPath, light: Incidence) 
         )
         data = trace_bundle(packed, 0, bundle, light.tilt)
         sums = measure_bundle(data, bundle.pupil, bundle.triangles, path.stop_crossings, blades, light.axes)
-        sums[:4] += _frayed(packed, bundle, data, light)
+        sums[:4] += _frayed(packed, bundle, data, light, float(sums[0]))
         if sums[0] <= 0.0:
             return nothing
         x, y = sums[1] / sums[0], sums[2] / sums[0]
@@ -190,7 +193,7 @@ def _measure(lens: Lens, packed: PackedLens, path: LightPath, light: Incidence) 
     return GhostRow(j, i, flux, (float(x), float(y)), rms, peak, patch, bounded_by, focus)
 
 
-def _frayed(packed: PackedLens, bundle: Bundle, data: Floats, light: Incidence) -> Floats:
+def _frayed(packed: PackedLens, bundle: Bundle, data: Floats, light: Incidence, flux: float) -> Floats:
     """Integrate over the triangles in which some rays end, ray by ray: weight times 1, x, y, x^2 + y^2.
 
     They carry little light, but where rays leave the last surface at a grazing angle it lands so far out that it
@@ -218,6 +221,9 @@ def _frayed(packed: PackedLens, bundle: Bundle, data: Floats, light: Incidence) 
     # both halves of the pupil: across the meridional plane they cancel
     weight = np.where(passes, 2.0 * rays[:, WEIGHT], 0.0) * np.repeat(area, len(s))
     x, y = np.where(passes, rays[:, X], 0.0), np.where(passes, rays[:, Y], 0.0)
+    # the second moment need not exist: the farthest rays are left out, as long as they carry next to nothing
+    far = np.argsort(-np.hypot(x, y), kind="stable")
+    weight[far[np.cumsum(weight[far]) <= FARTHEST * (flux + weight.sum())]] = 0.0
     along = float((weight * y).sum())
     moment = float((weight * (x * x + y * y)).sum())
     return np.array([weight.sum(), -along * light.axes[1, 0], -along * light.axes[1, 1], moment])
