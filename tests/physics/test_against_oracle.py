@@ -137,7 +137,7 @@ def test_more_shipped_lenses(name):
     compare_systems(from_lens(a_lens), a_lens, (6.0, 4.0), samples=2000)
 
 
-# the zoom at the widest angle: light of path 25-22 leaves at grazing angles, and interpolating such rays over a triangle
+# the zoom, widest angle: light of path 25-22 leaves at grazing angles, and interpolating such rays over a triangle
 # makes its size 60 % too large; flux and every other ghost agree
 GRAZING = pytest.mark.xfail(strict=True, reason="the size of Canon 25-22 at (15, 8) degrees is 60 % too large")
 
