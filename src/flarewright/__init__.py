@@ -44,6 +44,7 @@ if TYPE_CHECKING:
     from .model import Quality as Quality
     from .model import QuarterWave as QuarterWave
     from .model import Stack as Stack
+    from .model import Standard as Standard
     from .model import Stop as Stop
     from .model import Surface as Surface
     from .model import Tabulated as Tabulated
@@ -57,8 +58,8 @@ _HOMES = {
     ".errors": ("FlarewrightError", "GlassError", "LensError", "OutputError", "ProjectError"),
     ".model": (
         "D65", "AsLens", "Bare", "BlackBody", "Camera", "EqualEnergy", "Everywhere", "Film", "Iris", "Layer", "Lens",
-        "Light", "Lines", "Medium", "Output", "PerRow", "Preset", "Project", "Quality", "QuarterWave", "Stack", "Stop",
-        "Surface", "Tabulated",
+        "Light", "Lines", "Medium", "Output", "PerRow", "Preset", "Project", "Quality", "QuarterWave", "Stack",
+        "Standard", "Stop", "Surface", "Tabulated",
     ),
     ".io.exr": ("write_exr",),
     ".io.project_file": ("read_project",),

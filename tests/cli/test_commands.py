@@ -11,6 +11,7 @@ from pathlib import Path
 import jsonschema
 import numpy as np
 import pytest
+from PIL import Image
 
 import flarewright as fw
 from flarewright import __version__
@@ -308,6 +309,42 @@ def test_schemas_are_schemas(capsys):
 
 
 # ---------------------------------------------------------------------------------------------------------------------
+# coating
+
+
+def test_coating_list_states_what_the_coatings_do(capsys):
+    listed = call_json(capsys, "coating", "list")["coatings"]
+    assert [row["name"] for row in listed] == [
+        "uncoated-1930s", "single-1950s", "early-multicoat", "modern-broadband"]  # fmt: skip
+    assert all(row["source"] and row["era"] and row["design"] for row in listed)
+    means = [row["on_glass"][0]["mean_reflectance"] for row in listed]
+    assert means[0] > 2 * means[1] > 4 * means[2]
+    assert [len(row["on_glass"][0]["films"]) for row in listed] == [0, 1, 3, 5]
+    assert "modern-broadband" in call(capsys, "coating", "list").out
+
+
+def test_coating_plot_tells_and_draws(capsys, folder):
+    data = call_json(capsys, "coating", "plot", "quarter-wave:550", "--glass", "1.52")
+    at = data["wavelengths_nm"].index(550.0)
+    assert data["angles"][0]["reflectance"][at] == pytest.approx(((1.52 - 1.38**2) / (1.52 + 1.38**2)) ** 2, rel=1e-9)
+    assert [row["angle_deg"] for row in data["angles"]] == [0, 15, 30, 45, 60]
+    assert data["films"] == [{"index": 1.38, "thickness_nm": pytest.approx(550 / 4 / 1.38)}]
+    assert "SCHOTT N-SF6" in call(capsys, "coating", "plot", "modern-broadband", "--glass", "n sf6").out
+    # an ideal film reaches zero, which a logarithmic axis cannot hold
+    for name, coating in (("a.svg", "quarter-wave:550:ideal"), ("b.svg", "none"), ("a.png", "early-multicoat")):
+        assert call(capsys, "coating", "plot", coating, "-o", name).out == ""
+    for name, curves in (("a.svg", 5), ("b.svg", 5)):
+        text = (folder / name).read_text("utf-8")
+        assert sum(line.count('stroke-width="2"') for line in text.splitlines()) == curves
+        ET.fromstring(text)
+        assert "nan" not in text
+    pixels = np.asarray(Image.open("a.png"))
+    assert pixels.shape == (560, 900, 3)
+    assert len(np.unique(pixels.reshape(-1, 3), axis=0)) > 200
+    assert sorted(path.name for path in folder.iterdir()) == ["a.png", "a.svg", "b.svg"]
+
+
+# ---------------------------------------------------------------------------------------------------------------------
 # project
 
 
@@ -333,7 +370,7 @@ def test_project_init_teaches_and_is_usable(capsys, folder):
 # the program itself
 
 
-@pytest.mark.parametrize("words", [(), ("lens",), ("project",), ("render", "--help"), ("ghosts", "-h")])
+@pytest.mark.parametrize("words", [(), ("lens",), ("coating",), ("project",), ("render", "--help"), ("ghosts", "-h")])
 def test_help_is_given(capsys, words):
     out = call(capsys, *words).out
     assert "Usage: flarewright" in out

@@ -29,6 +29,7 @@ from flarewright.model import (
     PerRow,
     QuarterWave,
     Stack,
+    Standard,
     Stop,
     Surface,
 )
@@ -254,6 +255,7 @@ COATINGS = {
     "quarter-wave:550+10": QuarterWave(center_wavelength_nm=550, thickness_offset_nm=10),
     "quarter-wave:550:ideal-10.5": QuarterWave(center_wavelength_nm=550, index="ideal", thickness_offset_nm=-10.5),
     "film:1.38:96.4": Film(index=1.38, thickness_nm=96.4),
+    "modern-broadband": Standard(name="modern-broadband"),
     "stack:1.38:96.4,2.1:120": Stack(layers=(Film(index=1.38, thickness_nm=96.4), Film(index=2.1, thickness_nm=120))),
 }
 

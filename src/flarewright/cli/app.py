@@ -12,6 +12,8 @@ import typer
 from .. import __version__
 from ..errors import FlarewrightError
 from . import (
+    coating_list,
+    coating_plot,
     ghosts,
     lens_check,
     lens_convert,
@@ -34,17 +36,21 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 lens_app = typer.Typer(help="Look at, check and convert lens files.")
+coating_app = typer.Typer(help="Look at coatings: the standard ones, and what any coating reflects.")
 project_app = typer.Typer(help="Project files: everything a render needs, in one TOML file.")
 
 app.command("render", epilog=render.EPILOG)(render.render)
 app.command("ghosts", epilog=ghosts.EPILOG)(ghosts.ghosts)
 app.command("lenses", epilog=lenses.EPILOG)(lenses.lenses)
 app.add_typer(lens_app, name="lens")
+app.add_typer(coating_app, name="coating")
 app.add_typer(project_app, name="project")
 lens_app.command("show", epilog=lens_show.EPILOG)(lens_show.show)
 lens_app.command("check", epilog=lens_check.EPILOG)(lens_check.check)
 lens_app.command("convert", epilog=lens_convert.EPILOG)(lens_convert.convert)
 lens_app.command("schema")(lens_schema.schema)
+coating_app.command("list", epilog=coating_list.EPILOG)(coating_list.listing)
+coating_app.command("plot", epilog=coating_plot.EPILOG)(coating_plot.plot)
 project_app.command("init", epilog=project_init.EPILOG)(project_init.init)
 project_app.command("check")(project_check.check)
 project_app.command("schema")(project_schema.schema)
@@ -88,7 +94,7 @@ def run(arguments: Sequence[str]) -> int:
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="replace")
     words = list(arguments)
-    if words in ([], ["lens"], ["project"]):
+    if words in ([], ["lens"], ["coating"], ["project"]):
         words.append("--help")
     try:
         code = _call(words)

@@ -73,16 +73,23 @@ def _finite(value: Any) -> Any:
     return value
 
 
-def check_place(path: Path, suffix: str) -> None:
+def check_place(path: Path, suffix: str | tuple[str, ...]) -> None:
     """Refuse an output that could not be written before the work is done, not after.
+
+    Parameters
+    ----------
+    path : path
+    suffix : str or tuple of str
+        How the name may end.
 
     Raises
     ------
     OutputError
         When the name ends otherwise than in `suffix`, its folder does not exist, or it is a folder itself.
     """
-    if path.suffix.lower() != suffix:
-        raise OutputError(f"the output {str(path)!r} must be named *{suffix}")
+    allowed = (suffix,) if isinstance(suffix, str) else suffix
+    if path.suffix.lower() not in allowed:
+        raise OutputError(f"the output {str(path)!r} must be named *{' or *'.join(allowed)}")
     if not path.parent.is_dir():
         raise OutputError(f"cannot write {path}: the folder {path.parent} does not exist; create it first")
     if path.is_dir():

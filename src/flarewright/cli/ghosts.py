@@ -24,7 +24,11 @@ def ghosts(
     light: Annotated[str, typer.Option(metavar="X,Y", help="Field angles in degrees, right and up in the picture.")],
     wavelength_nm: Annotated[float, typer.Option(help="One wavelength, 380 to 780.")] = 587.56,
     coating: Annotated[
-        str, typer.Option(help="lens, none, quarter-wave:NM, preset:NAME, film:N:NM, stack:N:NM,... or a file.")
+        str,
+        typer.Option(
+            help="lens, none, quarter-wave:NM, preset:NAME, a name of `flarewright coating list`, stack:N:NM,... "
+            "or a file."
+        ),
     ] = "lens",
     fstop: Annotated[float | None, typer.Option(help="f-number; wide open when left out.")] = None,
     paths: Annotated[str, typer.Option(help="all, or same-side of the stop.")] = "all",

@@ -66,7 +66,8 @@ def render(
     coating: Annotated[
         str | None,
         typer.Option(
-            help="none, quarter-wave:NM, preset:NAME, lens, film:N:NM, stack:N:NM,... or a coating file.",
+            help="none, quarter-wave:NM, preset:NAME, lens, a name of `flarewright coating list`, film:N:NM, "
+            "stack:N:NM,... or a coating file.",
             rich_help_panel=_LENS,
         ),
     ] = None,

@@ -9,23 +9,30 @@
 | `quarter-wave:550+10` | 10 nm too thick (`-10`: too thin); may follow an index too |
 | `film:1.38:96.4` | one film of index 1.38, 96.4 nm thick |
 | `stack:1.38:96.4,2.1:120` | several films, from the air to the glass |
+| `modern-broadband` | a standard coating: `uncoated-1930s`, `single-1950s`, `early-multicoat`, `modern-broadband` |
 """
 
 from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 from pydantic import TypeAdapter, ValidationError
 
 from flarewright.errors import ProjectError
-from flarewright.model import Bare, Coating, CoatingChoice, Everywhere, Film, PerRow, QuarterWave, Stack
+from flarewright.model import Bare, Coating, CoatingChoice, Everywhere, Film, PerRow, QuarterWave, Stack, Standard
+from flarewright.model.coating import StandardName
 
-from .sentences import validation_sentences
+from .sentences import did_you_mean, validation_sentences
 from .text_file import read_toml
 
-HELP = "write none, quarter-wave:550, quarter-wave:550:ideal, film:1.38:96.4 or stack:1.38:96.4,2.1:120"
+STANDARD_NAMES: tuple[StandardName, ...] = get_args(StandardName)
+
+HELP = (
+    "write none, quarter-wave:550, quarter-wave:550:ideal, film:1.38:96.4, stack:1.38:96.4,2.1:120 or one of "
+    + ", ".join(STANDARD_NAMES)
+)
 
 UNCOATED = "-"
 """In a list of one coating a row: this row has none, the stop for example."""
@@ -50,7 +57,7 @@ def parse_coating(text: str) -> Coating:
 
     Returns
     -------
-    Bare, QuarterWave, Film or Stack
+    Bare, QuarterWave, Film, Stack or Standard
 
     Raises
     ------
@@ -60,6 +67,9 @@ def parse_coating(text: str) -> Coating:
     plain = re.sub(r"\s+", "", text).lower()
     if plain in ("none", "bare"):
         return Bare()
+    for name in STANDARD_NAMES:
+        if plain == name:
+            return Standard(name=name)
     kind, _, rest = plain.partition(":")
     try:
         if kind == "quarter-wave" and (match := _QUARTER_WAVE.fullmatch(plain)):
@@ -72,7 +82,7 @@ def parse_coating(text: str) -> Coating:
         raise ProjectError(f"coating {text!r}: {'; '.join(validation_sentences(error))}") from None
     except ValueError:
         pass
-    raise ProjectError(f"coating {text!r} is not understood: {HELP}")
+    raise ProjectError(f"coating {text!r} is not understood{did_you_mean(plain, STANDARD_NAMES)}: {HELP}")
 
 
 def coating_from(value: object) -> Coating | None:
@@ -108,7 +118,7 @@ def format_coating(coating: Coating) -> str:
 
     Parameters
     ----------
-    coating : Bare, QuarterWave, Film or Stack
+    coating : Bare, QuarterWave, Film, Stack or Standard
 
     Returns
     -------
@@ -116,6 +126,8 @@ def format_coating(coating: Coating) -> str:
     """
     if isinstance(coating, Bare):
         return "none"
+    if isinstance(coating, Standard):
+        return coating.name
     if isinstance(coating, Film):
         return f"film:{_number(coating.index)}:{_number(coating.thickness_nm)}"
     if isinstance(coating, Stack):

@@ -6,12 +6,12 @@ from typing import Any
 
 from flarewright.model import Iris
 
-from .coating_text import HELP
+from .coating_text import HELP, STANDARD_NAMES
 from .lens_fields import CURVATURE, RADIUS, ROW_NUMBERS, TOP_NUMBERS, TOP_TEXTS
 
 _NUMBER = r"([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?"
 _COATING_TEXT = (
-    rf"^(none|bare|-|"
+    rf"^(none|bare|-|{'|'.join(STANDARD_NAMES)}|"
     rf"quarter-wave:{_NUMBER}([+-]{_NUMBER})?(:(ideal|real|{_NUMBER}))?([+-]{_NUMBER})?|"
     rf"film:{_NUMBER}:{_NUMBER}|"
     rf"stack:{_NUMBER}:{_NUMBER}(,{_NUMBER}:{_NUMBER})*)?$"
@@ -134,6 +134,7 @@ def _coating() -> dict[str, Any]:
                 },
                 ["kind", "layers"],
             ),
+            _table({"kind": {"const": "standard"}, "name": {"enum": list(STANDARD_NAMES)}}, ["kind", "name"]),
         ],
     }
 

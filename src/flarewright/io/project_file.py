@@ -305,10 +305,12 @@ _SECTIONS: dict[str, tuple[type[BaseModel], ...]] = {
     "output": (Output,),
     "lights": (lights.Light,),
     "spectrum": (lights.EqualEnergy, lights.D65, lights.BlackBody, lights.Lines, lights.Tabulated),
-    "coating": (choices.Preset, choices.Everywhere, choices.PerRow, coatings.QuarterWave, coatings.Film),
+    "coating": (
+        choices.Preset, choices.Everywhere, choices.PerRow, coatings.QuarterWave, coatings.Film, coatings.Standard,
+    ),
     "lens": (Lens,),
     "rows": (Surface,),
-}
+}  # fmt: skip
 
 
 def _suggestion(keys: list[int | str]) -> str:

@@ -1,7 +1,7 @@
 """Frozen data without algorithms: lens, glass, coating, iris, light, camera, project."""
 
 from .camera import Camera
-from .coating import Bare, Coating, Film, QuarterWave, Stack
+from .coating import Bare, Coating, Film, QuarterWave, Stack, Standard
 from .glass import Dispersion, Medium
 from .iris import Iris
 from .layer import Layer
@@ -36,6 +36,7 @@ __all__ = [
     "Row",
     "Spectrum",
     "Stack",
+    "Standard",
     "Stop",
     "Surface",
     "Tabulated",

@@ -46,4 +46,14 @@ class Stack(Frozen):
     layers: tuple[Film, ...] = Field(min_length=1, max_length=200)
 
 
-Coating = Annotated[Bare | QuarterWave | Film | Stack, Field(discriminator="kind")]
+StandardName = Literal["uncoated-1930s", "single-1950s", "early-multicoat", "modern-broadband"]
+
+
+class Standard(Frozen):
+    """A coating as lenses of an era wore it; its films follow the glass (`optics.standard_coatings`)."""
+
+    kind: Literal["standard"] = "standard"
+    name: StandardName
+
+
+Coating = Annotated[Bare | QuarterWave | Film | Stack | Standard, Field(discriminator="kind")]

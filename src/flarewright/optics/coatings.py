@@ -14,11 +14,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from flarewright.errors import FlarewrightError
-from flarewright.model.coating import Bare, Coating, Film, QuarterWave
+from flarewright.model.coating import Bare, Coating, Film, QuarterWave, Standard
+
+from .standard_coatings import MGF2, standard_films
 
 Floats = NDArray[np.float64]
 
-MAGNESIUM_FLUORIDE = 1.38
+MAGNESIUM_FLUORIDE = MGF2
 """Lowest index of a film that real coating materials reach."""
 
 __all__ = [
@@ -55,7 +57,7 @@ def film_stack(coating: Coating | None, n_front: float, n_back: float) -> tuple[
     Notes
     -----
     Quarter wave: d = lambda0 / (4 n1) + offset, n1 = sqrt(n0 n2) ("ideal"), not below magnesium fluoride ("real"), or
-    the stated number. `Stack` lists its films from the side of the lower index.
+    the stated number. `Stack` and `Standard` list their films from the side of the lower index.
     """
     if coating is None or isinstance(coating, Bare):
         return (), ()
@@ -63,7 +65,8 @@ def film_stack(coating: Coating | None, n_front: float, n_back: float) -> tuple[
         return (coating.index,), (coating.thickness_nm,)
     if isinstance(coating, QuarterWave):
         return _quarter_wave(coating, n_front, n_back)
-    films = coating.layers if n_front <= n_back else coating.layers[::-1]
+    outward = standard_films(coating.name, max(n_front, n_back)) if isinstance(coating, Standard) else coating.layers
+    films = outward if n_front <= n_back else outward[::-1]
     return tuple(film.index for film in films), tuple(film.thickness_nm for film in films)
 
 

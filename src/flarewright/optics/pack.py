@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import LensError, ProjectError
 from ..model import AsLens, Coating, CoatingChoice, Everywhere, Lens, PerRow, Preset, Stop
+from ..model.coating import StandardName
 from .coatings import film_stack, reflectance_table
 from .paraxial import D_LINE_NM, FirstOrder, gap_indices, vertex_positions
 
@@ -76,7 +78,8 @@ def resolve_coatings(lens: Lens, choice: CoatingChoice) -> tuple[Coating | None,
     if isinstance(choice, Preset):
         if choice.name not in lens.coating_presets:
             known = ", ".join(lens.coating_presets) or "none"
-            raise ProjectError(f"{lens.name} has no coating preset {choice.name!r}; it has: {known}")
+            hint = "; leave out 'preset:' for the standard coating" if choice.name in get_args(StandardName) else ""
+            raise ProjectError(f"{lens.name} has no coating preset {choice.name!r}; it has: {known}{hint}")
         return lens.coating_presets[choice.name]
     if isinstance(choice, PerRow):
         if len(choice.coatings) != len(lens.rows):

@@ -1,0 +1,85 @@
+"""What a coated glass surface in air reflects: R against wavelength and angle, its means, and its colour."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from flarewright.model import D65, Coating, Film
+
+from .coatings import film_stack, stack_reflectance
+from .color import luminance_weights
+from .spectrum import band_weights
+
+Floats = NDArray[np.float64]
+
+BAND_NM = (420.0, 680.0)
+"""The band over which mean reflectances of coatings are stated."""
+
+WAVELENGTHS_NM = np.arange(380.0, 781.0, 5.0)
+
+
+@dataclass(frozen=True)
+class CoatingResponse:
+    """A coated surface as seen from the air.
+
+    Attributes
+    ----------
+    films : tuple of Film
+        From the air to the glass.
+    wavelengths_nm : ndarray, shape (W,)
+    angles_deg : ndarray, shape (A,)
+        Of incidence, in air.
+    reflectance : ndarray, shape (A, W)
+        R of unpolarised light.
+    mean_reflectance : ndarray, shape (A,)
+        Over 420 to 680 nm, every wavelength alike.
+    luminous_reflectance : ndarray, shape (A,)
+        Of daylight D65, weighted by the eye.
+    rgb : ndarray, shape (A, 3)
+        The reflected part of white daylight D65 in linear Rec.709, where (1, 1, 1) is all of it.
+    """
+
+    films: tuple[Film, ...]
+    wavelengths_nm: Floats
+    angles_deg: Floats
+    reflectance: Floats
+    mean_reflectance: Floats
+    luminous_reflectance: Floats
+    rgb: Floats
+
+
+def coating_response(coating: Coating | None, n_d: float, n_glass: ArrayLike, angles_deg: ArrayLike) -> CoatingResponse:
+    """Compute what a coated surface between air and glass reflects.
+
+    Parameters
+    ----------
+    coating : Coating or None
+    n_d : float
+        Index of the glass at 587.56 nm, for which the films are made.
+    n_glass : array_like
+        Index of the glass at `WAVELENGTHS_NM`, or one number for all.
+    angles_deg : array_like, shape (A,)
+        Angles of incidence in air, 0 to 90.
+
+    Returns
+    -------
+    CoatingResponse
+    """
+    indices, thicknesses_nm = film_stack(coating, 1.0, n_d)
+    wave, angles = WAVELENGTHS_NM, np.atleast_1d(np.asarray(angles_deg, dtype=np.float64))
+    cosine = np.clip(np.cos(np.radians(angles)), 0.0, 1.0)[:, None]
+    R = stack_reflectance(1.0, n_glass, indices, thicknesses_nm, wave, cosine)
+    inside = (wave >= BAND_NM[0]) & (wave <= BAND_NM[1])
+    rgb = R @ band_weights(D65(), wave, "rec709")
+    return CoatingResponse(
+        films=tuple(Film(index=n, thickness_nm=d) for n, d in zip(indices, thicknesses_nm, strict=True)),
+        wavelengths_nm=wave,
+        angles_deg=angles,
+        reflectance=R,
+        mean_reflectance=R[:, inside].mean(axis=1),
+        luminous_reflectance=rgb @ luminance_weights("rec709"),
+        rgb=rgb,
+    )

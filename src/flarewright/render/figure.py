@@ -1,0 +1,142 @@
+"""Small drawings of lines, texts and boxes, as SVG or as pixels, without a plot library."""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..io.atomic import write_atomically
+from ..io.png import write_png
+
+INK, FAINT, PAPER = "#22313f", "#8796a5", "#fbfcfd"
+
+# pixels are drawn this many times finer and averaged, for smooth edges
+_FINER = 3
+
+
+@dataclass(frozen=True)
+class Line:
+    """A polyline; places in pixels from the upper left corner."""
+
+    points: Sequence[tuple[float, float]]
+    colour: str = INK
+    width: float = 1.0
+
+
+@dataclass(frozen=True)
+class Box:
+    """A filled rectangle."""
+
+    x: float
+    y: float
+    width: float
+    height: float
+    colour: str
+
+
+@dataclass(frozen=True)
+class Text:
+    """Words on a baseline."""
+
+    x: float
+    y: float
+    words: str
+    size: float = 12.0
+    colour: str = INK
+    anchor: Literal["start", "middle", "end"] = "start"
+
+
+Mark = Line | Box | Text
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A sheet of marks, later ones over earlier ones."""
+
+    width: int
+    height: int
+    title: str
+    marks: tuple[Mark, ...]
+
+
+def write_figure(path: Path, figure: Figure, about: str) -> None:
+    """Write a figure as `.svg` or `.png`, whole or not at all.
+
+    Parameters
+    ----------
+    path : path
+        The suffix decides.
+    figure : Figure
+    about : str
+        The program that made it, for the file.
+
+    Raises
+    ------
+    OutputError
+        When the file cannot be written.
+    """
+    if path.suffix.lower() == ".svg":
+        write_atomically(path, lambda temporary: _write_text(temporary, to_svg(figure)))
+    else:
+        write_png(path, to_pixels(figure), {"Software": about, "Title": figure.title})
+
+
+def _write_text(path: Path, text: str) -> None:
+    path.write_text(text, "utf-8")
+
+
+def to_svg(figure: Figure) -> str:
+    """Return a figure as SVG text."""
+    body = "\n".join(_svg_mark(mark) for mark in figure.marks)
+    return (
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {figure.width} {figure.height}" width="{figure.width}" '
+        f'height="{figure.height}" font-family="Helvetica, Arial, sans-serif">\n'
+        f"<title>{html.escape(figure.title)}</title>\n"
+        f'<rect width="100%" height="100%" fill="{PAPER}"/>\n{body}\n</svg>\n'
+    )
+
+
+def _svg_mark(mark: Mark) -> str:
+    if isinstance(mark, Line):
+        points = " ".join(f"{x:.2f},{y:.2f}" for x, y in mark.points)
+        return (
+            f'<polyline points="{points}" fill="none" stroke="{mark.colour}" stroke-width="{mark.width:g}" '
+            'stroke-linejoin="round"/>'
+        )
+    if isinstance(mark, Box):
+        return (
+            f'<rect x="{mark.x:.2f}" y="{mark.y:.2f}" width="{mark.width:.2f}" height="{mark.height:.2f}" '
+            f'fill="{mark.colour}"/>'
+        )
+    return (
+        f'<text x="{mark.x:.2f}" y="{mark.y:.2f}" font-size="{mark.size:g}" text-anchor="{mark.anchor}" '
+        f'fill="{mark.colour}">{html.escape(mark.words)}</text>'
+    )
+
+
+def to_pixels(figure: Figure) -> NDArray[np.uint8]:
+    """Return a figure as 8-bit sRGB pixels, shape (height, width, 3)."""
+    from PIL import Image, ImageDraw, ImageFont
+
+    s = _FINER
+    sheet = Image.new("RGB", (figure.width * s, figure.height * s), PAPER)
+    draw = ImageDraw.Draw(sheet)
+    for mark in figure.marks:
+        if isinstance(mark, Line):
+            points = [(x * s, y * s) for x, y in mark.points]
+            draw.line(points, fill=mark.colour, width=max(1, round(mark.width * s)), joint="curve")
+        elif isinstance(mark, Box):
+            # Pillow's boxes hold their last pixel too
+            right, low = (mark.x + mark.width) * s - 1, (mark.y + mark.height) * s - 1
+            draw.rectangle([mark.x * s, mark.y * s, max(right, mark.x * s), max(low, mark.y * s)], fill=mark.colour)
+        else:
+            font = ImageFont.load_default(mark.size * s)
+            anchor = {"start": "ls", "middle": "ms", "end": "rs"}[mark.anchor]
+            draw.text((mark.x * s, mark.y * s), mark.words, fill=mark.colour, font=font, anchor=anchor)
+    return np.asarray(sheet.resize((figure.width, figure.height), Image.Resampling.BOX))

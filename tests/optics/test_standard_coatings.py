@@ -1,0 +1,132 @@
+"""The standard coatings: what they are stated to reflect, told by Rouard's summation and not by the matrices."""
+
+import numpy as np
+import pytest
+
+from flarewright.model import Everywhere, Standard
+from flarewright.optics.coating_response import BAND_NM, coating_response
+from flarewright.optics.coatings import film_stack, stack_reflectance, stack_reflectance_transmittance
+from flarewright.optics.pack import resolve_coatings
+from flarewright.optics.standard_coatings import BROADBAND_GLASS, STANDARD_COATINGS, standard_films
+from flarewright.render.prepare import load_lens
+
+NAMES = [known.name for known in STANDARD_COATINGS]
+BAND = np.linspace(*BAND_NM, 131)
+
+
+def rouard(n_front, n_back, indices, thicknesses_nm, lam, angle):
+    """Sum the reflections of a stack film by film from the glass outwards (Rouard 1937), for s and p."""
+    n = np.array([n_front, *indices, n_back])
+    cos = np.sqrt(1 - (n_front * np.sin(angle) / n) ** 2 + 0j)
+    out = 0.0
+    for eta in (n * cos, n / cos):
+        step = (eta[:-1] - eta[1:]) / (eta[:-1] + eta[1:])
+        r = step[-1]
+        for k in range(len(indices) - 1, -1, -1):
+            phase = np.exp(4j * np.pi * n[k + 1] * thicknesses_nm[k] * cos[k + 1] / lam)
+            r = (step[k] + r * phase) / (1 + step[k] * r * phase)
+        out += 0.5 * abs(r) ** 2
+    return out
+
+
+def mean_reflectance(name, glass):
+    n, d = film_stack(Standard(name=name), 1.0, glass)
+    return np.mean([rouard(1.0, glass, n, d, lam, 0.0) for lam in BAND])
+
+
+@pytest.mark.parametrize(
+    ("name", "glass", "stated"),
+    [
+        ("uncoated-1930s", 1.52, 0.04258), ("uncoated-1930s", 1.80, 0.08163),
+        ("single-1950s", 1.52, 0.01414), ("single-1950s", 1.80, 0.00514),
+        ("early-multicoat", 1.52, 0.00118), ("early-multicoat", 1.80, 0.00171),
+        ("modern-broadband", 1.52, 0.00141), ("modern-broadband", 1.80, 0.00131),
+    ],
+)  # fmt: skip
+def test_the_mean_reflectance_that_the_docs_state(name, glass, stated):
+    assert mean_reflectance(name, glass) == pytest.approx(stated, abs=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("name", "densest", "bound"), [("early-multicoat", 1.95, 0.0045), ("modern-broadband", 2.11, 0.00145)]
+)
+def test_multicoatings_suit_every_glass(name, densest, bound):
+    """Between the designs too: no glass of a catalogue is left out."""
+    assert max(mean_reflectance(name, glass) for glass in np.arange(1.42, densest, 0.0125)) < bound
+
+
+def test_the_third_film_of_the_early_multicoat_ends_where_it_stops_helping():
+    below, above = (standard_films("early-multicoat", glass) for glass in (1.63, 1.6301))
+    assert (len(below), len(above)) == (3, 2)
+    at_centre = [
+        stack_reflectance(1.0, 1.63, [f.index for f in films], [f.thickness_nm for f in films], 530.0, 1.0)
+        for films in (below, above)
+    ]
+    assert at_centre[0] == pytest.approx(at_centre[1], rel=0.05)
+
+
+def test_the_modern_one_is_flat_over_the_band_where_the_early_one_is_not():
+    for glass in (1.52, 1.65, 1.8, 1.95):
+        worst = {}
+        for name in ("early-multicoat", "modern-broadband"):
+            n, d = film_stack(Standard(name=name), 1.0, glass)
+            worst[name] = max(rouard(1.0, glass, n, d, lam, 0.0) for lam in BAND)
+        assert worst["modern-broadband"] < 0.0065
+        assert worst["early-multicoat"] > 1.2 * worst["modern-broadband"]
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("glass", [1.49, 1.7, 1.92])
+def test_matrices_agree_with_rouard_and_lose_no_light(name, glass):
+    n, d = film_stack(Standard(name=name), 1.0, glass)
+    for lam in (400.0, 530.0, 690.0):
+        for angle in np.radians([0.0, 20.0, 45.0, 75.0]):
+            R, T = stack_reflectance_transmittance(1.0, glass, n, d, lam, np.cos(angle))
+            assert 0.5 * (R[0] + R[1]) == pytest.approx(rouard(1.0, glass, n, d, lam, angle), abs=1e-13)
+            np.testing.assert_allclose(R + T, 1.0, atol=1e-12)
+
+
+@pytest.mark.parametrize("glass", [1.46, 1.52, 1.8])
+def test_a_quarter_wave_at_its_centre_is_the_formula(glass):
+    n, d = film_stack(Standard(name="single-1950s"), 1.0, glass)
+    expected = ((glass - 1.38**2) / (glass + 1.38**2)) ** 2
+    assert stack_reflectance(1.0, glass, n, d, 550.0, 1.0) == pytest.approx(expected, rel=1e-12)
+
+
+@pytest.mark.parametrize("glass", [1.46, 1.52, 1.65, 1.8, 2.0])
+def test_at_its_centre_the_early_multicoat_has_no_half_wave(glass):
+    n, d = film_stack(Standard(name="early-multicoat"), 1.0, glass)
+    Y = n[0] ** 2 * glass / n[2] ** 2 if len(n) == 3 else n[0] ** 2 / glass
+    assert stack_reflectance(1.0, glass, n, d, 530.0, 1.0) == pytest.approx(((1 - Y) / (1 + Y)) ** 2, abs=1e-12)
+
+
+def test_films_run_from_the_air_whichever_way_the_light_goes():
+    front = film_stack(Standard(name="modern-broadband"), 1.0, 1.7)
+    back = film_stack(Standard(name="modern-broadband"), 1.7, 1.0)
+    assert (front[0][::-1], front[1][::-1]) == back
+    assert front[0][0] == 1.38
+
+
+def test_designs_beyond_the_table_stay_the_last_ones():
+    for outside, last in ((1.3, BROADBAND_GLASS[0]), (2.4, BROADBAND_GLASS[-1])):
+        assert standard_films("modern-broadband", outside) == standard_films("modern-broadband", last)
+
+
+def test_each_glass_of_a_lens_gets_its_own_design_and_cemented_surfaces_none():
+    lens = load_lens("heliar-tronnier")
+    coatings = resolve_coatings(lens, Everywhere(coating=Standard(name="modern-broadband")))
+    cemented = [k for k in range(1, len(lens.rows)) if coatings[k] is None and k != lens.stop_row]
+    assert cemented
+    assert coatings[0] == Standard(name="modern-broadband")
+
+
+def test_the_response_adds_up():
+    response = coating_response(Standard(name="single-1950s"), 1.52, 1.52, [0.0, 40.0])
+    n, d = film_stack(Standard(name="single-1950s"), 1.0, 1.52)
+    direct = stack_reflectance(1.0, 1.52, n, d, response.wavelengths_nm, np.cos(np.radians(40.0)))
+    np.testing.assert_allclose(response.reflectance[1], direct, rtol=1e-14)
+    # the eye sees a mean of R, so it lies between its ends
+    assert response.reflectance[0].min() < response.luminous_reflectance[0] < response.reflectance[0].max()
+    # bare glass of one index reflects white
+    bare = coating_response(None, 1.52, 1.52, 0.0)
+    np.testing.assert_allclose(bare.rgb, (0.52 / 2.52) ** 2, rtol=2e-3)
