@@ -55,6 +55,7 @@ def ghosts(
     f_number = chosen_fstop(fstop)
 
     from ..render.analysis import ghosts as analyse
+    from ..render.first_run import compile_for_analysis
     from ..render.prepare import load_lens
 
     remarks: list[str] = []
@@ -62,6 +63,7 @@ def ghosts(
     for name, value in (("--focus", focus), ("--sensor-distance", sensor_distance)):
         if value is not None and not (math.isfinite(value) and value > 0.0):
             raise ProjectError(f"{name} {value:g} is no distance; give millimetres above 0")
+    compile_for_analysis()
     table = analyse(
         prescription,
         angles,

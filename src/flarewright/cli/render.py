@@ -172,8 +172,10 @@ def _render(project: Project, threads: int | None) -> Rendering:
     """Render with a progress bar where someone looks at it."""
     import sys
 
+    from ..render.first_run import compile_for_render
     from ..render.render import render as render_project
 
+    compile_for_render(project, threads)
     if not sys.stderr.isatty():
         return render_project(project, threads=threads)
     from rich.console import Console

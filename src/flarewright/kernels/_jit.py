@@ -13,7 +13,11 @@ _FASTMATH = {"contract", "reassoc", "arcp", "nsz", "afn"}
 
 def compiled(function: Callable[..., Any]) -> Any:
     """Compile a kernel that Python calls."""
-    return njit(function, cache=True, nogil=True, error_model="numpy", fastmath=_FASTMATH)
+    try:
+        return njit(function, cache=True, nogil=True, error_model="numpy", fastmath=_FASTMATH)
+    except RuntimeError:
+        # no folder to cache in can be written: every run compiles
+        return njit(function, nogil=True, error_model="numpy", fastmath=_FASTMATH)
 
 
 def inlined(function: Callable[..., Any]) -> Any:

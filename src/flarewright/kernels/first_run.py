@@ -1,0 +1,216 @@
+"""The first run: compile what a command needs in more than one process at once (docs/adr/0007).
+
+Numba holds one lock while it compiles, so threads do not help. Each process compiles its share of the kernels that
+Python calls ("roots") into Numba's cache on disk; what a helper has compiled is loaded from there. Nothing depends on
+the helpers: a root that is not in the cache when it is first called is compiled then.
+"""
+
+from __future__ import annotations
+
+import gc
+import os
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
+from importlib import import_module
+from typing import Any
+
+from numba.core.sigutils import normalize_signature
+
+# a helper that takes longer than this is given up, and the command compiles alone
+PATIENCE_S = 120.0
+# set for helpers, which start none themselves
+_MARK = "FLAREWRIGHT_HELPER"
+
+_GEOMETRY = "i8[::1], i8[::1], f8[::1], f8[::1], f8[::1], f8[::1]"
+_BUNDLE = "f8[:,::1], f8[:,::1], i8[:,::1]"
+_CANVAS = "f8[:,::1], f8[::1], f8, f8[::1], f4[:,:,::1], f4[::1]"
+_WINGS = "f8[::1], f8[::1], f8[::1], f8[::1]"
+
+# module and kernel of each root, its types as a render calls it (tests/contracts compares them with real calls), and
+# how long it takes to compile beside the others
+ROOTS = {
+    "mesh": (
+        "mesh.build_mesh",
+        f"{_GEOMETRY}, f8[:,::1], f8[:,:,::1], f8, f8, i8, f8, f8, f8[::1], i8, i8, i8, f8, f8, f8, f8",
+        5.2,
+    ),
+    "prepass": ("prepass.find_box", f"{_GEOMETRY}, f8[::1], f8[:,::1], f8, f8, i8, f8, f8, f8[::1], i8, i8", 3.0),
+    "draw": ("bundle.draw_bundle", f"{_BUNDLE}, f8[::1], i8, f8[:,::1], none, f8, {_CANVAS}", 4.8),
+    "draw masked": ("bundle.draw_bundle", f"{_BUNDLE}, f8[::1], i8, f8[:,::1], f8[:,::1], f8, {_CANVAS}", 6.5),
+    "densities": ("bundle.node_densities", _BUNDLE, 0.3),
+    "measure": ("bundle.measure_bundle", f"{_BUNDLE}, i8, f8[:,::1], f8[:,::1]", 0.6),
+    "matrices": (
+        "matrix.draw_matrix_ghosts",
+        "i8[::1], i8[::1], i8[::1], i8[::1], f8[::1], f8[::1], f8[:,::1], f8[:,:,::1], f8, f8, f8, f8[:,::1], f8, "
+        "none, f8, f8[:,::1], f8[::1], f8, f8[:,::1], f8[:,:,::1], f4[::1]",
+        4.0,
+    ),
+    "blade wings": (
+        "resample.blend_blade_wings",
+        f"{_WINGS}, f8, f8[:,:,::1], f8[:,:,::1], f8[::1], f8[::1], f8, f8, f8, f8, f4[:,:,::1]",
+        0.8,
+    ),
+    "fan wings": ("resample.blend_fan_wings", f"{_WINGS}, f8[::1], f8, f8, f4[:,:,::1]", 0.5),
+    "window": ("interleave.lit_window", "f4[:,:,::1]", 0.3),
+    "pixels": ("interleave.interleave", "f4[:,:,::1], i8, i8, f8, f4[:,:,::1]", 0.1),
+}
+# what a helper loses to its own start
+_START = 0.7
+
+
+def compile_together(names: Sequence[str], processes: int) -> None:
+    """Compile roots that are not in the cache, some of them in other processes.
+
+    Returns at once when the cache holds them, when Numba does not compile or has nowhere to cache, or when there is
+    only one process to use: then each root is compiled when it is first called.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Keys of `ROOTS` that the command will call.
+    processes : int
+        Largest number of processes, this one included.
+    """
+    shares = divided(absent(names), processes)
+    if len(shares) < 2 or _MARK in os.environ:
+        return
+    with _helpers(shares[1:]) as helpers:
+        compile_roots(shares[0])
+        for helper in helpers:
+            with suppress(subprocess.TimeoutExpired):
+                helper.wait(PATIENCE_S)
+
+
+def divided(names: Sequence[str], processes: int) -> list[list[str]]:
+    """Divide roots over processes, the slowest first, each to the one that would be done with it first.
+
+    Parameters
+    ----------
+    names : sequence of str
+    processes : int
+
+    Returns
+    -------
+    list of list of str
+        The first share is this process'; none is empty.
+    """
+    busy = [0.0, *[_START] * (processes - 1)]
+    shares: list[list[str]] = [[] for _ in busy]
+    for name in sorted(names, key=lambda name: -ROOTS[name][2]):
+        least = busy.index(min(busy))
+        busy[least] += ROOTS[name][2]
+        shares[least].append(name)
+    return [share for share in shares if share]
+
+
+def cores() -> int:
+    """Return how many cores this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def absent(names: Sequence[str]) -> list[str]:
+    """Return the roots of which the cache on disk holds nothing that fits the sources; none where nothing is cached."""
+    return [name for name in names if not _held(kernel(name))]
+
+
+def kernel(name: str) -> Any:
+    """Return the kernel of a root."""
+    module, function = ROOTS[name][0].split(".")
+    return getattr(import_module(f"{__package__}.{module}"), function)
+
+
+def types(name: str) -> tuple[Any, ...]:
+    """Return the types that a render calls a root with; the cache knows a kernel by them."""
+    found, _ = normalize_signature(f"({ROOTS[name][1]},)")
+    return tuple(found)
+
+
+def _held(dispatcher: Any) -> bool:
+    try:
+        # Numba has no public way to look into its cache without a call
+        return bool(dispatcher._cache._cache_file._load_index())
+    except Exception:
+        # not compiled, not cached, or another Numba: there is nothing to win
+        return True
+
+
+def compile_roots(names: Sequence[str]) -> None:
+    """Compile roots for the types that a render calls them with, into the cache on disk.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Keys of `ROOTS`.
+    """
+    with _uncollected():
+        for name in names:
+            # what cannot be compiled ahead tells so when it is called
+            with suppress(Exception):
+                kernel(name).compile(types(name))
+
+
+@contextmanager
+def _uncollected() -> Iterator[None]:
+    """Leave the garbage collector out of the compiler's way: it takes a tenth of the time and finds little."""
+    enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if enabled:
+            gc.enable()
+
+
+@contextmanager
+def _helpers(shares: Sequence[Sequence[str]]) -> Iterator[list[subprocess.Popen[bytes]]]:
+    """Start a process a share; none outlives the block."""
+    started: list[subprocess.Popen[bytes]] = []
+    try:
+        for share in shares:
+            # no program, no memory or no right to start another: the command compiles alone
+            with suppress(OSError, ValueError):
+                started.append(_start(share))
+        yield started
+    finally:
+        for helper in started:
+            helper.kill()
+            helper.communicate()
+
+
+def _start(share: Sequence[str]) -> subprocess.Popen[bytes]:
+    if getattr(sys, "frozen", False) or not sys.executable:
+        raise OSError("there is no interpreter to start")
+    # the parent's search path, and never the working folder in its place
+    code = f"import sys; sys.path[:] = {sys.path!r}; from {__name__} import help_out; help_out({list(share)!r})"
+    return subprocess.Popen(
+        [sys.executable, "-c", code],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        env={**os.environ, _MARK: "1"},
+        creationflags=getattr(subprocess, "CREATE_NO_WINDOW", 0),
+    )
+
+
+def help_out(names: Sequence[str]) -> None:
+    """Compile roots in a helper, and end the process.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Keys of `ROOTS`.
+    """
+
+    def end_with_parent() -> None:
+        # the pipe closes when the command ends, however it ends
+        os.read(0, 1)
+        os._exit(1)
+
+    threading.Thread(target=end_with_parent, daemon=True).start()
+    compile_roots(names)
+    os._exit(0)

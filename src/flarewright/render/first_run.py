@@ -1,0 +1,43 @@
+"""What a command compiles on its first run (docs/adr/0007)."""
+
+from __future__ import annotations
+
+from ..kernels.first_run import absent, compile_together, cores
+from ..model import Project
+from .prepare import settle
+
+# what every command calls that traces rays
+_TRACING = ("mesh", "prepass", "measure")
+
+
+def compile_for_render(project: Project, threads: int | None = None) -> None:
+    """Compile what a render calls, unless it is compiled.
+
+    Parameters
+    ----------
+    project : Project
+    threads : int, optional
+        Most processes to use; None: one a core.
+
+    Raises
+    ------
+    FlarewrightError
+        When the project cannot be rendered: nobody waits for a compiler to hear that.
+    """
+    if not absent(_TRACING):
+        return
+    iris = settle(project).iris
+    names = [*_TRACING]
+    if project.quality.mode == "final":
+        names += ["draw" if iris.mask is None else "draw masked", "densities", "window", "pixels"]
+    elif iris.mask is None:
+        # a draft through a mask is rare: its kernel is compiled when it is called
+        names += ["matrices"]
+    if project.output.starburst:
+        names += ["fan wings" if iris.blades == 0 or iris.mask is not None else "blade wings"]
+    compile_together(names, min(threads or cores(), cores()))
+
+
+def compile_for_analysis() -> None:
+    """Compile what the ghost analysis calls, unless it is compiled."""
+    compile_together([*_TRACING, "draw", "densities"], cores())
