@@ -158,6 +158,31 @@ def test_spike_profile_is_the_averaged_sinc():
     np.testing.assert_allclose(profile.half_total, total, rtol=1e-12)
 
 
+def test_spike_profile_is_averaged_over_the_pixel():
+    wings = pupil_pattern(Iris(blades=6)).wings
+    pitch, N = 0.028, 8.0
+    profile = spike_profile(wings, WHITE_NM, WHITE, N, (pitch, pitch))
+    part = (np.arange(400) + 0.5) / 400 - 0.5
+    for k, angle in enumerate(wings.angle):
+        shadow = pitch / (2 * N) * (np.sin(angle) * part[:, None] + np.cos(angle) * part).ravel()
+        for at in (0, 60, 200, 420):
+            u = wings.length * (at * profile.step + shadow) / (WHITE_NM[:, None] * 1e-6)
+            brute = wings.multiplicity * wings.length**2 / (4 * math.pi**3) * (np.sinc(u) ** 2).mean(axis=1) @ WHITE
+            np.testing.assert_allclose(profile.density[k, at], brute, rtol=5e-3)
+
+
+@pytest.mark.parametrize("iris", SHAPES)
+@pytest.mark.parametrize("f_number", [2.8, 8.0, 22.0])
+def test_a_draft_errs_near_the_centre_only(iris, f_number):
+    final = layer(iris, f_number, size=(640, 360), weights=GREY)
+    size, centre = (640, 360), (320.3, 179.8)
+    draft = starburst_layer(iris, f_number, (0.028, 0.028), size, centre, WHITE_NM, GREY, split=1)
+    assert np.abs(draft - final).max() < 5e-6 * final.max()
+    assert draft.sum(dtype=float) == pytest.approx(final.sum(dtype=float), rel=3e-5)
+    far = radii(size, centre, 1.0) > 12.0
+    np.testing.assert_array_equal(draft[far], final[far])
+
+
 @pytest.mark.parametrize(("blades", "spikes"), [(4, 4), (5, 10), (6, 6), (7, 14), (8, 8), (9, 18)])
 @pytest.mark.parametrize("f_number", [2.8, 16.0])
 def test_even_blades_give_n_spikes_odd_ones_2n(blades, spikes, f_number):

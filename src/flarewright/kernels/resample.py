@@ -57,25 +57,42 @@ def deposit_core(
     strip = np.empty(last + 1)
     above = np.empty(width + 1)
     below = np.empty(width + 1)
+    knot = np.empty((width + 1, 4), dtype=np.int64)
+    share = np.empty((width + 1, 4))
     for m in range(knots_per_mm.shape[0]):
         scale = knots_per_mm[m]
-        first = min(max(int(math.floor(x_edges[0] * scale + middle)) - 1, 0), last)
-        final = min(max(int(math.floor(x_edges[width] * scale + middle)) + 2, 0), last)
+        for j in range(width + 1):
+            k, w0, w1, w2, w3 = _spline_weights(min(max(x_edges[j] * scale + middle, -4.0), last + 4.0))
+            share[j, 0], share[j, 1], share[j, 2], share[j, 3] = w0, w1, w2, w3
+            for q in range(4):
+                knot[j, q] = min(max(k + q, 0), last)
+        first, final = knot[0, 0], knot[width, 3]
+        # few corners on a fine table: read each corner's sixteen knots instead of the whole row
+        sparse = final - first + 1 > 4 * (width + 1)
         for i in range(height + 1):
-            # Interpolate along y once, then every corner of this row along x.
             k, w0, w1, w2, w3 = _spline_weights(min(max(y_edges[i] * scale + middle, -4.0), last + 4.0))
             k0, k1 = min(max(k, 0), last), min(max(k + 1, 0), last)
             k2, k3 = min(max(k + 2, 0), last), min(max(k + 3, 0), last)
-            for j in range(first, final + 1):
-                strip[j] = w0 * table[k0, j] + w1 * table[k1, j] + w2 * table[k2, j] + w3 * table[k3, j]
-            for j in range(width + 1):
-                k, w0, w1, w2, w3 = _spline_weights(min(max(x_edges[j] * scale + middle, -4.0), last + 4.0))
-                below[j] = (
-                    w0 * strip[min(max(k, first), final)]
-                    + w1 * strip[min(max(k + 1, first), final)]
-                    + w2 * strip[min(max(k + 2, first), final)]
-                    + w3 * strip[min(max(k + 3, first), final)]
-                )
+            # Interpolate along y, then every corner of this row along x.
+            if sparse:
+                for j in range(width + 1):
+                    value = 0.0
+                    for q in range(4):
+                        a = knot[j, q]
+                        value += share[j, q] * (
+                            w0 * table[k0, a] + w1 * table[k1, a] + w2 * table[k2, a] + w3 * table[k3, a]
+                        )
+                    below[j] = value
+            else:
+                for a in range(first, final + 1):
+                    strip[a] = w0 * table[k0, a] + w1 * table[k1, a] + w2 * table[k2, a] + w3 * table[k3, a]
+                for j in range(width + 1):
+                    below[j] = (
+                        share[j, 0] * strip[knot[j, 0]]
+                        + share[j, 1] * strip[knot[j, 1]]
+                        + share[j, 2] * strip[knot[j, 2]]
+                        + share[j, 3] * strip[knot[j, 3]]
+                    )
             if i > 0:
                 for j in range(width):
                     flux = above[j + 1] - above[j] - below[j + 1] + below[j]
@@ -148,26 +165,6 @@ def blend_fan_wings(
                 out[i, j, c] = (1.0 - w) * out[i, j, c] + wing * colour[c]
 
 
-@inlined
-def _cumulative(table, slope, c, v, per_step, half_total, tail):
-    """Flux of a spike's profile between 0 and v in channel c: Hermite cubic in the table, closed form beyond it."""
-    a = abs(v)
-    at = a * per_step
-    k = int(at)
-    if k >= table.shape[0] - 1:
-        value = half_total - tail / a
-    else:
-        f = at - k
-        h = 1.0 / per_step
-        value = (
-            (1.0 + 2.0 * f) * (1.0 - f) ** 2 * table[k, c]
-            + f * f * (3.0 - 2.0 * f) * table[k + 1, c]
-            + h * f * (1.0 - f) ** 2 * slope[k, c]
-            - h * f * f * (1.0 - f) * slope[k + 1, c]
-        )
-    return value if v >= 0.0 else -value
-
-
 @compiled
 def blend_blade_wings(
     x: Floats,
@@ -211,48 +208,84 @@ def blend_blade_wings(
         Irradiance of the core on entry, of both on return.
     """
     blades = angle.shape[0]
+    width = x.shape[0]
     channels = out.shape[2]
     per_step = 1.0 / step
     end = (tables.shape[1] - 2) * step
     cos_fan, sin_fan = math.cos(half_fan), math.sin(half_fan)
-    normal = np.empty((blades, 2))
-    for b in range(blades):
-        normal[b, 0], normal[b, 1] = math.cos(angle[b]), math.sin(angle[b])
-    total = np.empty(channels)
+    total = np.empty((channels, width))
+    # single precision where pixels are many and lanes count; v^2 - half^2 does not cancel off the table
+    far, flat, near = np.empty(width, np.float32), np.empty(width, np.float32), np.empty(width, np.uint8)
+    x32, zero, one = x.astype(np.float32), np.float32(0.0), np.float32(1.0)
+    scale32, end32, fan32 = np.float32(scale), np.float32(end), np.float32(half_fan)
+    cos32, sin32 = np.float32(cos_fan), np.float32(sin_fan)
     area = pixel[0] * pixel[0] + pixel[1] * pixel[1]
+    # A straight blade's profile is differenced over a quarter step each way, which turns it into the slope.
+    least = 0.25 * step
+    least32 = np.float32(least)
     for i in range(y.shape[0]):
-        for j in range(x.shape[0]):
-            r = math.sqrt(x[j] * x[j] + y[i] * y[i])
-            w = _window(r, inner, outer)
-            if w <= 0.0:
-                continue
-            total[:] = 0.0
-            far = 0.0
-            # A fan's width in v; for a straight blade a quarter step, which turns the difference into the slope.
-            half = max(r * half_fan * scale, 0.25 * step)
-            phi = math.atan2(y[i], x[j]) if half_fan > 0.0 else 0.0
-            for b in range(blades):
-                along = abs(normal[b, 0] * x[j] + normal[b, 1] * y[i])
-                across = abs(normal[b, 0] * y[i] - normal[b, 1] * x[j])
-                theta = 1.0
-                if half_fan > 0.0:
-                    turn = (phi - angle[b]) / math.pi
-                    theta = math.pi * abs(turn - math.floor(turn + 0.5))
-                if half_fan == 0.0:
-                    v = r * across / along * scale
-                elif theta <= half_fan:
-                    v = r * theta * scale
-                elif across * sin_fan + along * cos_fan > 0.0:
-                    beyond = (across * cos_fan - along * sin_fan) / (along * cos_fan + across * sin_fan)
-                    v = r * (half_fan + beyond) * scale
-                if v - half > end:
-                    far += 1.0 / (v * v - half * half)
-                else:
+        y32 = np.float32(y[i])
+        for j in range(width):
+            far[j], flat[j] = zero, zero
+        total[:, :] = 0.0
+        for b in range(blades):
+            nx, ny = math.cos(angle[b]), math.sin(angle[b])
+            nx32, ny32 = np.float32(nx), np.float32(ny)
+            # Off the table all channels share closed forms: beside the spike or its fan, and deep inside the fan.
+            for j in range(width):
+                r = math.sqrt(x32[j] * x32[j] + y32 * y32)
+                along, across = abs(nx32 * x32[j] + ny32 * y32), abs(nx32 * y32 - ny32 * x32[j])
+                N, D = across * cos32 - along * sin32, along * cos32 + across * sin32
+                wide = r * fan32 * scale32
+                wide = wide if wide > least32 else least32
+                v = r * scale32 * (fan32 * D + N)
+                # half_fan - theta is its sine, -N / r, to a few percent of a term that is itself a few per mille
+                depth = -N * scale32
+                beside, inside = v > (end32 + wide) * D, depth > end32
+                over = v * v - wide * wide * D * D if beside else depth * (depth - wide - wide)
+                far[j] += (D * D if beside else one if inside else zero) / over
+                flat[j] += (one if inside else zero) / wide
+                near[j] = 0 if beside or inside else 1
+            for j in range(width):
+                if not near[j]:
+                    continue
+                r = math.sqrt(x[j] * x[j] + y[i] * y[i])
+                along, across = abs(nx * x[j] + ny * y[i]), abs(nx * y[i] - ny * x[j])
+                N, D = across * cos_fan - along * sin_fan, along * cos_fan + across * sin_fan
+                half = max(r * half_fan * scale, least)
+                theta = half_fan + N / D if N > 0.0 else math.atan2(across, along)
+                v = r * theta * scale
+                # the profile's integral from one side of the fan to the other: a Hermite cubic in the table
+                for side in range(2):
+                    at = v + half if side == 0 else v - half
+                    sign = (1.0 if at >= 0.0 else -1.0) * (0.5 - side) / half
+                    at = abs(at)
+                    k = int(at * per_step)
+                    if k >= tables.shape[1] - 1:
+                        for c in range(channels):
+                            total[c, j] += sign * (half_total[c] - tail[c] / at)
+                        continue
+                    f = at * per_step - k
+                    g = 1.0 - f
+                    w0, w1 = sign * (1.0 + 2.0 * f) * g * g, sign * (1.0 + 2.0 * g) * f * f
+                    h0, h1 = sign * step * f * g * g, -sign * step * f * f * g
                     for c in range(channels):
-                        high = _cumulative(tables[b], slopes[b], c, v + half, per_step, half_total[c], tail[c])
-                        low = _cumulative(tables[b], slopes[b], c, v - half, per_step, half_total[c], tail[c])
-                        total[c] += (high - low) / (2.0 * half)
+                        total[c, j] += (
+                            w0 * tables[b, k, c]
+                            + w1 * tables[b, k + 1, c]
+                            + h0 * slopes[b, k, c]
+                            + h1 * slopes[b, k + 1, c]
+                        )
+        for j in range(width):
+            r2 = x[j] * x[j] + y[i] * y[i]
+            w = 1.0
+            if r2 < outer * outer:
+                w = _window(math.sqrt(r2), inner, outer)
+                if w <= 0.0:
+                    continue
             # The mean of 1 / r^2 along a spike over the pixel, to second order.
-            share = w / (r * r) * (1.0 + 0.125 * area / (r * r))
+            share = w / r2 * (1.0 + 0.125 * area / r2)
             for c in range(channels):
-                out[i, j, c] = (1.0 - w) * out[i, j, c] + share * (total[c] + far * tail[c])
+                out[i, j, c] = (1.0 - w) * out[i, j, c] + share * (
+                    total[c, j] + far[j] * tail[c] + flat[j] * half_total[c]
+                )

@@ -127,16 +127,36 @@ def transmission(
     ndarray of float64
         Transmitted share, 0 to 1 for a mask within 0 to 1.
     """
-    px, py = np.broadcast_arrays(np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64))
+    px, py = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
     if mask is not None:
+        px, py = np.broadcast_arrays(px, py)
         return _look_up(mask, iris.rotation_deg, px / semi_diameter, py / semi_diameter)
-    worst = np.full(px.shape, -np.inf)
-    for nx, ny, offset, curvature in blade_edges(iris, semi_diameter):
-        qx, qy = px - offset * nx, py - offset * ny
-        worst = np.maximum(worst, nx * qx + ny * qy + 0.5 * curvature * (qx * qx + qy * qy))
+    worst = _border_value(blade_edges(iris, semi_diameter), px, py)
     if footprint <= 0.0:
         return np.where(worst <= 0.0, 1.0, 0.0)
-    return np.clip(0.5 - worst / footprint, 0.0, 1.0)
+    worst *= -1.0 / footprint
+    worst += 0.5
+    return np.clip(worst, 0.0, 1.0, out=worst)
+
+
+def _border_value(edges: Floats, x: Floats, y: Floats) -> Floats:
+    """Largest implicit function of the blades (`blade_edges`) at points that broadcast.
+
+    Blades differ only in their normals, so with |q|^2 written out what depends on the blade is linear in the point:
+    f = (1 - c o) n.p + c / 2 |p|^2 + o (c o / 2 - 1), o the offset and c the curvature.
+    """
+    offset, curvature = float(edges[0, 2]), float(edges[0, 3])
+    bend = 1.0 - curvature * offset
+    worst: Floats = np.empty(np.broadcast_shapes(x.shape, y.shape))
+    worst.fill(-np.inf)
+    term = np.empty_like(worst)
+    for nx, ny in edges[:, :2]:
+        np.add(bend * nx * x, bend * ny * y, out=term)
+        np.maximum(worst, term, out=worst)
+    if curvature != 0.0:
+        worst += np.add(0.5 * curvature * x * x, 0.5 * curvature * y * y, out=term)
+    worst += offset * (0.5 * curvature * offset - 1.0)
+    return worst
 
 
 def _ray_length(cosine: Floats | float, k: float) -> Floats:

@@ -14,7 +14,7 @@ from ..optics.bundle import Bundle, find_region, trace_bundle, trace_grid
 from ..optics.paths import direct_path
 from .prepare import Settled
 from .shot import Shot
-from .starburst import starburst_layer
+from .starburst import NEAR_SPLIT, starburst_layer
 
 Floats = NDArray[np.float64]
 
@@ -128,6 +128,7 @@ def starburst_of(settled: Settled, shots: Sequence[Shot], images: Sequence[Direc
             fine_nm,
             shot.weights(fine_nm) * flux[:, None],
             mask=mask,
+            split=NEAR_SPLIT if settled.project.quality.mode == "final" else 1,
         )
     return Layer("starburst", total, (0, 0, width, height))
 

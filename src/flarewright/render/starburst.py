@@ -36,6 +36,7 @@ def starburst_layer(
     weights_rgb: ArrayLike,
     *,
     mask: NDArray[np.floating] | None = None,
+    split: int = NEAR_SPLIT,
 ) -> NDArray[np.float32]:
     """Irradiance of the diffracted direct image of a light.
 
@@ -58,6 +59,10 @@ def starburst_layer(
         intensity); negatives are kept.
     mask : ndarray, shape (rows, columns), or None
         Image of the iris, as in `optics.iris.transmission`.
+    split : int
+        Parts a side into which pixels near the centre are divided where the wings begin there. 1 is for drafts: it
+        costs half the time, keeps the flux to 2e-5, and errs by 4e-6 of the peak, which is up to 0.4 of the value of
+        some pixels within eight of the centre.
 
     Returns
     -------
@@ -94,11 +99,11 @@ def starburst_layer(
     painter.paint(x_edges, y_edges, pixel_mm, picture)
 
     # Where the blend begins inside the near zone, pixels there are too coarse for it.
-    if painter.inner < NEAR_PIXELS * max(pixel_mm):
+    if split > 1 and painter.inner < NEAR_PIXELS * max(pixel_mm):
         left, right = _near(cx, width)
         top, bottom = _near(cy, height)
         if left < right and top < bottom:
-            k = NEAR_SPLIT
+            k = split
             fine = np.zeros(((bottom - top) * k, (right - left) * k, 3))
             x_fine = (left + np.arange((right - left) * k + 1) / k - cx) * pixel_mm[0]
             y_fine = (cy - top - np.arange((bottom - top) * k + 1) / k) * pixel_mm[1]
