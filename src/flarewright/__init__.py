@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from .io.exr import write_exr as write_exr
     from .io.project_file import read_project as read_project
     from .model import D65 as D65
+    from .model import Art as Art
     from .model import AsLens as AsLens
     from .model import Bare as Bare
     from .model import BlackBody as BlackBody
@@ -43,6 +44,7 @@ if TYPE_CHECKING:
     from .model import Project as Project
     from .model import Quality as Quality
     from .model import QuarterWave as QuarterWave
+    from .model import Rule as Rule
     from .model import Stack as Stack
     from .model import Standard as Standard
     from .model import Stop as Stop
@@ -57,9 +59,9 @@ if TYPE_CHECKING:
 _HOMES = {
     ".errors": ("FlarewrightError", "GlassError", "LensError", "OutputError", "ProjectError"),
     ".model": (
-        "D65", "AsLens", "Bare", "BlackBody", "Camera", "EqualEnergy", "Everywhere", "Film", "Iris", "Layer", "Lens",
-        "Light", "Lines", "Medium", "Output", "PerRow", "Preset", "Project", "Quality", "QuarterWave", "Stack",
-        "Standard", "Stop", "Surface", "Tabulated",
+        "D65", "Art", "AsLens", "Bare", "BlackBody", "Camera", "EqualEnergy", "Everywhere", "Film", "Iris", "Layer",
+        "Lens", "Light", "Lines", "Medium", "Output", "PerRow", "Preset", "Project", "Quality", "QuarterWave", "Rule",
+        "Stack", "Standard", "Stop", "Surface", "Tabulated",
     ),
     ".io.exr": ("write_exr",),
     ".io.project_file": ("read_project",),

@@ -157,6 +157,25 @@ def test_flags_win_over_the_project_file_and_the_rest_of_it_stays(capsys, projec
     assert other.f_number == 5.6
 
 
+def test_art_flags_come_after_the_project_s_rules(capsys, projects, folder):
+    (folder / "p.toml").write_text(
+        'lens = "heliar-tronnier"\n[[lights]]\nfield_deg = [1, 2]\n[camera]\nsize_px = [8, 6]\n'
+        '[art.gain]\nstarburst = 0.5\n[[art.rules]]\nselect = "row:7"\ntint = [1, 0, 0]\n'
+    )
+    call(
+        capsys, "render", "--project", "p.toml", "-o", "a.exr", "--solo", "4-1", "--solo", "bounded:entrance", "--mute",
+        "largest:2", "--gain", "ghosts=2", "--gain", "not 4-1=0.5",
+    )  # fmt: skip
+    call(capsys, "render", "--project", "p.toml", "-o", "a.exr", "--physical")
+    graded, physical = projects
+    assert graded.art.gain == {"starburst": 0.5, "ghosts": 2.0}
+    assert [(rule.select, rule.enable, rule.gain) for rule in graded.art.rules] == [
+        ("row:7", None, 1.0), ("all", False, 1.0), ("4-1", True, 1.0), ("bounded:entrance", True, 1.0),
+        ("largest:2", False, 1.0), ("not 4-1", None, 0.5)]  # fmt: skip
+    assert physical.art.physical
+    assert physical.art.rules == read_project("p.toml").art.rules
+
+
 def test_turning_the_blades_keeps_the_lens_own_number(capsys, projects):
     call(capsys, "render", "heliar-tronnier", "--light", "1,1", "--size", "8x6", "--rotation", "10", "-o", "a.exr")
     call(

@@ -12,6 +12,7 @@ from flarewright.io.project_file import parse_coating_choice, project_json_schem
 from flarewright.io.spectrum_text import parse_spectrum, spectrum_text
 from flarewright.model import (
     D65,
+    Art,
     AsLens,
     Bare,
     BlackBody,
@@ -30,7 +31,9 @@ from flarewright.model import (
     Project,
     Quality,
     QuarterWave,
+    Rule,
     Stack,
+    Standard,
     Stop,
     Surface,
     Tabulated,
@@ -69,6 +72,20 @@ PROJECTS = [
         coating=Everywhere(coating=Stack(layers=(Film(index=1.38, thickness_nm=96.4),))),
         lights=(Light(field_deg=(0, 0)),),
     ),
+    Project(
+        lens="x",
+        coating=PerRow(coatings=(Standard(name="modern-broadband"), None)),
+        lights=(Light(field_deg=(0, 0)),),
+        art=Art(
+            gain={"ghosts": 2.5},
+            rules=(
+                Rule(select="not row:7", enable=False),
+                Rule(select="7-3,8-2", gain=0.5, tint=(1, 0.5, 0), offset_px=(1, -2.5), scale=1.5, blur_mm=0.25),
+                Rule(select="all", ramp=((0, 1, 1, 1), (1, 1, 0.5, 0)), offset_mm=(0, 1), blur_px=2, enable=True),
+            ),
+        ),
+    ),
+    Project(lens="x", lights=(Light(field_deg=(0, 0)),), art=Art(physical=True)),
 ]
 
 

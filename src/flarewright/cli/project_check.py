@@ -17,10 +17,12 @@ def check(
     """Check a project and its lens, and tell every mistake at once; exit code 2 when it cannot be rendered."""
     from ..io.project_file import read_project
     from ..optics.pack import resolve_coatings
+    from ..render.art import resolve_art
     from ..render.prepare import settle
 
     settled = settle(read_project(file))
     resolve_coatings(settled.lens, settled.project.coating)
+    resolve_art(settled)
     if as_json:
         print_json(
             {

@@ -22,7 +22,7 @@ EPILOG = (
     "flarewright render --project shot.toml --quality draft -o test.exr"
 )
 
-_LIGHT, _LENS, _CAMERA, _WORK, _OUT = "Light", "Lens", "Camera", "Quality", "Output"
+_LIGHT, _LENS, _CAMERA, _WORK, _ART, _OUT = "Light", "Lens", "Camera", "Quality", "Art direction", "Output"
 
 
 def render(
@@ -96,6 +96,27 @@ def render(
     paths: Annotated[
         str | None, typer.Option(help="Ghost paths: all, or same-side of the stop.", rich_help_panel=_WORK)
     ] = None,
+    mute: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="GHOSTS",
+            help="Leave ghosts out: 7-3, row:7, brightest:5, largest:10, bounded:stop, 'not 7-3'; may be repeated.",
+            rich_help_panel=_ART,
+        ),
+    ] = None,
+    solo: Annotated[
+        list[str] | None,
+        typer.Option(metavar="GHOSTS", help="Draw these ghosts only; may be repeated.", rich_help_panel=_ART),
+    ] = None,
+    gain: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME=FACTOR", help="Multiply a pass (ghosts, starburst) or ghosts (7-3).", rich_help_panel=_ART
+        ),
+    ] = None,
+    physical: Annotated[
+        bool, typer.Option("--physical", help="Ignore all that is changed by hand.", rich_help_panel=_ART)
+    ] = False,
     threads: Annotated[
         int | None, typer.Option(min=1, help="All cores when left out; pixels do not change.", rich_help_panel=_WORK)
     ] = None,
@@ -144,7 +165,7 @@ def render(
         fstop=fstop, blades=blades, rotation=rotation, rounding=rounding, iris_image=iris_image, coating=coating,
         focus=focus, size=size, sensor=sensor, sensor_distance=sensor_distance, quality=quality,
         wavelengths=wavelengths, paths=paths, layers=layers, brightest=brightest, no_starburst=no_starburst,
-        colorspace=colorspace, half=half,
+        colorspace=colorspace, half=half, mute=mute or [], solo=solo or [], gain=gain or [], physical=physical,
     )  # fmt: skip
     settings = build_project(flags)
     _keep_inputs(settings, project, [output] if no_png else [output, output.with_suffix(".png")])

@@ -12,7 +12,8 @@ from pydantic import ValidationError
 from ..errors import ProjectError
 from ..io.project_file import ProjectFileError, explain, parse_coating_choice, read_project
 from ..io.spectrum_text import parse_spectrum
-from ..model import Iris, Light, Project
+from ..model import Art, Iris, Light, Project, Rule
+from ..model.art import PASSES
 from .common import field_angles, pair
 
 # Where a finding about a project belongs when flags made the project.
@@ -62,6 +63,10 @@ class Flags:
     no_starburst: bool
     colorspace: str | None
     half: bool | None
+    mute: list[str]
+    solo: list[str]
+    gain: list[str]
+    physical: bool
 
 
 def build_project(flags: Flags) -> Project:
@@ -99,6 +104,8 @@ def build_project(flags: Flags) -> Project:
         given = {key: value for key, value in changes.items() if value is not None}
         if given:
             fields[section] = {**(dict(getattr(base, section)) if base else {}), **given}
+    if (art := _art(flags, base.art if base else Art())) is not None:
+        fields["art"] = art
     try:
         return Project.model_validate(fields)
     except ValidationError as error:
@@ -175,6 +182,45 @@ def _iris(flags: Flags, lens: Any, base: Project | None) -> dict[str, Any] | Non
     else:
         iris = lens.iris if lens is not None else Iris()
     return {**dict(iris), **given}
+
+
+def _art(flags: Flags, base: Art) -> dict[str, Any] | None:
+    """Return the art direction with the flags' rules after the project's, or None when no flag changes it."""
+    if not (flags.mute or flags.solo or flags.gain or flags.physical):
+        return None
+    rules = list(base.rules)
+    if flags.solo:
+        rules += [Rule(select="all", enable=False), *(_rule("--solo", text, enable=True) for text in flags.solo)]
+    rules += [_rule("--mute", text, enable=False) for text in flags.mute]
+    passes = dict(base.gain)
+    for text in flags.gain:
+        name, _, number = (part.strip() for part in text.rpartition("="))
+        try:
+            factor = float(number)
+        except ValueError:
+            name = ""
+        if not name:
+            raise ProjectError(
+                f"--gain {text!r} is no name and factor; write --gain ghosts=2 for a pass, --gain 7-3=0.5 for ghosts"
+            )
+        if not 0.0 <= factor <= 1e9:
+            raise ProjectError(f"--gain {text!r} is no factor of light; give a number between 0 and 1e9")
+        if name in PASSES:
+            passes[name] = factor
+        elif re.fullmatch("[a-z]+", name) and name not in ("all", "not"):
+            raise ProjectError(
+                f"--gain: there is no pass {name!r}; known are {', '.join(PASSES)}; ghosts are named like 7-3 or row:7"
+            )
+        else:
+            rules.append(_rule("--gain", name, gain=factor))
+    return {"physical": flags.physical or base.physical, "gain": passes, "rules": rules}
+
+
+def _rule(flag: str, select: str, **changes: Any) -> Rule:
+    try:
+        return Rule.model_validate({"select": select, **changes})
+    except ValidationError as error:
+        raise ProjectError(f"{flag}: {explain(error, {'select': select})[0].removeprefix('select: ')}") from None
 
 
 def _in_flags(sentence: str) -> str:

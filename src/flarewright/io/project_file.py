@@ -22,6 +22,7 @@ from typing import Any, cast
 from pydantic import BaseModel, ValidationError
 
 from ..errors import FlarewrightError, LensError, ProjectError
+from ..model import art as arts
 from ..model import coating as coatings
 from ..model import light as lights
 from ..model import project as choices
@@ -308,6 +309,8 @@ _SECTIONS: dict[str, tuple[type[BaseModel], ...]] = {
     "coating": (
         choices.Preset, choices.Everywhere, choices.PerRow, coatings.QuarterWave, coatings.Film, coatings.Standard,
     ),
+    "art": (arts.Art,),
+    "rules": (arts.Rule,),
     "lens": (Lens,),
     "rows": (Surface,),
 }  # fmt: skip
@@ -319,7 +322,8 @@ def _suggestion(keys: list[int | str]) -> str:
     known = [name for model in _SECTIONS.get(section, ()) for name in model.model_fields]
     for other, models in _SECTIONS.items():
         if other and any(wrong in model.model_fields for model in models):
-            return f" here; it belongs into [{other}]" if other != "lights" else " here; it belongs into [[lights]]"
+            heading = {"lights": "[[lights]]", "rules": "[[art.rules]]"}.get(other, f"[{other}]")
+            return f" here; it belongs into {heading}"
     if near := did_you_mean(wrong, known):
         return near
     return f"; known are {', '.join(dict.fromkeys(known))}" if known else ""

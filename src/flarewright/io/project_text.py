@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from ..errors import ProjectError
+from ..model import Art
 from ..model import project as choices
 from ..model.project import CoatingChoice, Project
 from .coating_text import UNCOATED, format_coating
@@ -38,6 +39,15 @@ ABOUT = {
     "output.pixel_type": '"half" or "float"',
 }
 
+_TEACH_ART = """
+# Changes by hand, on top of the physics; docs/art-direction.md. art.physical = true ignores them.
+# [art.gain]
+# ghosts = 2.0
+# [[art.rules]]
+# select = "7-3"   # or "all", "row:7", "brightest:5", "largest:10", "bounded:stop", "not 7-3"
+# gain = 0.5   # also: enable, tint, ramp, offset_px, offset_mm, scale, blur_px, blur_mm
+"""
+
 
 def project_text(project: Project, *, folder: Path | None = None, comments: bool = False) -> str:
     """Return a project as TOML that `read_project` reads back to the same project.
@@ -58,12 +68,19 @@ def project_text(project: Project, *, folder: Path | None = None, comments: bool
     if folder is not None:
         _make_relative(data, folder)
     data["coating"] = _short_coating(project.coating)
+    if project.art == Art():
+        del data["art"]
+    else:
+        # what a rule leaves alone is not worth a line
+        rules = [rule.model_dump(mode="json", exclude_defaults=True) for rule in project.art.rules]
+        data["art"] = {**data["art"], "rules": rules}
     for written, light in zip(data["lights"], project.lights, strict=True):
         written["spectrum"] = spectrum_text(light.spectrum) or written["spectrum"]
     nothing = _left_out(project) if comments else {}
     out: list[str] = []
     _emit_table(out, data, (), nothing, ABOUT if comments else {})
-    return "\n".join(out).strip() + "\n"
+    teach = _TEACH_ART if comments and project.art == Art() else ""
+    return "\n".join(out).strip() + "\n" + teach
 
 
 def _make_relative(data: dict[str, Any], folder: Path) -> None:

@@ -1,5 +1,6 @@
 """Frozen data without algorithms: lens, glass, coating, iris, light, camera, project."""
 
+from .art import Art, Rule
 from .camera import Camera
 from .coating import Bare, Coating, Film, QuarterWave, Stack, Standard
 from .glass import Dispersion, Medium
@@ -11,6 +12,7 @@ from .project import AsLens, CoatingChoice, Everywhere, Output, PerRow, Preset, 
 
 __all__ = [
     "D65",
+    "Art",
     "AsLens",
     "Bare",
     "BlackBody",
@@ -34,6 +36,7 @@ __all__ = [
     "Quality",
     "QuarterWave",
     "Row",
+    "Rule",
     "Spectrum",
     "Stack",
     "Standard",

@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
+from .art import Art
 from .base import Frozen
 from .camera import Camera, Colorspace
 from .coating import Coating
@@ -104,6 +105,8 @@ class Project(Frozen):
         None: wide open.
     iris : Iris or None
         None: the lens file's.
+    art : Art
+        What is changed by hand; nothing by default.
     """
 
     schema_version: Literal[1] = 1
@@ -115,6 +118,7 @@ class Project(Frozen):
     camera: Camera = Camera()
     quality: Quality = Quality()
     output: Output = Output()
+    art: Art = Art()
 
     @model_validator(mode="after")
     def _picture_is_sane(self) -> Project:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from math import ceil, sqrt
@@ -16,7 +17,7 @@ from ..model import AsLens, CoatingChoice, Iris, Lens
 from .bundle import Bundle, Incidence, find_region, incidence, trace_bundle, trace_grid, trace_points
 from .iris import blade_edges
 from .pack import PackedLens, pack_lens, resolve_coatings
-from .paraxial import D_LINE_NM, first_order, path_matrices
+from .paraxial import D_LINE_NM, FirstOrder, first_order, path_matrices
 from .paths import LightPath, direct_path, ghost_paths
 
 Floats = NDArray[np.float64]
@@ -248,6 +249,25 @@ def _peak(
         to_pixels, light.cosine, np.array([1.0, 0.0, 0.0]), plane, np.empty(side + 1, dtype=np.float32),
     )  # fmt: skip
     return float(plane[0].max()) / patch**2, patch
+
+
+def bounding_edges(lens: Lens, order: FirstOrder, paths: Sequence[LightPath]) -> list[str]:
+    """Tell for paths which edge bounds their ghosts, as `ghost_table` does, without tracing.
+
+    Parameters
+    ----------
+    lens : Lens
+        Complete.
+    order : FirstOrder
+        At the opening and focus to be used.
+    paths : sequence of LightPath
+
+    Returns
+    -------
+    list of {"stop", "entrance"}
+    """
+    packed = pack_lens(lens, order, (None,) * len(lens.rows), np.array([D_LINE_NM]))
+    return [_paraxial_facts(lens, packed, path)[0] for path in paths]
 
 
 def _paraxial_facts(lens: Lens, packed: PackedLens, path: LightPath) -> tuple[str, float | None]:

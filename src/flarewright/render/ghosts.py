@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
@@ -15,9 +15,10 @@ from ..kernels.raster import sum_rows
 from ..model import Layer, Quality
 from ..optics.color import luminance_weights
 from ..optics.paths import LightPath
+from .art import PLAIN, PathArt
 from .canvas import DETAILS, Plane, blank, merge, to_layer
-from .ghosts_draft import draw_draft
-from .ghosts_final import FinalPass, contrast, draw_final, find_final
+from .ghosts_draft import draft_alone, draw_draft, draw_draft_by_hand
+from .ghosts_final import FinalPass, contrast, draw_alone, draw_final, find_final
 from .shot import Shot
 
 Progress = Callable[[float, str], None]
@@ -45,6 +46,8 @@ class GhostPass:
         Paths left out on purpose.
     culled_share : float
         Their part of the flux, by the pre-pass.
+    muted : int
+        Paths left out by hand.
     """
 
     total: Layer
@@ -53,6 +56,7 @@ class GhostPass:
     dark: int | None
     culled: int
     culled_share: float
+    muted: int
 
 
 class _Meter:
@@ -76,6 +80,7 @@ def render_ghosts(
     quality: Quality,
     *,
     singles: int | None = 0,
+    art: Mapping[str, PathArt] | None = None,
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> GhostPass:
@@ -88,6 +93,8 @@ def render_ghosts(
     quality : Quality
     singles : int or None
         How many of the brightest paths also get a layer of their own; None: all.
+    art : mapping of str to PathArt, optional
+        What is changed by hand, by path name.
     threads : int, optional
         None: all cores. The pixels do not depend on it.
     progress : callable, optional
@@ -97,12 +104,17 @@ def render_ghosts(
     -------
     GhostPass
     """
+    art = art or {}
+    muted = {name for name, changed in art.items() if not changed.enabled}
+    paths, given = [path for path in paths if path.name not in muted], paths
     meter = _Meter(len(paths) * (2 if quality.mode == "final" else 1), progress)
     with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
         try:
             if quality.mode == "draft":
-                return _draft(shots, paths, singles, pool, meter)
-            return _final(shots, paths, quality, singles, pool, meter)
+                done = _draft(shots, paths, singles, art, pool, meter)
+            else:
+                done = _final(shots, paths, quality, singles, art, pool, meter)
+            return replace(done, muted=len(given) - len(paths))
         except BaseException:
             # Ctrl-C arrives here: let the workers end at their next wavelength
             meter.cancelled.set()
@@ -115,19 +127,21 @@ def _final(
     paths: Sequence[LightPath],
     quality: Quality,
     singles: int | None,
+    art: Mapping[str, PathArt],
     pool: ThreadPoolExecutor,
     meter: _Meter,
 ) -> GhostPass:
     def find(path: LightPath) -> list[FinalPass]:
         if meter.cancelled.is_set():
             return []
-        found = [item for item in (find_final(shot, path) for shot in shots) if item is not None]
+        changed = art.get(path.name, PLAIN)
+        found = [item for item in (find_final(shot, path, changed) for shot in shots) if item is not None]
         meter.step("looking for ghosts")
         return found
 
     found = [items for items in pool.map(find, paths) if items]
     # what lands beside the picture is neither bright nor worth keeping
-    flux = np.array([sum(item.region.seen_flux * item.shot.light.intensity for item in items) for items in found])
+    flux = np.array([sum(item.region.seen_flux * item.gain for item in items) for items in found])
     level = _level(found)
     keep = _worth_drawing(flux, quality.cull)
     order = [int(k) for k in np.argsort(-flux, kind="stable") if keep[k]]
@@ -140,7 +154,9 @@ def _final(
             if meter.cancelled.is_set():
                 break
             for item in found[k]:
-                if item.region.seen_flux > 0.0:
+                if item.region.seen_flux > 0.0 and item.art.alone:
+                    draw_alone(item, quality, canvas, meter.cancelled)
+                elif item.region.seen_flux > 0.0:
                     # a layer of its own may be graded up, so it is drawn in full
                     visibility = float("inf") if k in alone else contrast(item, level)
                     draw_final(item, quality, canvas, visibility, meter.cancelled)
@@ -148,35 +164,44 @@ def _final(
         return canvas.planes
 
     named = [found[k][0].path for k in order]
-    total, layers = _collect(shots, order, named, singles, draw, pool)
+    total, layers = _collect(shots, order, named, singles, art, draw, pool)
     share = float(flux[~keep].sum() / flux.sum()) if flux.sum() > 0.0 else 0.0
-    return GhostPass(total, layers, len(order), len(paths) - len(found), int((~keep).sum()), share)
+    return GhostPass(total, layers, len(order), len(paths) - len(found), int((~keep).sum()), share, 0)
 
 
 def _draft(
     shots: Sequence[Shot],
     paths: Sequence[LightPath],
     singles: int | None,
+    art: Mapping[str, PathArt],
     pool: ThreadPoolExecutor,
     meter: _Meter,
 ) -> GhostPass:
     def draw(group: list[int]) -> list[Plane | None]:
         width, height = shots[0].size_px
         picture = np.zeros((3, height, width))
+        by_hand = [(paths[k], art[paths[k].name]) for k in group if paths[k].name in art]
         for shot in shots:
-            draw_draft(shot, [paths[k] for k in group], picture)
+            draw_draft(shot, [paths[k] for k in group if paths[k].name not in art], picture)
+            for path, changed in by_hand:
+                if not changed.alone:
+                    draw_draft_by_hand(shot, path, changed, picture)
         sum_rows(picture)
+        for shot in shots:
+            for path, changed in by_hand:
+                if changed.alone:
+                    picture += draft_alone(shot, path, changed)
         for k in group:
             meter.step(f"ghost {paths[k].name}")
         return [picture]
 
-    order = list(range(len(paths))) if singles == 0 else _rank_draft(shots, paths)
+    order = list(range(len(paths))) if singles == 0 else _rank_draft(shots, paths, art)
     named = [paths[k] for k in order]
-    total, layers = _collect(shots, order, named, singles, draw, pool)
-    return GhostPass(total, layers, len(paths), None, 0, 0.0)
+    total, layers = _collect(shots, order, named, singles, art, draw, pool)
+    return GhostPass(total, layers, len(paths), None, 0, 0.0, 0)
 
 
-def _rank_draft(shots: Sequence[Shot], paths: Sequence[LightPath]) -> list[int]:
+def _rank_draft(shots: Sequence[Shot], paths: Sequence[LightPath], art: Mapping[str, PathArt]) -> list[int]:
     """Order paths by their flux in the picture, seen at a sixteenth of the resolution."""
     small = [
         replace(shot, to_pixels=shot.to_pixels / 16.0, size_px=(-(-shot.size_px[0] // 16), -(-shot.size_px[1] // 16)))
@@ -186,7 +211,8 @@ def _rank_draft(shots: Sequence[Shot], paths: Sequence[LightPath]) -> list[int]:
     for k, path in enumerate(paths):
         for shot in small:
             picture = np.zeros((3, shot.size_px[1], shot.size_px[0]))
-            draw_draft(shot, [path], picture)
+            # a ramp and a blur hardly change the order
+            draw_draft_by_hand(shot, path, art.get(path.name, PLAIN), picture)
             sum_rows(picture)
             flux[k] += luminance_weights(shot.colorspace) @ picture.sum(axis=(1, 2))
     return [int(k) for k in np.argsort(-flux, kind="stable")]
@@ -197,7 +223,7 @@ def _level(found: list[list[FinalPass]]) -> float:
     items = [item for group in found for item in group]
     if not items:
         return 0.0
-    seen = sum(item.region.seen_flux * item.shot.light.intensity for item in items)
+    seen = sum(item.region.seen_flux * item.gain for item in items)
     return float(seen / (np.pi * items[0].shot.view_radius ** 2))
 
 
@@ -215,6 +241,7 @@ def _collect(
     items: list[int],
     named: Sequence[LightPath],
     singles: int | None,
+    art: Mapping[str, PathArt],
     draw: Callable[[list[int]], list[Plane | None]],
     pool: ThreadPoolExecutor,
 ) -> tuple[Layer, tuple[Layer, ...]]:
@@ -235,6 +262,8 @@ def _collect(
             "path": path.name,
             "flux_mm2": float(luminance @ plane.sum(axis=(1, 2), dtype=np.float64)),
         }
+        if path.name in art:
+            about["art"] = art[path.name].text()
         layers.append(to_layer(f"ghost.{path.name}", plane, pixel_area, about))
         # the layer has its own copy by now
         totals = _added(totals, planes)

@@ -7,19 +7,22 @@ colour runs smoothly instead of in steps.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
+from math import sqrt
 from threading import Event
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernels.bundle import draw_bundle, node_densities
+from ..kernels.bundle import draw_bundle, measure_bundle, node_densities
 from ..kernels.trace import ALIVE, REL, X, Y
 from ..model import Quality
 from ..optics.bundle import Region, find_region, trace_bundle, trace_grid
 from ..optics.paths import LightPath
-from .canvas import Canvas
+from .art import PLAIN, Frame, PathArt
+from .canvas import Canvas, blank, merge
+from .grade import finish
 from .shot import Shot
 
 Floats = NDArray[np.float64]
@@ -45,27 +48,70 @@ class FinalPass:
     path : LightPath
     region : Region
         Accepted pupil and rough estimates, per unit irradiance.
+    to_pixels : ndarray, shape (4,)
+        The shot's, moved and scaled by `art`.
+    view_radius : float
+        What lands farther from the axis does not come into the picture, mm.
+    art : PathArt
+    frame : Frame or None
+        The ghost's own centre and size, where `art` asks for them.
     """
 
     shot: Shot
     path: LightPath
     region: Region
+    to_pixels: Floats
+    view_radius: float
+    art: PathArt
+    frame: Frame | None
+
+    @property
+    def gain(self) -> float:
+        """What makes the path brighter than its region says: the light, and a person's wish."""
+        return self.shot.light.intensity * self.art.visible_gain
 
 
-def find_final(shot: Shot, path: LightPath) -> FinalPass | None:
+def find_final(shot: Shot, path: LightPath, art: PathArt = PLAIN) -> FinalPass | None:
     """Look where a path accepts light; None when it passes nothing.
 
     Parameters
     ----------
     shot : Shot
     path : LightPath
+    art : PathArt
+        What is changed about it by hand.
 
     Returns
     -------
     FinalPass or None
     """
-    region = find_region(shot.packed, path, shot.incidence.tilt, shot.opening.radius, shot.view_radius)
-    return None if region is None else FinalPass(shot, path, region)
+    lens, tilt, iris_radius = shot.packed, shot.incidence.tilt, shot.opening.radius
+    frame = None
+    if art.framed:
+        whole = find_region(lens, path, tilt, iris_radius)
+        if whole is None:
+            return None
+        frame = _frame(shot, path, whole)
+    view_radius = art.view_radius(shot.view_radius, frame)
+    region = find_region(lens, path, tilt, iris_radius, view_radius)
+    if region is None:
+        return None
+    return FinalPass(shot, path, region, art.place(shot.to_pixels, frame), view_radius, art, frame)
+
+
+def _frame(shot: Shot, path: LightPath, region: Region) -> Frame:
+    """Measure a ghost's centre and size at the middle wavelength, on the unbounded sensor plane."""
+    opening, tilt = shot.opening, shot.incidence.tilt
+    # only the rim matters for its place
+    bundle = trace_grid(shot.packed, path, tilt, (opening.radius, opening.inner), region, tolerance=0.25, scale=1e-6)
+    data = trace_bundle(shot.packed, len(shot.packed.wavelengths_nm) // 2, bundle, tilt)
+    sums = measure_bundle(
+        data, bundle.pupil, bundle.triangles, path.stop_crossings, opening.blades, shot.incidence.axes
+    )
+    if sums[0] <= 0.0:
+        return Frame((0.0, 0.0), 0.0)
+    x, y = float(sums[1] / sums[0]), float(sums[2] / sums[0])
+    return Frame((x, y), sqrt(max(2.0 * (sums[3] / sums[0] - x * x - y * y), 0.0)))
 
 
 def contrast(item: FinalPass, level: float) -> float:
@@ -81,7 +127,7 @@ def contrast(item: FinalPass, level: float) -> float:
     -------
     float
     """
-    return item.region.brightness * item.shot.light.intensity / level if level > 0.0 else float("inf")
+    return item.region.brightness * item.gain / item.art.scale**2 / level if level > 0.0 else float("inf")
 
 
 def draw_final(
@@ -103,18 +149,18 @@ def draw_final(
     detail = sum(visibility < limit for limit in DETAIL_CONTRAST)
     shot, path = item.shot, item.path
     tilt, opening = shot.incidence.tilt, shot.opening
-    to_pixels = shot.to_pixels / 2.0**detail
+    to_pixels = item.to_pixels / 2.0**detail
     scale = float(max(to_pixels[2], to_pixels[3]))
     bundle = trace_grid(
         shot.packed, path, tilt, (opening.radius, opening.inner), item.region,
-        tolerance=quality.tolerance_px, scale=scale, view_radius=shot.view_radius,
+        tolerance=quality.tolerance_px, scale=scale, view_radius=item.view_radius,
     )  # fmt: skip
     count = len(shot.packed.wavelengths_nm)
     traced = [trace_bundle(shot.packed, w, bundle, tilt) for w in range(count)]
-    pieces = _bridges(traced, shot, scale, visibility) if quality.bridge else [1] * (count - 1)
+    pieces = _bridges(traced, item.view_radius, scale, visibility) if quality.bridge else [1] * (count - 1)
     steps = [(w, k / n) for w, n in enumerate(pieces) for k in range(n)] + [(count - 1, 0.0)]
     fine_nm = np.interp([w + part for w, part in steps], np.arange(count), shot.packed.wavelengths_nm)
-    for (w, part), rgb in zip(steps, shot.weights(fine_nm), strict=True):
+    for (w, part), rgb in zip(steps, shot.weights(fine_nm) * item.art.rgb, strict=True):
         if stop is not None and stop.is_set():
             return
         if rgb.any():
@@ -126,13 +172,33 @@ def draw_final(
             )  # fmt: skip
 
 
-def _bridges(traced: list[Floats], shot: Shot, scale: float, visibility: float) -> list[int]:
+def draw_alone(item: FinalPass, quality: Quality, canvas: Canvas, stop: Event | None = None) -> None:
+    """Draw one path of one light on a plane of its own, ramp and blur it, and add it to a canvas.
+
+    Parameters
+    ----------
+    item : FinalPass
+    quality : Quality
+    canvas : Canvas
+        Added to, at full resolution.
+    stop : Event, optional
+        Set to leave off between two wavelengths.
+    """
+    own, art = item.shot.to_pixels, item.art
+    (width, height), (mx, my) = canvas.size_px, art.margin(own)
+    sheet = blank((width + 2 * mx, height + 2 * my))
+    draw_final(replace(item, to_pixels=item.to_pixels + np.array([mx, my, 0.0, 0.0])), quality, sheet, stop=stop)
+    plane, _ = canvas.scratch()
+    plane += finish(merge(sheet.planes, sheet.size_px), art, item.frame, item.to_pixels, own)
+
+
+def _bridges(traced: list[Floats], view_radius: float, scale: float, visibility: float) -> list[int]:
     """Into how many pieces to divide each gap between traced wavelengths so that no step is seen."""
     most = min(MOST_BRIDGES, max(1, int(visibility / STEP_CONTRAST))) if visibility < float("inf") else MOST_BRIDGES
     pieces = []
     for short, long in pairwise(traced):
         passing = (short[:, ALIVE] * long[:, ALIVE] > 0.0) & (np.minimum(short[:, REL], long[:, REL]) <= 1.0)
-        seen = passing & (np.hypot(short[:, X], short[:, Y]) <= shot.view_radius)
+        seen = passing & (np.hypot(short[:, X], short[:, Y]) <= view_radius)
         shift = np.hypot(long[seen, X] - short[seen, X], long[seen, Y] - short[seen, Y]) * scale
         # the few nodes that fly farthest carry hardly any light
         wide = float(np.quantile(shift, SHIFT_QUANTILE)) if shift.size else 0.0

@@ -11,6 +11,7 @@ from ..io.mask_image import read_mask
 from ..model import Layer, Project
 from ..optics.bundle import incidence
 from ..optics.paths import ghost_paths
+from .art import ResolvedArt, graded, resolve_art
 from .compose import beauty
 from .direct import DirectImage, direct_image, starburst_of
 from .ghosts import GhostPass, render_ghosts
@@ -65,21 +66,26 @@ def render(project: Project, *, threads: int | None = None, progress: Progress |
     """
     settled = settle(project)
     mask = None if settled.iris.mask is None else read_mask(settled.iris.mask)
+    art = resolve_art(settled)
     opening = make_opening(settled, mask)
     shots = make_shots(settled, opening)
     paths = ghost_paths(settled.lens, project.quality.paths)
     singles = project.output.brightest if project.output.layers == "ghosts" else 0
-    ghosts = render_ghosts(shots, paths, project.quality, singles=singles, threads=threads, progress=progress)
+    ghosts = render_ghosts(
+        shots, paths, project.quality, singles=singles, art=art.paths, threads=threads, progress=progress
+    )
     images = [direct_image(settled.lens, shot) for shot in shots]
     passes = [ghosts.total]
     if project.output.starburst:
         passes.insert(0, starburst_of(settled, shots, images, mask))
+    passes = [graded(layer, art.gain.get(layer.name, 1.0)) for layer in passes]
+    alone = [graded(layer, art.gain.get("ghosts", 1.0)) for layer in ghosts.singles]
     whole = beauty(passes, project.camera.size_px)
-    layers = (whole,) if project.output.layers == "beauty" else (whole, *passes, *ghosts.singles)
+    layers = (whole,) if project.output.layers == "beauty" else (whole, *passes, *alone)
     return Rendering(
         project,
         layers,
-        _summary(settled, shots, images, ghosts),
+        _summary(settled, shots, images, ghosts, art),
         (*settled.remarks, *_remarks(settled, shots[0], ghosts)),
     )
 
@@ -114,7 +120,9 @@ def _scene_scale(settled: Settled, shot: Shot) -> float:
     return float(pi * on_axis.transmittance * opened * slope**2)
 
 
-def _summary(settled: Settled, shots: tuple[Shot, ...], images: list[DirectImage], ghosts: GhostPass) -> dict[str, Any]:
+def _summary(
+    settled: Settled, shots: tuple[Shot, ...], images: list[DirectImage], ghosts: GhostPass, art: ResolvedArt
+) -> dict[str, Any]:
     order, project = settled.order, settled.project
     return {
         "lens": settled.lens.name,
@@ -126,6 +134,7 @@ def _summary(settled: Settled, shots: tuple[Shot, ...], images: list[DirectImage
         "size_px": list(project.camera.size_px),
         "sensor_mm": list(project.camera.sensor),
         "quality": project.quality.mode,
+        "physical": art.physical,
         "wavelengths_nm": [float(w) for w in shots[0].packed.wavelengths_nm],
         "scene_irradiance_per_radiance": _scene_scale(settled, shots[0]),
         "lights": [
@@ -143,6 +152,7 @@ def _summary(settled: Settled, shots: tuple[Shot, ...], images: list[DirectImage
             "dark": ghosts.dark,
             "culled": ghosts.culled,
             "culled_share": ghosts.culled_share,
+            "muted": ghosts.muted,
         },
     }
 

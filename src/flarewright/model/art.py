@@ -1,0 +1,112 @@
+"""Art direction: what a person changes about ghosts, on top of the physics and one switch away from it."""
+
+from __future__ import annotations
+
+import re
+from itertools import pairwise
+from typing import Annotated
+
+from pydantic import AfterValidator, Field, model_validator
+
+from .base import Frozen
+
+SELECTOR = re.compile(
+    r"(?P<opposite>not\s+)?"
+    r"(?:(?P<all>all)|row:(?P<row>\d{1,4})|largest:(?P<largest>\d{1,6})|brightest:(?P<brightest>\d{1,6})|"
+    r"bounded:(?P<bounded>stop|entrance)|(?P<names>\d+(?:-\d+)+(?:,\d+(?:-\d+)+)*))"
+)
+"""How ghosts are chosen; what each form means stands at `Rule`."""
+
+
+PASSES = ("starburst", "ghosts")
+"""Layers whose light may be graded as a whole."""
+
+
+def _selector(text: str) -> str:
+    plain = re.sub(r"\s*,\s*", ",", " ".join(text.split()).lower())
+    if not SELECTOR.fullmatch(plain):
+        raise ValueError(
+            f"{text!r} chooses no ghosts; write all, a path like 7-3 (or 7-3,8-2), row:7, brightest:5, largest:10, "
+            "bounded:stop or bounded:entrance, or one of these after the word not"
+        )
+    return plain
+
+
+Selector = Annotated[str, AfterValidator(_selector)]
+Factor = Annotated[float, Field(ge=0.0, le=1e9)]
+Colour = tuple[Factor, Factor, Factor]
+Pixels = Annotated[float, Field(ge=-65536.0, le=65536.0)]
+Millimetres = Annotated[float, Field(ge=-1000.0, le=1000.0)]
+
+
+class Rule(Frozen):
+    """A change to some ghosts; its default values change nothing.
+
+    Attributes
+    ----------
+    select : str
+        "all"; path names "7-3" or "7-3,8-2"; "row:7": paths that reflect at row 7; "brightest:5", "largest:10": by
+        throughput and by rms radius as `flarewright ghosts` lists them; "bounded:stop", "bounded:entrance": by what
+        it says bounds them; "not " before any of these: all others.
+    enable : bool or None
+        False leaves the ghosts out, True brings back what an earlier rule left out.
+    gain : float
+        Multiplies their light.
+    tint : tuple of float
+        Multiplies red, green and blue, in the picture's linear colour space.
+    ramp : tuple of (position, red, green, blue)
+        Multiplies the colour by the distance from the ghost's centre: 0 there, 1 at sqrt(2) times its rms radius, which
+        is the rim of an even disc. Linear between the positions, constant beyond them.
+    offset_px, offset_mm : tuple of float or None
+        Moves the ghosts right and up in the picture (Hullin 2011, section 7); one of the two.
+    scale : float
+        Enlarges each ghost about its own centre; its flux stays.
+    blur_px, blur_mm : float or None
+        Standard deviation of a Gaussian; one of the two. The flux stays.
+    """
+
+    select: Selector
+    enable: bool | None = None
+    gain: Factor = 1.0
+    tint: Colour = (1.0, 1.0, 1.0)
+    ramp: tuple[tuple[Factor, Factor, Factor, Factor], ...] = ()
+    offset_px: tuple[Pixels, Pixels] | None = None
+    offset_mm: tuple[Millimetres, Millimetres] | None = None
+    scale: float = Field(1.0, ge=0.01, le=100.0)
+    blur_px: float | None = Field(None, ge=0.0, le=4096.0)
+    blur_mm: float | None = Field(None, ge=0.0, le=1000.0)
+
+    @model_validator(mode="after")
+    def _is_of_one_mind(self) -> Rule:
+        for name in ("offset", "blur"):
+            if getattr(self, f"{name}_px") is not None and getattr(self, f"{name}_mm") is not None:
+                raise ValueError(f"{name}_px and {name}_mm say the same thing twice; keep one")
+        if any(later[0] <= sooner[0] for sooner, later in pairwise(self.ramp)):
+            raise ValueError("ramp: positions must rise from each [position, red, green, blue] to the next")
+        return self
+
+
+class Art(Frozen):
+    """Everything that is changed by hand.
+
+    Attributes
+    ----------
+    physical : bool
+        True ignores all of it: the picture is the physics alone.
+    gain : dict of str to float
+        Factors of whole passes by their layer's name, one of `PASSES`.
+    rules : tuple of Rule
+        In order. Gains, tints, ramps and scales multiply, offsets add, blurs add as Gaussians do, and the last rule
+        that says `enable` decides.
+    """
+
+    physical: bool = False
+    gain: dict[str, Factor] = Field(default_factory=dict)
+    rules: tuple[Rule, ...] = ()
+
+    @model_validator(mode="after")
+    def _passes_exist(self) -> Art:
+        for name in self.gain:
+            if name not in PASSES:
+                raise ValueError(f"gain: there is no pass {name!r}; known are {', '.join(PASSES)}")
+        return self

@@ -1,0 +1,297 @@
+"""Art direction resolved: from a project's rules to what is changed about each path and each pass."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from math import hypot
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import ProjectError
+from ..model import Layer
+from ..model.art import SELECTOR, Rule
+from ..optics.ghosts import GhostTable, bounding_edges, ghost_table
+from ..optics.paths import LightPath, ghost_paths
+from .prepare import Settled
+
+Floats = NDArray[np.float64]
+Ramp = tuple[tuple[float, float, float, float], ...]
+
+# a Gaussian is followed this many standard deviations
+REACH = 4.0
+# beyond this part of the picture's width a blur would need planes many times its size
+WIDEST_BLUR = 0.125
+
+
+@dataclass(frozen=True)
+class Frame:
+    """Where a ghost lies by itself: its centre and the radius of the even disc of its size, upright, mm."""
+
+    centre: tuple[float, float]
+    radius: float
+
+
+@dataclass(frozen=True)
+class PathArt:
+    """What is changed about one path; the default changes nothing.
+
+    Attributes
+    ----------
+    enabled : bool
+    rgb : tuple of float
+        Gain and tint.
+    ramps : tuple of Ramp
+    offset : tuple of float
+        Right and up, mm.
+    scale : float
+    blur : float
+        Standard deviation, mm.
+    """
+
+    enabled: bool = True
+    rgb: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    ramps: tuple[Ramp, ...] = ()
+    offset: tuple[float, float] = (0.0, 0.0)
+    scale: float = 1.0
+    blur: float = 0.0
+
+    @property
+    def framed(self) -> bool:
+        """Whether the ghost's centre must be known."""
+        return self.scale != 1.0 or bool(self.ramps)
+
+    @property
+    def alone(self) -> bool:
+        """Whether the ghost needs a plane of its own."""
+        return self.blur > 0.0 or bool(self.ramps)
+
+    @cached_property
+    def visible_gain(self) -> float:
+        """How much brighter the ghost may become anywhere: what culling and level of detail go by."""
+        gain = max(self.rgb)
+        for ramp in self.ramps:
+            gain *= max(max(stop[1:]) for stop in ramp)
+        return gain
+
+    def place(self, to_pixels: Floats, frame: Frame | None) -> Floats:
+        """Return the map from sensor to pixels that moves and scales the ghost.
+
+        Parameters
+        ----------
+        to_pixels : ndarray, shape (4,)
+            Column and row of the axis, pixels per mm across and down.
+        frame : Frame or None
+            Needed when `scale` is not 1.
+
+        Returns
+        -------
+        ndarray, shape (4,)
+        """
+        if self.scale == 1.0 and self.offset == (0.0, 0.0):
+            return to_pixels
+        x, y = (0.0, 0.0) if frame is None else frame.centre
+        right, up = x * (1.0 - self.scale) + self.offset[0], y * (1.0 - self.scale) + self.offset[1]
+        column, row, across, down = to_pixels
+        return np.array([column + right * across, row - up * down, across * self.scale, down * self.scale])
+
+    def view_radius(self, radius: float, frame: Frame | None) -> float:
+        """Return how far from the axis light may land and yet come into a picture of this radius, mm."""
+        reach = (radius + REACH * self.blur + hypot(*self.offset)) / self.scale
+        return reach + (hypot(*frame.centre) * abs(1.0 - 1.0 / self.scale) if frame is not None else 0.0)
+
+    def margin(self, to_pixels: Floats) -> tuple[int, int]:
+        """Return the columns and rows around the picture from which a blur brings light in."""
+        if self.blur == 0.0:
+            return 0, 0
+        return int(np.ceil(REACH * self.blur * to_pixels[2])) + 4, int(np.ceil(REACH * self.blur * to_pixels[3])) + 4
+
+    def text(self) -> str:
+        """Say what is changed, for the layer's metadata."""
+        words = []
+        if self.rgb != (1.0, 1.0, 1.0):
+            words.append("rgb gain " + ",".join(f"{value:g}" for value in self.rgb))
+        if self.ramps:
+            words.append("ramp " + " ".join(",".join(f"{v:g}" for v in stop) for ramp in self.ramps for stop in ramp))
+        if self.offset != (0.0, 0.0):
+            words.append(f"offset {self.offset[0]:g},{self.offset[1]:g} mm")
+        if self.scale != 1.0:
+            words.append(f"scale {self.scale:g}")
+        if self.blur:
+            words.append(f"blur {self.blur:g} mm")
+        return "; ".join(words)
+
+
+PLAIN = PathArt()
+
+
+@dataclass(frozen=True)
+class ResolvedArt:
+    """A project's art direction for one lens.
+
+    Attributes
+    ----------
+    paths : mapping of str to PathArt
+        By path name; paths that nothing changes are left out.
+    gain : mapping of str to float
+        By layer name of a pass; those of 1 are left out.
+    """
+
+    paths: Mapping[str, PathArt] = field(default_factory=dict)
+    gain: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def physical(self) -> bool:
+        """True when nothing is changed."""
+        return not self.paths and not self.gain
+
+
+def resolve_art(settled: Settled) -> ResolvedArt:
+    """Find out which ghosts the rules choose, and add up what they change.
+
+    Parameters
+    ----------
+    settled : Settled
+
+    Returns
+    -------
+    ResolvedArt
+        Empty when `art.physical` is set.
+
+    Raises
+    ------
+    ProjectError
+        When a rule names a path or row that the lens does not have, or a blur is too wide.
+    """
+    art, project = settled.project.art, settled.project
+    if art.physical or (not art.rules and not art.gain):
+        return ResolvedArt()
+    facts = _Facts(settled, ghost_paths(settled.lens, project.quality.paths))
+    found = {path.name: PLAIN for path in facts.paths}
+    across = project.camera.size_px[0] / project.camera.sensor[0]
+    down = project.camera.size_px[1] / project.camera.sensor[1]
+    for k, rule in enumerate(art.rules):
+        for name in _chosen(facts, rule.select, f"art.rules[{k}].select"):
+            found[name] = _with(found[name], rule, across, down)
+    widest = WIDEST_BLUR * project.camera.sensor[0]
+    for name, changed in found.items():
+        if changed.blur > widest:
+            raise ProjectError(
+                f"art.rules: ghost {name} is blurred by {changed.blur:g} mm, more than an eighth of the sensor's "
+                f"width; keep the blur below {widest:g} mm ({widest * across:.0f} pixels)"
+            )
+    paths = {name: changed for name, changed in found.items() if changed != PLAIN}
+    return ResolvedArt(paths, {name: gain for name, gain in art.gain.items() if gain != 1.0})
+
+
+def graded(layer: Layer, gain: float) -> Layer:
+    """Return a layer whose light is multiplied, and which says so."""
+    if gain == 1.0:
+        return layer
+    about: dict[str, Any] = {**layer.about, "pass_gain": gain}
+    if "flux_mm2" in about:
+        about["flux_mm2"] *= gain
+    return replace(layer, pixels=layer.pixels * np.float32(gain), about=about)
+
+
+def _with(art: PathArt, rule: Rule, across: float, down: float) -> PathArt:
+    """Add a rule to what is changed already."""
+    red, green, blue = (a * rule.gain * b for a, b in zip(art.rgb, rule.tint, strict=True))
+    right, up = rule.offset_mm or (0.0, 0.0)
+    if rule.offset_px is not None:
+        right, up = rule.offset_px[0] / across, rule.offset_px[1] / down
+    blur = rule.blur_px / across if rule.blur_px is not None else rule.blur_mm or 0.0
+    return PathArt(
+        enabled=art.enabled if rule.enable is None else rule.enable,
+        rgb=(red, green, blue),
+        ramps=(*art.ramps, rule.ramp) if rule.ramp else art.ramps,
+        offset=(art.offset[0] + right, art.offset[1] + up),
+        scale=art.scale * rule.scale,
+        blur=hypot(art.blur, blur),
+    )
+
+
+class _Facts:
+    """What selectors ask about; the costly analysis is made when one asks for it."""
+
+    def __init__(self, settled: Settled, paths: tuple[LightPath, ...]) -> None:
+        self.settled, self.paths = settled, paths
+        self.names = [path.name for path in paths]
+
+    @cached_property
+    def tables(self) -> list[GhostTable]:
+        """The ghost analysis for every light."""
+        project, camera = self.settled.project, self.settled.project.camera
+        return [
+            ghost_table(
+                self.settled.lens,
+                light.field_deg,
+                f_number=project.f_number,
+                coating=project.coating,
+                paths=project.quality.paths,
+                sensor_distance=camera.sensor_distance,
+                focus_distance=camera.focus_distance,
+            )
+            for light in project.lights
+        ]
+
+    def ranked(self, measure: str) -> list[str]:
+        """Names by throughput of all lights together, or by the largest rms radius; dark paths are left out."""
+        score: dict[str, float] = dict.fromkeys(self.names, 0.0)
+        lit: set[str] = set()
+        for table, light in zip(self.tables, self.settled.project.lights, strict=True):
+            for row in table.ghosts:
+                name = f"{row.first_reflection}-{row.second_reflection}"
+                if row.throughput_mm2 * light.intensity > 0.0:
+                    lit.add(name)
+                    flux = row.throughput_mm2 * light.intensity
+                    score[name] = score[name] + flux if measure == "brightest" else max(score[name], row.rms_radius_mm)
+        return sorted(lit, key=lambda name: (-score[name], self.names.index(name)))
+
+    @cached_property
+    def bounds(self) -> dict[str, str]:
+        """Which edge bounds each path."""
+        edges = bounding_edges(self.settled.lens, self.settled.order, self.paths)
+        return dict(zip(self.names, edges, strict=True))
+
+
+def _chosen(facts: _Facts, select: str, where: str) -> list[str]:
+    """Return the names of the paths that a selector chooses."""
+    match = SELECTOR.fullmatch(select)
+    assert match is not None, "the model lets no other text through"
+    lens = facts.settled.lens
+    if match["names"]:
+        chosen = set(match["names"].split(","))
+        if unknown := sorted(chosen - set(facts.names)):
+            raise ProjectError(
+                f"{where}: {lens.name} has no ghost {unknown[0]}; a path J-I reflects at row J, then at row I < J, "
+                f"both between 0 and {len(lens.rows) - 1} and neither the stop (row {lens.stop_row})"
+                + ("; only paths on one side of the stop are drawn" if len(facts.names) < _pairs(lens.rows) else "")
+            )
+    elif match["row"]:
+        row = int(match["row"])
+        if row >= len(lens.rows) or row == lens.stop_row:
+            raise ProjectError(
+                f"{where}: nothing reflects at row {row} of {lens.name}; its surfaces are rows 0 to "
+                f"{len(lens.rows) - 1} without the stop (row {lens.stop_row})"
+            )
+        chosen = {path.name for path in facts.paths if row in (path.first_reflection, path.second_reflection)}
+    elif match["bounded"]:
+        chosen = {name for name, edge in facts.bounds.items() if edge == match["bounded"]}
+    elif match["largest"] or match["brightest"]:
+        kind = "largest" if match["largest"] else "brightest"
+        chosen = set(facts.ranked(kind)[: int(match[kind])])
+    else:
+        chosen = set(facts.names)
+    return [name for name in facts.names if (name in chosen) != bool(match["opposite"])]
+
+
+def _pairs(rows: Sequence[object]) -> int:
+    surfaces = len(rows) - 1
+    return surfaces * (surfaces - 1) // 2
+
+
+__all__ = ["PLAIN", "REACH", "Frame", "PathArt", "Ramp", "ResolvedArt", "graded", "resolve_art"]

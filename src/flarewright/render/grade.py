@@ -1,0 +1,128 @@
+"""What art direction does to a ghost on a plane of its own: a colour ramp and a blur."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..kernels.interleave import lit_window
+from .art import REACH, Frame, PathArt, Ramp
+from .canvas import Plane
+
+Floats = NDArray[np.float64]
+
+
+def finish(plane: Plane, art: PathArt, frame: Frame | None, placed: Floats, to_pixels: Floats) -> Plane:
+    """Ramp and blur a ghost that was drawn alone, and cut the margin off.
+
+    Parameters
+    ----------
+    plane : ndarray, shape (3, H + 2 my, W + 2 mx)
+        The ghost with the margin of `PathArt.margin` around the picture.
+    art : PathArt
+    frame : Frame or None
+        The ghost's centre and radius; needed for ramps.
+    placed : ndarray, shape (4,)
+        `PathArt.place` of the picture without margin.
+    to_pixels : ndarray, shape (4,)
+        The picture's own.
+
+    Returns
+    -------
+    ndarray, shape (3, H, W)
+        Flux per pixel.
+    """
+    mx, my = art.margin(to_pixels)
+    x0, y0, x1, y1 = lit_window(plane)
+    if x1 > x0:
+        light = plane[:, y0:y1, x0:x1].astype(np.float64)
+        if frame is not None and art.ramps:
+            column, row = placed[0] + placed[2] * frame.centre[0] + mx, placed[1] - placed[3] * frame.centre[1] + my
+            across, down = (max(frame.radius * float(scale), 1e-6) for scale in placed[2:])
+            columns, rows = (np.arange(x0, x1) + 0.5 - column) / across, (np.arange(y0, y1) + 0.5 - row) / down
+            light *= ramp_factors(art.ramps, np.hypot(rows[:, None], columns[None, :]))
+        if art.blur > 0.0:
+            light, (x0, y0) = _blurred(light, (x0, y0), art.blur * to_pixels[2:4], (plane.shape[2], plane.shape[1]))
+        plane = np.zeros_like(plane)
+        plane[:, y0 : y0 + light.shape[1], x0 : x0 + light.shape[2]] = light
+    return plane[:, my : plane.shape[1] - my, mx : plane.shape[2] - mx]
+
+
+def ramp_factors(ramps: Sequence[Ramp], distance: Floats) -> Floats:
+    """Return the factors of red, green and blue at distances from a ghost's centre.
+
+    Parameters
+    ----------
+    ramps : sequence of Ramp
+        Each (position, red, green, blue), rising; all are multiplied.
+    distance : ndarray, shape (H, W)
+        1 at the rim of an even disc.
+
+    Returns
+    -------
+    ndarray, shape (3, H, W)
+    """
+    factors = np.ones((3, *distance.shape))
+    for ramp in ramps:
+        positions, *colours = np.transpose(ramp)
+        for channel, values in enumerate(colours):
+            factors[channel] *= np.interp(distance, positions, values)
+    return factors
+
+
+def gaussian(sigma_px: float) -> Floats:
+    """Return the weights of a Gaussian over pixels, shape (2 n + 1,), sum 1.
+
+    Parameters
+    ----------
+    sigma_px : float
+        Standard deviation.
+
+    Returns
+    -------
+    ndarray
+        Cut off at four standard deviations and three pixels.
+
+    Notes
+    -----
+    The discrete analogue of the Gaussian, exp(-t) I_k(t) with t = sigma^2 (T. Lindeberg, "Scale-Space for Discrete
+    Signals", IEEE PAMI 12, 234, 1990), from its transfer function exp(t (cos w - 1)). Unlike samples of a Gaussian it
+    has the variance t for narrow blurs too, and blurring twice adds variances.
+    """
+    n = int(np.ceil(REACH * sigma_px)) + 3
+    length = 4 * (2 * n + 1)
+    transfer = np.exp(sigma_px**2 * (np.cos(2.0 * np.pi * np.arange(length // 2 + 1) / length) - 1.0))
+    weights = np.roll(np.fft.irfft(transfer, length), n)[: 2 * n + 1]
+    return np.asarray(weights / weights.sum())
+
+
+def _blurred(
+    light: Floats, corner: tuple[int, int], sigma_px: Floats, size: tuple[int, int]
+) -> tuple[Floats, tuple[int, int]]:
+    """Blur along both axes; return what stays within the plane and its corner."""
+    x0, y0 = corner
+    for axis, sigma in ((2, float(sigma_px[0])), (1, float(sigma_px[1]))):
+        weights = gaussian(sigma)
+        light = _convolved(light, weights, axis)
+        if axis == 2:
+            x0 -= len(weights) // 2
+        else:
+            y0 -= len(weights) // 2
+    left, top = max(0, -x0), max(0, -y0)
+    light = light[:, top : size[1] - y0, left : size[0] - x0]
+    return light, (x0 + left, y0 + top)
+
+
+def _convolved(light: Floats, weights: Floats, axis: int) -> Floats:
+    """Convolve along an axis by Fourier transforms; longer by the weights' length less one."""
+    length = light.shape[axis] + len(weights) - 1
+    shape = [1, 1, 1]
+    shape[axis] = -1
+    spectrum = np.fft.rfft(light, length, axis=axis)
+    spectrum *= np.fft.rfft(weights, length).reshape(shape)
+    out = np.fft.irfft(spectrum, length, axis=axis)
+    # the transform's rounding is light nowhere
+    out[np.abs(out) < 1e-14 * np.abs(light).max()] = 0.0
+    return np.asarray(out)
