@@ -118,7 +118,7 @@ def test_a_finer_tolerance_makes_a_finer_grid_and_the_same_flux():
     for tolerance in (1.0, 0.25, 0.05):
         _, bundle = mesh_of(shot, path, tolerance)
         data = trace_points(shot.packed, 1, path, shot.incidence.tilt, bundle.pupil)
-        sums = measure_bundle(data, bundle.pupil, bundle.triangles, 1, blades, shot.incidence.axes)
+        sums = measure_bundle(data, bundle.pupil, bundle.triangles, 1, blades, shot.incidence.axes, 2)
         found.append((len(bundle.triangles), sums[0]))
     assert found[0][0] <= found[1][0] < found[2][0]
     assert found[0][1] == pytest.approx(found[2][1], rel=2e-3)

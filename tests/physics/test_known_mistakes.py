@@ -158,7 +158,7 @@ def test_folded_cells_dropped():
     plane, *scratch = canvas.blank((64, 64)).scratch()
     draw_bundle(
         data, pupil, triangles, node_densities(data, pupil, triangles), 1, np.zeros((0, 4)), np.ones((1, 1)), 1.0,
-        np.eye(2), np.array([32.0, 32.0, 2.0, 2.0]), 1.0, np.ones(3), plane, *scratch,
+        np.eye(2), np.array([32.0, 32.0, 2.0, 2.0]), 1.0, np.ones(3), plane, *scratch, 2,
     )  # fmt: skip
     assert plane[0].sum(dtype=float) == pytest.approx(2.0, rel=1e-5)  # the half and its mirror image
     inner = plane[0][34:40, 16:30]

@@ -38,6 +38,7 @@ from .lens_fields import (
     NumberField,
 )
 from .sentences import count, did_you_mean, shorten, summary, validation_sentences
+from .shape_fields import read_elements, read_shape
 from .text_file import read_toml
 
 MOST_ROWS = 500
@@ -91,16 +92,18 @@ def read_lens_toml(path: str | Path) -> LensReading:
         table = read_toml(path, "a lens file")
     except ValueError as error:
         raise LensError(str(error), (str(error),)) from None
-    return lens_from_table(table, str(path))
+    return lens_from_table(table, str(path), folder=Path(path).parent)
 
 
-def lens_from_table(table: dict[str, Any], where: str) -> LensReading:
+def lens_from_table(table: dict[str, Any], where: str, *, folder: Path | None = None) -> LensReading:
     """Make a lens of a parsed TOML table; `where` (the file) begins the message of an error.
 
     Parameters
     ----------
     table : dict
     where : str
+    folder : path, optional
+        Where relative paths of images start; None: the working folder.
 
     Returns
     -------
@@ -114,12 +117,14 @@ def lens_from_table(table: dict[str, Any], where: str) -> LensReading:
     problems: list[str] = []
     fields = _top_level(table, problems)
     findings: list[tuple[int, media.Finding]] = []
-    rows = _rows(table.get("rows"), problems, findings)
+    rows = _rows(table.get("rows"), problems, findings, folder)
+    elements = read_elements(table.get("elements", []), problems)
     presets = _presets(table.get("coating_presets", {}), len(rows), problems)
     lens: Lens | None = None
     if not problems:
         try:
-            lens = Lens(**fields, rows=tuple(row for row in rows if row is not None), coating_presets=presets)
+            whole = tuple(row for row in rows if row is not None)
+            lens = Lens(**fields, rows=whole, elements=elements, coating_presets=presets)
         except ValidationError as error:
             problems += validation_sentences(error)
     if lens is None:
@@ -161,7 +166,9 @@ def _top_level(table: dict[str, Any], problems: list[str]) -> dict[str, Any]:
     return fields
 
 
-def _rows(table: object, problems: list[str], findings: list[tuple[int, media.Finding]]) -> list[Row | None]:
+def _rows(
+    table: object, problems: list[str], findings: list[tuple[int, media.Finding]], folder: Path | None
+) -> list[Row | None]:
     """Check each row on its own, then what the rows make together; a bad row is None."""
     if table is None:
         problems.append("rows is missing: a lens is rows = [ { radius = ..., thickness = ... }, ... ]")
@@ -180,7 +187,7 @@ def _rows(table: object, problems: list[str], findings: list[tuple[int, media.Fi
         elif _is_stop(entry, k, problems):
             rows.append(_stop(entry, k, problems))
         else:
-            rows.append(_surface(entry, k, problems, findings))
+            rows.append(_surface(entry, k, problems, findings, folder))
     stops = [k for k, entry in enumerate(table) if isinstance(entry, dict) and entry.get("stop") is True]
     if not stops:
         problems.append("no row is the stop: add { stop = true, thickness = ... } where the iris sits")
@@ -222,7 +229,11 @@ def _stop(entry: dict[str, Any], k: int, problems: list[str]) -> Stop | None:
 
 
 def _surface(
-    entry: dict[str, Any], k: int, problems: list[str], findings: list[tuple[int, media.Finding]]
+    entry: dict[str, Any],
+    k: int,
+    problems: list[str],
+    findings: list[tuple[int, media.Finding]],
+    folder: Path | None,
 ) -> Surface | None:
     before = len(problems)
     _unknown_keys(entry, ("stop", *SURFACE_KEYS), f"row {k}: ", problems)
@@ -237,6 +248,9 @@ def _surface(
         problems.append(f"row {k}: semi_diameter_estimated is {shorten(estimated)}, true or false was expected")
     values |= {key: numbers[key] for key in ("conic", "thickness", "semi_diameter") if key in numbers}
     values["semi_diameter_estimated"] = estimated
+    if "radius_x" in entry or "curvature_x" in entry:
+        values["curvature_x"] = _curvature(entry, k, problems, "_x")
+    values |= read_shape(entry, f"row {k}", folder, problems)
     if "coating" in entry:
         values["coating"] = _coating(entry["coating"], f"row {k}", problems)
 
@@ -255,29 +269,30 @@ def _surface(
     return Surface(**values) if len(problems) == before else None
 
 
-def _curvature(entry: dict[str, Any], k: int, problems: list[str]) -> float:
-    if "radius" in entry and "curvature" in entry:
-        problems.append(f"row {k}: radius and curvature are both given: keep one")
-    elif "curvature" in entry:
-        return _number(entry["curvature"], f"row {k}: curvature", CURVATURE, problems) or 0.0
-    elif "radius" not in entry:
+def _curvature(entry: dict[str, Any], k: int, problems: list[str], axis: str = "") -> float:
+    radius, curvature = f"radius{axis}", f"curvature{axis}"
+    if radius in entry and curvature in entry:
+        problems.append(f"row {k}: {radius} and {curvature} are both given: keep one")
+    elif curvature in entry:
+        return _number(entry[curvature], f"row {k}: {curvature}", CURVATURE, problems) or 0.0
+    elif radius not in entry:
         problems.append(f'row {k}: radius is missing: give it in mm, or radius = "flat"')
     else:
-        return _curvature_of(entry["radius"], k, problems)
+        return _curvature_of(entry[radius], radius, k, problems)
     return 0.0
 
 
-def _curvature_of(radius: object, k: int, problems: list[str]) -> float:
+def _curvature_of(radius: object, key: str, k: int, problems: list[str]) -> float:
     if radius == "flat":
         return 0.0
     if isinstance(radius, str):
-        problems.append(f'row {k}: radius is {shorten(radius)}, a number in mm or "flat" was expected')
+        problems.append(f'row {k}: {key} is {shorten(radius)}, a number in mm or "flat" was expected')
     elif radius in (0, float("inf"), float("-inf")) and not isinstance(radius, bool):
-        problems.append(f'row {k}: radius is {radius!r}: for a plane surface write radius = "flat"')
-    elif (value := _number(radius, f"row {k}: radius", RADIUS, problems)) is not None:
+        problems.append(f'row {k}: {key} is {radius!r}: for a plane surface write {key} = "flat"')
+    elif (value := _number(radius, f"row {k}: {key}", RADIUS, problems)) is not None:
         if abs(1.0 / value) <= CURVATURE.high:
             return 1.0 / value
-        problems.append(f"row {k}: radius is {shorten(radius)}: less than a micrometre is no lens surface")
+        problems.append(f"row {k}: {key} is {shorten(radius)}: less than a micrometre is no lens surface")
     return 0.0
 
 

@@ -8,6 +8,7 @@ from flarewright.model import Iris
 
 from .coating_text import HELP, STANDARD_NAMES
 from .lens_fields import CURVATURE, RADIUS, ROW_NUMBERS, TOP_NUMBERS, TOP_TEXTS
+from .shape_fields import elements_schema, shape_schema
 
 _NUMBER = r"([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?"
 _COATING_TEXT = (
@@ -43,6 +44,7 @@ def lens_json_schema() -> dict[str, Any]:
             "maxContains": 1,
             "description": "the prescription from front to back",
         },
+        "elements": elements_schema(),
         "coating_presets": {
             "type": "object",
             "additionalProperties": {"type": "array", "items": {"$ref": "#/$defs/coating"}},
@@ -73,6 +75,11 @@ def _surface() -> dict[str, Any]:
                 "anyOf": [{**radius, "not": {"const": 0}}, {"const": "flat"}],
             },
             "curvature": CURVATURE.schema(),
+            "radius_x": {
+                "description": "radius in the x-z plane; left out: a surface of revolution",
+                "anyOf": [{**radius, "not": {"const": 0}}, {"const": "flat"}],
+            },
+            **shape_schema(),
             **{key: field.schema() for key, field in ROW_NUMBERS.items()},
             "glass": {"type": "string", "minLength": 1, "description": 'catalogue name, "N-BK7" or "SCHOTT N-BK7"'},
             "semi_diameter_estimated": {"type": "boolean", "description": "true: not from the prescription"},
@@ -80,6 +87,7 @@ def _surface() -> dict[str, Any]:
             "stop": {"const": False},
         },
         "oneOf": [{"required": ["radius"]}, {"required": ["curvature"]}],
+        "not": {"required": ["radius_x", "curvature_x"]},
         # An Abbe number alone is no glass.
         "if": {"required": ["v_d"]},
         "then": {"anyOf": [{"required": ["n_d"]}, {"required": ["glass"]}]},

@@ -11,6 +11,7 @@ from flarewright.model.iris import Iris
 from .atomic import write_atomically
 from .coating_text import UNCOATED, format_coating
 from .lens_fields import TOP_NUMBERS, TOP_TEXTS
+from .shape_fields import shape_parts
 
 
 def write_lens(lens: Lens, path: str | Path) -> None:
@@ -46,6 +47,9 @@ def format_lens(lens: Lens) -> str:
     lines += [f"{key} = {_text(getattr(lens, key))}" for key in TOP_TEXTS if getattr(lens, key) or key == "name"]
     lines += [f"{key} = {_number(getattr(lens, key))}" for key in TOP_NUMBERS if getattr(lens, key) is not None]
     lines += ["", "rows = [", *(f"  {{ {_row(row)} }}," for row in lens.rows), "]"]
+    for element in lens.elements:
+        lines += ["", "[[elements]]", f"rows = [{element.rows[0]}, {element.rows[1]}]"]
+        lines += [f"{key} = [{', '.join(map(_number, getattr(element, key)))}]" for key in ("decentre", "tilt_deg")]
     if lens.iris != Iris():
         lines += ["", "[iris]", *(f"{key} = {_value(value)}" for key, value in lens.iris if value is not None)]
     if lens.coating_presets:
@@ -60,6 +64,7 @@ def _row(row: Row) -> str:
     parts = [_radius(row.curvature)]
     if row.conic:
         parts.append(f"conic = {_number(row.conic)}")
+    parts += shape_parts(row, _number, _quoted, _radius)
     parts.append(f"thickness = {_number(row.thickness)}")
     if row.medium is not None:
         if row.medium.glass is not None:
@@ -76,16 +81,16 @@ def _row(row: Row) -> str:
     return ", ".join(parts)
 
 
-def _radius(curvature: float) -> str:
+def _radius(curvature: float, axis: str = "") -> str:
     """Write the shortest radius that gives exactly this curvature again, or the curvature itself where none does."""
     if curvature == 0.0:
-        return 'radius = "flat"'
+        return f'radius{axis} = "flat"'
     radius = 1.0 / curvature
     for digits in range(1, 18):
         text = f"{radius:.{digits}g}"
         if abs(radius) < 1e9 and 1.0 / float(text) == curvature:
-            return f"radius = {_number(float(text))}"
-    return f"curvature = {_number(curvature)}"
+            return f"radius{axis} = {_number(float(text))}"
+    return f"curvature{axis} = {_number(curvature)}"
 
 
 def _coating(coating: Coating | None) -> str:

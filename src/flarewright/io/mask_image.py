@@ -36,7 +36,7 @@ def read_mask(path: str | Path) -> NDArray[np.float64]:
     if not place.is_file():
         raise ProjectError(f"{place}: there is no such iris image; give the path of a PNG or EXR file")
     try:
-        grey = _read_exr(place) if place.suffix.lower() == ".exr" else _read_picture(place)
+        grey = read_grey(place)
     except (OSError, ValueError, SyntaxError) as error:
         raise ProjectError(f"{place}: this cannot be read as an image ({error}); give a PNG or EXR file") from error
     if min(grey.shape) < 2 or max(grey.shape) > LARGEST:
@@ -47,6 +47,11 @@ def read_mask(path: str | Path) -> NDArray[np.float64]:
     if not np.isfinite(grey).all() or grey.max() <= 0.0:
         raise ProjectError(f"{place}: the iris image is black or not finite, so no light passes; white transmits")
     return grey
+
+
+def read_grey(path: Path) -> NDArray[np.float64]:
+    """Read a picture as grey, white 1; whatever the reader raises goes on to the caller, who knows what it is for."""
+    return _read_exr(path) if path.suffix.lower() == ".exr" else _read_picture(path)
 
 
 def _read_picture(path: Path) -> NDArray[np.float64]:

@@ -140,7 +140,7 @@ def _expanded(data: dict[str, Any], folder: Path, problems: list[str]) -> dict[s
         case str(name):
             out["lens"] = lens_location(name, folder)
         case dict(table):
-            out["lens"] = _embedded_lens(table, problems)
+            out["lens"] = _embedded_lens(table, folder, problems)
         case None:
             pass
         case other:
@@ -159,7 +159,7 @@ def _expanded(data: dict[str, Any], folder: Path, problems: list[str]) -> dict[s
     return out
 
 
-def _embedded_lens(table: dict[str, Any], problems: list[str]) -> Any:
+def _embedded_lens(table: dict[str, Any], folder: Path, problems: list[str]) -> Any:
     """Accept a prescription inside the project, as in a lens file or as `project_text` writes it (rows with a kind)."""
     rows = table.get("rows")
     if isinstance(rows, list) and all(isinstance(row, dict) and "kind" in row for row in rows):
@@ -173,7 +173,7 @@ def _embedded_lens(table: dict[str, Any], problems: list[str]) -> Any:
             return "?"
         return {**table, "coating_presets": read}
     try:
-        return lens_from_table(table, "lens").lens
+        return lens_from_table(table, "lens", folder=folder).lens
     except LensError as error:
         problems.extend(f"lens: {problem}" for problem in error.problems or (str(error),))
         return "?"

@@ -69,9 +69,9 @@ def node_densities(data, pupil, triangles):
 @compiled
 def draw_bundle(
     data, pupil, triangles, densities, crossings, blades, mask, mask_half, axes, to_pixels, gain, rgb,
-    plane, strip,
+    plane, strip, halves,
 ):  # fmt: skip
-    """Add a bundle and its mirror image to a picture, flux for flux.
+    """Add a bundle, and its mirror image where it has one, to a picture, flux for flux.
 
     Parameters
     ----------
@@ -92,6 +92,8 @@ def draw_bundle(
         Flux per pixel, added to.
     strip
         Scratch of `fill_polygon`.
+    halves : int
+        2: the bundle and its mirror image in x make the light; 1: the bundle alone does.
 
     Notes
     -----
@@ -106,7 +108,7 @@ def draw_bundle(
     corner = np.empty((3, 3))
     spots, inside = np.empty((pupil.shape[0], 2)), np.empty(pupil.shape[0], dtype=np.bool_)
     pixel_area = to_pixels[2] * to_pixels[3]
-    for half in range(2):
+    for half in range(halves):
         mirror = 1.0 - 2.0 * half
         _place_nodes(data, mirror, crossings, blades, axes, to_pixels, spots, inside)
         for t in range(triangles.shape[0]):
@@ -223,12 +225,12 @@ def _splat_polygon(polygon, count, flux, rgb, plane):
 
 
 @compiled
-def measure_bundle(data, pupil, triangles, crossings, blades, axes):
+def measure_bundle(data, pupil, triangles, crossings, blades, axes, halves):
     """Integrate a bundle over what passes.
 
     Parameters
     ----------
-    data, pupil, triangles, crossings, blades, axes
+    data, pupil, triangles, crossings, blades, axes, halves
         As in `draw_bundle`.
 
     Returns
@@ -250,7 +252,7 @@ def measure_bundle(data, pupil, triangles, crossings, blades, axes):
         triangle = triangles[t]
         if data[triangle[0], ALIVE] * data[triangle[1], ALIVE] * data[triangle[2], ALIVE] == 0.0:
             continue
-        for half in range(2):
+        for half in range(halves):
             count = clip_triangle(
                 data, pupil, triangle, 1.0 - 2.0 * half, crossings, blades, axes, polygon, other, values
             )

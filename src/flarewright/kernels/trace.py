@@ -4,64 +4,15 @@ from math import sqrt
 
 import numpy as np
 
-from ._jit import compiled, inlined
+from ._jit import compiled
+from .bend import ALIVE, LANES, REFLECT, REFRACT, REL, STOP, STOP_X, WEIGHT, X, Y, bend
 from .intersect import intersect_conic
+from .shapes import hit_shapes, trace_shapes
 
-REFRACT = 0
-REFLECT = 1
-STOP = 2
-
-LANES = 64
-
-# columns of a traced node
-X, Y, WEIGHT, REL, ALIVE = 0, 1, 2, 3, 4
-STOP_X = 5  # then stop y, and the same for a second and third crossing
-
-
-@inlined
-def bend(curvature, conic, x, y, z, dx, dy, dz, root, heading, eta, mirror):
-    """Refract or reflect a ray at a hit.
-
-    Parameters
-    ----------
-    curvature, conic : float
-    x, y, z : float
-        The hit, mm, relative to the vertex.
-    dx, dy, dz : float
-        Unit direction.
-    root : float
-        From `intersect_conic`.
-    heading : float
-        +1 or -1, the leg's direction.
-    eta : float
-        Index before over index behind.
-    mirror : float
-        1 reflects, 0 refracts.
-
-    Returns
-    -------
-    nx, ny, nz : float
-        New unit direction.
-    cos_in, cos_out : float
-        Cosines before and behind the surface, both >= 0.
-    inside : float
-        cos_out squared; negative beyond the critical angle.
-
-    Notes
-    -----
-    d' = eta d + (eta c - sqrt k) N and d' = d + 2 c N with c = -N.d, k = 1 - eta^2 (1 - c^2) (docs/physics.md). The
-    normal against the ray is heading * gradient / norm, which holds beyond a sphere's equator too.
-    """
-    gx = curvature * x
-    gy = curvature * y
-    gz = curvature * (1.0 + conic) * z - 1.0
-    inv_norm = 1.0 / sqrt(gx * gx + gy * gy + gz * gz)
-    cos_in = root * inv_norm
-    inside = 1.0 - eta * eta * (1.0 - cos_in * cos_in)
-    cos_out = sqrt(max(inside, 0.0))
-    along = (2.0 * cos_in if mirror > 0.0 else eta * cos_in - cos_out) * heading * inv_norm
-    scale = 1.0 if mirror > 0.0 else eta
-    return scale * dx + along * gx, scale * dy + along * gy, scale * dz + along * gz, cos_in, cos_out, inside
+__all__ = [
+    "ALIVE", "LANES", "REFLECT", "REFRACT", "REL", "STOP", "STOP_X", "WEIGHT", "X", "Y", "bend", "trace_hits",
+    "trace_nodes",
+]  # fmt: skip
 
 
 @compiled
@@ -73,7 +24,8 @@ def trace_nodes(rows, actions, curvature, conic, z_vertex, inv_semi, n_gap, refl
     rows, actions : ndarray, shape (S,), int64
         Row met at each step and what happens there (REFRACT, REFLECT, STOP).
     curvature, conic, z_vertex, inv_semi : ndarray, shape (K,)
-        Geometry of the rows; `inv_semi` is 1 / semi-diameter, 0 for the stop.
+        Geometry of the rows; `inv_semi` is 1 / semi-diameter, 0 for the stop. Where not every row is a centred conic,
+        `conic` is the shape table instead, shape (K, P) (`kernels.intersect`); only then is its code compiled.
     n_gap : ndarray, shape (K + 1,)
         Index before row 0, behind row 0, behind row 1, ...
     reflectance : ndarray, shape (K, M)
@@ -93,6 +45,9 @@ def trace_nodes(rows, actions, curvature, conic, z_vertex, inv_semi, n_gap, refl
     Hullin 2011, section 4.1. A ray ends when it misses, is totally reflected where it should refract, or turns the
     wrong way along its leg. A mirror beyond the critical angle has R = 1.
     """
+    if conic.ndim == 2:
+        trace_shapes(rows, actions, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, tilt, px, py, out)
+        return
     n_rays = px.shape[0]
     samples = reflectance.shape[1]
     last_cell = samples - 2
@@ -202,6 +157,9 @@ def trace_hits(rows, actions, curvature, conic, z_vertex, n_gap, sensor_z, tilt,
     hits : ndarray, shape (N, S + 2, 3)
         Filled with the start, the hit at every step, and the point on the sensor; NaN from where a ray ends.
     """
+    if conic.ndim == 2:
+        hit_shapes(rows, actions, conic, z_vertex, n_gap, sensor_z, tilt, px, py, hits)
+        return
     for k in range(px.shape[0]):
         x, y, z = px[k], py[k], 0.0
         dx, dy, dz = 0.0, np.sin(tilt), np.cos(tilt)

@@ -3,10 +3,11 @@
 from .art import Art, Rule
 from .camera import Camera
 from .coating import Bare, Coating, Film, QuarterWave, Stack, Standard
+from .figure import Figure
 from .glass import Dispersion, Medium
 from .iris import Iris
 from .layer import Layer
-from .lens import Lens, Row, Stop, Surface
+from .lens import Element, Lens, Row, Stop, Surface
 from .light import D65, BlackBody, EqualEnergy, Light, Lines, Spectrum, Tabulated
 from .project import AsLens, CoatingChoice, Everywhere, Output, PerRow, Preset, Project, Quality
 
@@ -20,8 +21,10 @@ __all__ = [
     "Coating",
     "CoatingChoice",
     "Dispersion",
+    "Element",
     "EqualEnergy",
     "Everywhere",
+    "Figure",
     "Film",
     "Iris",
     "Layer",

@@ -8,10 +8,17 @@ from pydantic import Field, model_validator
 
 from .base import Frozen
 from .coating import Coating
+from .figure import Figure
 from .glass import Medium
 from .iris import Iris
 
 SCHEMA_VERSION = 1
+
+# A4 to A20
+MOST_TERMS = 9
+
+Offset = Annotated[float, Field(ge=-100.0, le=100.0)]
+Tilt = Annotated[float, Field(ge=-45.0, le=45.0)]
 
 
 class Surface(Frozen):
@@ -20,9 +27,20 @@ class Surface(Frozen):
     Attributes
     ----------
     curvature : float
-        1 / radius in 1/mm; positive when the centre of curvature lies behind the vertex; 0 is flat.
+        1 / radius in 1/mm; positive when the centre of curvature lies behind the vertex; 0 is flat. Of a toroid or a
+        cylinder: in the y-z plane.
     conic : float
-        Conic constant; 0 is a sphere, -1 a paraboloid.
+        Conic constant; 0 is a sphere, -1 a paraboloid. Of a toroid or a cylinder: in the y-z plane.
+    curvature_x, conic_x : float or None
+        The same in the x-z plane; None: as in the y-z plane. A cylinder has one curvature that is 0.
+    asphere : tuple of float
+        A4, A6, ... of the sag's terms A4 r^4 + A6 r^6 + ..., 1/mm^3, 1/mm^5, ...
+    decentre : tuple of float or None
+        (x, y) of the vertex beside the axis, mm.
+    tilt_deg : tuple of float or None
+        Right-handed turns about the surface's x axis, then about the lens' y axis, at the vertex.
+    figure : Figure or None
+        Departure from the ideal form.
     thickness : float
         Distance to the next row's vertex, mm; of the last row: the patent's image distance, kept as a record only.
     medium : Medium or None
@@ -38,11 +56,33 @@ class Surface(Frozen):
     kind: Literal["surface"] = "surface"
     curvature: float = 0.0
     conic: float = 0.0
+    curvature_x: float | None = None
+    conic_x: float | None = None
+    asphere: tuple[float, ...] = Field((), max_length=MOST_TERMS)
+    decentre: tuple[Offset, Offset] | None = None
+    tilt_deg: tuple[Tilt, Tilt] | None = None
+    figure: Figure | None = None
     thickness: float = Field(0.0, ge=-1000.0, le=10000.0)
     medium: Medium | None = None
     semi_diameter: float | None = Field(None, gt=0.0, le=2000.0)
     semi_diameter_estimated: bool = False
     coating: Coating | None = None
+
+    @property
+    def meridian_x(self) -> tuple[float, float]:
+        """Curvature and conic constant in the x-z plane."""
+        c = self.curvature if self.curvature_x is None else self.curvature_x
+        return c, self.conic if self.conic_x is None else self.conic_x
+
+    @property
+    def toroidal(self) -> bool:
+        """Whether the two meridians differ."""
+        return self.meridian_x != (self.curvature, self.conic)
+
+    @property
+    def displaced(self) -> bool:
+        """Whether it sits beside the axis or askew."""
+        return any(self.decentre or ()) or any(self.tilt_deg or ())
 
 
 class Stop(Frozen):
@@ -53,6 +93,29 @@ class Stop(Frozen):
 
 
 Row = Annotated[Surface | Stop, Field(discriminator="kind")]
+
+
+class Element(Frozen):
+    """Rows that are moved together: a glass, a cemented group, or any part of the lens between two gaps.
+
+    Attributes
+    ----------
+    rows : tuple of int
+        First and last row of it, both included; it holds no stop.
+    decentre : tuple of float
+        (x, y) by which it is moved, mm.
+    tilt_deg : tuple of float
+        Turns about the x axis, then about the lens' y axis, at the vertex of its first row.
+    """
+
+    rows: tuple[int, int]
+    decentre: tuple[Offset, Offset] = (0.0, 0.0)
+    tilt_deg: tuple[Tilt, Tilt] = (0.0, 0.0)
+
+    @property
+    def displaced(self) -> bool:
+        """Whether it is moved at all."""
+        return any(self.decentre) or any(self.tilt_deg)
 
 
 class Lens(Frozen):
@@ -75,6 +138,8 @@ class Lens(Frozen):
         Distance of the plane in focus in front of the first vertex, mm; None is infinity.
     iris : Iris
         Default blades.
+    elements : tuple of Element
+        Groups of rows that stand beside the axis or askew.
     coating_presets : dict of str to tuple of Coating or None
         Named sets, one entry per row (the stop's is ignored).
     """
@@ -90,6 +155,7 @@ class Lens(Frozen):
     focus_distance: float | None = Field(None, gt=0.0)
     iris: Iris = Iris()
     rows: tuple[Row, ...] = Field(min_length=2)
+    elements: tuple[Element, ...] = ()
     coating_presets: dict[str, tuple[Coating | None, ...]] = Field(default_factory=dict)
 
     @property
@@ -108,9 +174,24 @@ class Lens(Frozen):
         last = self.rows[-1]
         if isinstance(last, Surface) and last.medium is not None:
             raise ValueError(f"row {len(self.rows) - 1}: behind the last row must be air, not glass")
+        self._elements_are_apart(stops[0])
         for name, coatings in self.coating_presets.items():
             if len(coatings) != len(self.rows):
                 raise ValueError(
                     f"coating preset {name!r} has {len(coatings)} entries, the lens has {len(self.rows)} rows"
                 )
         return self
+
+    def _elements_are_apart(self, stop: int) -> None:
+        taken: dict[int, int] = {}
+        for number, element in enumerate(self.elements):
+            first, last = element.rows
+            where = f"element {number} (rows {first} to {last})"
+            if not 0 <= first <= last < len(self.rows):
+                raise ValueError(f"{where}: give its first and last row, between 0 and {len(self.rows) - 1}")
+            if first <= stop <= last:
+                raise ValueError(f"{where} holds the stop, row {stop}, which is never moved; make it two elements")
+            for row in range(first, last + 1):
+                if row in taken:
+                    raise ValueError(f"{where} shares row {row} with element {taken[row]}; a row belongs to one")
+                taken[row] = number

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..kernels.intersect import AXES, ORIGIN, sag_of_shape
 from ..kernels.mesh import build_mesh
 from ..kernels.prepass import find_box
 from ..kernels.trace import STOP_X, trace_nodes
@@ -19,9 +20,12 @@ Floats = NDArray[np.float64]
 
 # cells of the pre-pass over half the pupil: 64 across the whole
 PREPASS = (32, 64)
+# and of the scans of a part of it
+FINER = (16, 32)
 # regions of fewer cells than this are looked for at every colour
 SMALL_REGION = 64
-# coarsest cells of a bundle's grid over half its region, and how often each may be halved
+# coarsest cells of a bundle's grid over half its region, and how often each may be halved; of a whole region twice as
+# many stand side by side
 GRID = (4, 8)
 MAX_LEVEL = 6
 
@@ -74,33 +78,60 @@ class Bundle:
     ----------
     path : LightPath
     pupil : ndarray, shape (N, 2)
-        Nodes on the plane of the first vertex in the meridional frame, mm; x >= 0.
+        Nodes on the plane of the first vertex in the meridional frame, mm; x >= 0 where there are two halves.
     triangles : ndarray, shape (T, 3)
     traced : dict of int to ndarray, shape (N, 5 + 2 C)
         The nodes as traced at the wavelengths that shaped the grid (`trace_points`).
+    halves : int
+        2: the bundle and its mirror image are the light; 1: the bundle is all of it.
     """
 
     path: LightPath
     pupil: Floats
     triangles: NDArray[np.int64]
     traced: dict[int, Floats]
+    halves: int = 2
 
 
 def _arguments(packed: PackedLens, w: int | list[int], path: LightPath, tilt: float) -> Any:
     """List what every tracing kernel takes first."""
-    geometry = (packed.curvature, packed.conic, packed.z_vertex, packed.inv_semi)
+    geometry = (packed.curvature, packed.form, packed.z_vertex, packed.inv_semi)
     return (path.rows, path.actions, *geometry, packed.n_gap[w], packed.reflectance[w], packed.sensor_z, tilt)
 
 
 def front_box(packed: PackedLens, tilt: float) -> Floats:
-    """Return the half of the first vertex' plane through which light can reach the first surface: x0, x1, y0, y1."""
+    """Return the part of the first vertex' plane through which light can reach the first surface: x0, x1, y0, y1.
+
+    Of a lens of revolution only the half x >= 0.
+    """
     first = packed.first_surface
+    if packed.shapes is not None:
+        return _shaped_box(packed, tilt, first)
     semi, c = packed.semi[first], packed.curvature[first]
     sag = c * semi**2 / (1.0 + sqrt(max(1.0 - (1.0 + packed.conic[first]) * (c * semi) ** 2, 0.0)))
     # a rim at z = sag is met by rays that cross z = 0 displaced by sag tan(tilt)
     low, high = -semi - max(0.0, sag * tan(tilt)), semi + max(0.0, -sag * tan(tilt))
     lead = abs(packed.z_vertex[first] * tan(tilt))
     return np.array([0.0, semi, low - lead, high + lead]) * (1.0 + 1e-9)
+
+
+def _shaped_box(packed: PackedLens, tilt: float, first: int) -> Floats:
+    """Bound the front of a lens whose first surface may have any shape and place: by the rim and heights on it."""
+    semi, shape = float(packed.semi[first]), packed.form[first]
+    angle = np.linspace(0.0, 2.0 * np.pi, 65)
+    x, y = semi * np.cos(angle), semi * np.sin(angle)
+    height = np.array([sag_of_shape(packed.form, first, u, v)[0] for u, v in zip(x, y, strict=True)])
+    rim = np.stack([x, y, height], axis=1) @ shape[AXES : AXES + 9].reshape(3, 3) + shape[ORIGIN : ORIGIN + 3]
+    # the rim's chords cut its arcs short, and the surface may bulge beyond its rim's height
+    slack = 0.01 * semi + float(np.ptp(np.append(rim[:, 2], shape[ORIGIN + 2])) * abs(tan(tilt)))
+    at = rim[:, 1] - (packed.z_vertex[first] + rim[:, 2]) * tan(tilt)
+    left = 0.0 if packed.symmetric else float(rim[:, 0].min()) - slack
+    return np.array([left, float(rim[:, 0].max()) + slack, float(at.min()) - slack, float(at.max()) + slack])
+
+
+def _cells(packed: PackedLens, cells: tuple[int, int]) -> tuple[int, int]:
+    """Cells across and along the part of the pupil that is traced, from those of half of it."""
+    return (cells[0] * (3 - packed.halves), cells[1])
 
 
 @dataclass(frozen=True)
@@ -153,15 +184,15 @@ def find_region(
         None when nothing passes.
     """
     middle, *others = _fitted(packed)
-    box, cells = front_box(packed, tilt), PREPASS
-    small = False
+    box, cells = front_box(packed, tilt), _cells(packed, PREPASS)
+    small, whole = False, True
     for _ in range(4):
         found, sums = _scan(packed, middle, path, tilt, iris_radius, view_radius, box, cells)
         # a large region leaves a cell of room for other colours; a small one may lie elsewhere for them
         small = small or sums[4] < SMALL_REGION
         if small:
             # the whole front is too much to scan thrice where one colour has shown the place
-            near, few = (_around(found, box, cells), (16, 32)) if cells == PREPASS and sums[4] > 0.0 else (box, cells)
+            near, few = (_around(found, box, cells), _cells(packed, FINER)) if whole and sums[4] > 0.0 else (box, cells)
             for w in others:
                 elsewhere, more = _scan(packed, w, path, tilt, iris_radius, view_radius, near, few)
                 found[0::2] = np.minimum(found[0::2], elsewhere[0::2])
@@ -171,7 +202,7 @@ def find_region(
             return None
         area = float((found[1] - found[0]) * (found[3] - found[2]))
         shrunk = area < 0.3 * (box[1] - box[0]) * (box[3] - box[2])
-        box, cells = found, (16, 32)
+        box, cells, whole = found, _cells(packed, FINER), False
         if not shrunk:
             break
     seen = float(sums[1]) if sums[3] > 0.0 else 0.0
@@ -205,6 +236,9 @@ def _scan(
     """Run the pre-pass over a box at one wavelength."""
     arguments = (*_arguments(packed, w, path, tilt), path.stop_crossings, iris_radius, view_radius)
     found, sums = find_box(*arguments, box, *cells)
+    if packed.halves == 1:
+        # the kernel counts every ray for its mirror image too
+        sums[:3] *= 0.5
     return found, sums
 
 
@@ -248,9 +282,9 @@ def trace_grid(
     rim_tolerance = flux_tolerance * sqrt(region.share)
     pupil, data, triangles = build_mesh(
         *_arguments(packed, fitted, path, tilt), path.stop_crossings, *iris,
-        region.box, *GRID, MAX_LEVEL, tolerance, rim_tolerance, scale, view_radius,
+        region.box, *_cells(packed, GRID), MAX_LEVEL, tolerance, rim_tolerance, scale, view_radius,
     )  # fmt: skip
-    return Bundle(path, pupil, triangles, dict(zip(fitted, data, strict=True)))
+    return Bundle(path, pupil, triangles, dict(zip(fitted, data, strict=True)), packed.halves)
 
 
 def trace_bundle(packed: PackedLens, w: int, bundle: Bundle, tilt: float) -> Floats:

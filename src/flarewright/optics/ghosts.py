@@ -16,7 +16,7 @@ from ..kernels.trace import ALIVE, REL, STOP_X, WEIGHT, X, Y
 from ..model import AsLens, CoatingChoice, Iris, Lens
 from .bundle import Bundle, Incidence, find_region, incidence, trace_bundle, trace_grid, trace_points
 from .iris import blade_edges
-from .pack import PackedLens, pack_lens, resolve_coatings
+from .pack import PackedLens, facing, pack_lens, resolve_coatings
 from .paraxial import D_LINE_NM, FirstOrder, first_order, path_matrices
 from .paths import LightPath, direct_path, ghost_paths
 
@@ -138,6 +138,7 @@ def ghost_table(
     coatings = resolve_coatings(lens, AsLens() if coating is None else coating)
     packed = pack_lens(lens, order, coatings, np.array([wavelength_nm]))
     light = incidence(field_deg)
+    packed = facing(packed, light.axes)
     todo = (direct_path(lens), *ghost_paths(lens, paths))
     with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
         measured = list(pool.map(lambda path: _measure(lens, packed, path, light), todo))
@@ -178,7 +179,9 @@ def _measure(lens: Lens, packed: PackedLens, path: LightPath, light: Incidence) 
             packed, path, light.tilt, (packed.stop_semi, packed.stop_semi), region, tolerance=0.25, scale=scale
         )
         data = trace_bundle(packed, 0, bundle, light.tilt)
-        sums = measure_bundle(data, bundle.pupil, bundle.triangles, path.stop_crossings, blades, light.axes)
+        sums = measure_bundle(
+            data, bundle.pupil, bundle.triangles, path.stop_crossings, blades, light.axes, bundle.halves
+        )
         sums[:4] += _frayed(packed, bundle, data, light, float(sums[0]))
         if sums[0] <= 0.0:
             return nothing
@@ -220,14 +223,15 @@ def _frayed(packed: PackedLens, bundle: Bundle, data: Floats, light: Incidence, 
         at = STOP_X + 2 * crossing
         passes &= np.hypot(rays[:, at], rays[:, at + 1]) <= packed.stop_semi
     # both halves of the pupil: across the meridional plane they cancel
-    weight = np.where(passes, 2.0 * rays[:, WEIGHT], 0.0) * np.repeat(area, len(s))
+    weight = np.where(passes, bundle.halves * rays[:, WEIGHT], 0.0) * np.repeat(area, len(s))
     x, y = np.where(passes, rays[:, X], 0.0), np.where(passes, rays[:, Y], 0.0)
     # the second moment need not exist: the farthest rays are left out, as long as they carry next to nothing
     far = np.argsort(-np.hypot(x, y), kind="stable")
     weight[far[np.cumsum(weight[far]) <= FARTHEST * (flux + weight.sum())]] = 0.0
-    along = float((weight * y).sum())
+    along, across = float((weight * y).sum()), 0.0 if bundle.halves == 2 else float((weight * x).sum())
     moment = float((weight * (x * x + y * y)).sum())
-    return np.array([weight.sum(), -along * light.axes[1, 0], -along * light.axes[1, 1], moment])
+    upright = -(across * light.axes[0] + along * light.axes[1])
+    return np.array([weight.sum(), upright[0], upright[1], moment])
 
 
 def _extent(sums: Floats) -> float:
@@ -247,6 +251,7 @@ def _peak(
     draw_bundle(
         data, bundle.pupil, bundle.triangles, densities, bundle.path.stop_crossings, blades, None, 1.0, light.axes,
         to_pixels, light.cosine, np.array([1.0, 0.0, 0.0]), plane, np.empty(side + 1, dtype=np.float32),
+        bundle.halves,
     )  # fmt: skip
     return float(plane[0].max()) / patch**2, patch
 

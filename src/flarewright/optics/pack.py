@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import get_args
 
@@ -14,6 +14,7 @@ from ..model import AsLens, Coating, CoatingChoice, Everywhere, Lens, PerRow, Pr
 from ..model.coating import StandardName
 from .coatings import film_stack, reflectance_table
 from .paraxial import D_LINE_NM, FirstOrder, gap_indices, vertex_positions
+from .shape import seen_along, shape_table, symmetric
 
 REFLECTANCE_SAMPLES = 1025
 
@@ -34,6 +35,12 @@ class PackedLens:
     sensor_z : float
     stop_semi : float
     first_order : FirstOrder
+    shapes : ndarray, shape (K, P), or None
+        Form and place of the rows in the lens' frame (`optics.shape.shape_table`); None when all are centred conics.
+    symmetric : bool
+        Whether the lens is one of revolution, so that half a bundle tells all of it.
+    faced : ndarray, shape (K, P), or None
+        `shapes` in the meridional frame of one light (`facing`).
     """
 
     curvature: NDArray[np.float64]
@@ -47,6 +54,24 @@ class PackedLens:
     sensor_z: float
     stop_semi: float
     first_order: FirstOrder
+    shapes: NDArray[np.float64] | None = None
+    symmetric: bool = True
+    faced: NDArray[np.float64] | None = None
+
+    @property
+    def halves(self) -> int:
+        """How many halves of the pupil a traced bundle stands for: 2 by mirror symmetry, else the 1 it is."""
+        return 2 if self.symmetric else 1
+
+    @property
+    def form(self) -> NDArray[np.float64]:
+        """What kernels take as `conic`: the conic constants, or the shape table as the light sees it."""
+        if self.shapes is None:
+            return self.conic
+        if self.symmetric:
+            return self.shapes
+        assert self.faced is not None, "a lens that is not one of revolution is traced towards a light: facing()"
+        return self.faced
 
     @property
     def first_surface(self) -> int:
@@ -145,7 +170,27 @@ def pack_lens(
         sensor_z=float(z[-1] + first_order.sensor_distance),
         stop_semi=first_order.stop_semi_diameter,
         first_order=first_order,
+        shapes=shape_table(lens),
+        symmetric=symmetric(lens),
     )
+
+
+def facing(packed: PackedLens, axes: NDArray[np.float64]) -> PackedLens:
+    """Turn a lens towards a light: only for those that are not ones of revolution it makes a difference.
+
+    Parameters
+    ----------
+    packed : PackedLens
+    axes : ndarray, shape (2, 2)
+        The light's (`optics.bundle.Incidence.axes`).
+
+    Returns
+    -------
+    PackedLens
+    """
+    if packed.symmetric or packed.shapes is None:
+        return packed
+    return replace(packed, faced=seen_along(packed.shapes, axes))
 
 
 def _reflectance(

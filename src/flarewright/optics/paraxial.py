@@ -36,6 +36,9 @@ class FirstOrder:
         The opening that gives the f-number.
     sensor_distance : float
         Last vertex to sensor.
+    efl_x, bfl_x : float or None
+        Focal length and back focus in the x-z plane, where they differ from those in the y-z plane (cylinders,
+        toroids); everything else is that of the y-z plane. None: the same. Infinite where that plane has no power.
     """
 
     efl: float
@@ -47,6 +50,8 @@ class FirstOrder:
     exit_pupil_z: float
     stop_semi_diameter: float
     sensor_distance: float
+    efl_x: float | None = None
+    bfl_x: float | None = None
 
 
 def vertex_positions(lens: Lens) -> NDArray[np.float64]:
@@ -65,7 +70,7 @@ def gap_indices(lens: Lens, wavelength_nm: float) -> NDArray[np.float64]:
 
 
 def path_matrices(lens: Lens, path: LightPath, wavelength_nm: float, sensor_z: float) -> tuple[list[Matrix], Matrix]:
-    """Multiply the matrices along a path.
+    """Multiply the matrices along a path, in the y-z plane.
 
     Parameters
     ----------
@@ -83,6 +88,12 @@ def path_matrices(lens: Lens, path: LightPath, wavelength_nm: float, sensor_z: f
         First vertex to sensor: Ms Ma.
     """
     curvature = np.array([row.curvature if isinstance(row, Surface) else 0.0 for row in lens.rows])
+    return _along(lens, path, curvature, wavelength_nm, sensor_z)
+
+
+def _along(
+    lens: Lens, path: LightPath, curvature: NDArray[np.float64], wavelength_nm: float, sensor_z: float
+) -> tuple[list[Matrix], Matrix]:
     to_stop = np.empty((path.stop_crossings, 2, 2))
     n, z = gap_indices(lens, wavelength_nm), vertex_positions(lens)
     total = _path_matrices(path.rows, path.actions, curvature, z, n, sensor_z, to_stop)
@@ -157,7 +168,18 @@ def first_order(
         exit_pupil_z=last + exit_z,
         stop_semi_diameter=float(abs(sa) * pupil / 2.0),
         sensor_distance=_sensor(lens, system, sensor_distance, focus_distance),
+        **_meridian_x(lens, wavelength_nm, last),
     )
+
+
+def _meridian_x(lens: Lens, wavelength_nm: float, last: float) -> dict[str, float]:
+    """Focal length and back focus in the x-z plane, if it is another lens there."""
+    curvature = np.array([row.meridian_x[0] if isinstance(row, Surface) else 0.0 for row in lens.rows])
+    if all(c == getattr(row, "curvature", 0.0) for c, row in zip(curvature, lens.rows, strict=True)):
+        return {}
+    _, ((a, _), (c, _)) = _along(lens, direct_path(lens), curvature, wavelength_nm, last)
+    afocal = abs(c) < 1e-9
+    return {"efl_x": float("inf") if afocal else -1.0 / c, "bfl_x": float("inf") if afocal else -a / c}
 
 
 def _exit_pupil(rear: Matrix, stop_diameter: float) -> tuple[float, float]:

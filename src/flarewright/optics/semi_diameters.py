@@ -8,7 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..model import Lens, Stop, Surface
-from .paraxial import first_order
+from .paraxial import D_LINE_NM, FirstOrder, first_order, path_matrices
+from .paths import direct_path
+from .shape import ideal, sag, transposed
 from .trace import trace_polylines
 
 # half diagonal of 36 x 24 mm, for lenses that do not state their field
@@ -50,7 +52,7 @@ def complete(lens: Lens) -> Lens:
     missing = [k for k, row in enumerate(lens.rows) if isinstance(row, Surface) and row.semi_diameter is None]
     if not missing:
         return lens
-    needed = np.maximum(_beam_radius(lens, 0.0, 1.0), _beam_radius(lens, half_field(lens), CORNER_PUPIL)) * ALLOWANCE
+    needed = _needed(lens) * ALLOWANCE
     rows = list(lens.rows)
     for k in missing:
         row = rows[k]
@@ -61,19 +63,40 @@ def complete(lens: Lens) -> Lens:
     return completed
 
 
-def _beam_radius(lens: Lens, angle: float, part: float) -> NDArray[np.float64]:
-    """Largest height of the meridional rays from `angle` that cross the stop within `part` of its radius, per row."""
-    order = first_order(lens)
-    stop = order.stop_semi_diameter * part
+def _needed(lens: Lens) -> NDArray[np.float64]:
+    """Largest height of the light on every row, of the lens as designed, in both its meridians."""
+    plain = ideal(lens)
+    order = first_order(plain)
+    needed = _meridian(plain, half_field(plain), order, order.entrance_pupil_diameter)
+    if not any(isinstance(row, Surface) and row.toroidal for row in plain.rows):
+        return needed
+    other = transposed(plain)
+    (to_stop,), _ = path_matrices(other, direct_path(other), D_LINE_NM, 0.0)
+    pupil = 2.0 * order.stop_semi_diameter / max(abs(float(to_stop[0, 0])), 1e-9)
+    angle = half_field(plain)
+    if plain.field_deg is None and order.efl_x is not None and order.efl_x > 0.0:
+        angle = atan(IMAGE_RADIUS / order.efl_x)
+    return np.maximum(needed, _meridian(other, angle, order, pupil))
+
+
+def _meridian(lens: Lens, angle: float, order: FirstOrder, pupil: float) -> NDArray[np.float64]:
+    """Largest height of the light in the y-z plane, on the axis and from the corner."""
+    stop, distance = order.stop_semi_diameter, order.sensor_distance
+    on_axis = _beam_radius(lens, 0.0, stop, pupil, distance)
+    return np.maximum(on_axis, _beam_radius(lens, angle, stop * CORNER_PUPIL, pupil, distance))
+
+
+def _beam_radius(lens: Lens, angle: float, stop: float, pupil: float, distance: float) -> NDArray[np.float64]:
+    """Largest height of the meridional rays from `angle` that cross the stop within a height, per row."""
     chief, step, found = 0.0, 0.0, 0.0
     # walk the chief ray out from the axis: the pupil of a wide angle wanders, and other branches may reach the stop too
     for at in np.linspace(0.0, angle, 1 if angle == 0.0 else FIELD_STEPS + 1):
-        aimed = _aim(lens, float(at), chief + step, order.entrance_pupil_diameter)
+        aimed = _aim(lens, float(at), chief + step, pupil, distance)
         if aimed is None:
             break
         chief, step, found = aimed, aimed - chief, float(at)
-    y = np.linspace(chief - 1.5 * order.entrance_pupil_diameter, chief + 1.5 * order.entrance_pupil_diameter, 1201)
-    hits = trace_polylines(lens, None, np.zeros_like(y), y, -found)
+    y = np.linspace(chief - 1.5 * pupil, chief + 1.5 * pupil, 1201)
+    hits = trace_polylines(lens, None, np.zeros_like(y), y, -found, sensor_distance=distance)
     passing = np.isfinite(hits[:, -1, 1]) & (np.abs(hits[:, 1 + lens.stop_row, 1]) <= stop)
     # only the beam that hangs together with the chief ray
     blocked = np.flatnonzero(~passing)
@@ -86,10 +109,10 @@ def _beam_radius(lens: Lens, angle: float, part: float) -> NDArray[np.float64]:
     return heights
 
 
-def _aim(lens: Lens, angle: float, guess: float, reach: float) -> float | None:
+def _aim(lens: Lens, angle: float, guess: float, reach: float, distance: float) -> float | None:
     """Find where the ray through the middle of the stop crosses the plane of the first vertex, near a guess."""
     y = np.linspace(guess - reach, guess + reach, 401)
-    hits = trace_polylines(lens, None, np.zeros_like(y), y, -angle)
+    hits = trace_polylines(lens, None, np.zeros_like(y), y, -angle, sensor_distance=distance)
     at_stop = np.where(np.isfinite(hits[:, -1, 1]), hits[:, 1 + lens.stop_row, 1], np.nan)
     crossing = np.flatnonzero(at_stop[:-1] * at_stop[1:] <= 0.0)
     if crossing.size == 0:
@@ -101,14 +124,17 @@ def _aim(lens: Lens, angle: float, guess: float, reach: float) -> float | None:
 
 def _own_limit(row: Surface) -> float:
     """Largest radius at which the surface still faces the axis."""
-    if row.curvature == 0.0 or row.conic <= -1.0:
-        return 2000.0
-    return 0.98 / (abs(row.curvature) * sqrt(1.0 + row.conic))
+    limit = 2000.0
+    for curvature, conic in (row.meridian_x, (row.curvature, row.conic)):
+        if curvature != 0.0 and conic > -1.0:
+            limit = min(limit, 0.98 / (abs(curvature) * sqrt(1.0 + conic)))
+    return limit
 
 
-def _sag(row: Surface, r: float) -> float:
-    c = row.curvature
-    return c * r * r / (1.0 + sqrt(max(1.0 - (1.0 + row.conic) * c * c * r * r, 0.0)))
+def _edge_gap(front: Surface, back: Surface, r: float) -> float:
+    """Least distance between two surfaces at a height, over both meridians."""
+    x, y = np.array([0.0, r]), np.array([r, 0.0])
+    return float((front.thickness + sag(back, x, y) - sag(front, x, y)).min())
 
 
 def _keep_apart(rows: list[Surface | Stop], estimated: set[int]) -> None:
@@ -121,7 +147,7 @@ def _keep_apart(rows: list[Surface | Stop], estimated: set[int]) -> None:
         assert back.semi_diameter is not None
         common = min(front.semi_diameter, back.semi_diameter)
         limit = common
-        while limit > 0.2 * common and front.thickness + _sag(back, limit) - _sag(front, limit) < EDGE:
+        while limit > 0.2 * common and _edge_gap(front, back, limit) < EDGE:
             limit *= 0.98
         if limit < common:
             for m, row in ((k, front), (k + 1, back)):

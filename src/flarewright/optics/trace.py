@@ -8,9 +8,10 @@ from numpy.typing import NDArray
 from ..kernels.trace import trace_hits
 from ..model import Lens
 from .bundle import incidence, trace_points
-from .pack import PackedLens
+from .pack import PackedLens, facing
 from .paraxial import D_LINE_NM, first_order, gap_indices, vertex_positions
 from .paths import LightPath, direct_path, ghost_path
+from .shape import shape_table
 
 Floats = NDArray[np.float64]
 
@@ -39,6 +40,7 @@ def trace_rays(
         crossing.
     """
     light = incidence(field_deg)
+    packed = facing(packed, light.axes)
     data = trace_points(packed, w, path, light.tilt, np.stack([x, y], axis=1) @ light.axes.T)
     with np.errstate(invalid="ignore"):  # rays that ended hold whatever their last step left
         on_sensor, at_stop = data[:, 0:2] @ light.axes, data[:, -2:] @ light.axes
@@ -63,7 +65,7 @@ def trace_polylines(
     sensor_distance: float | None = None,
     wavelength_nm: float = D_LINE_NM,
 ) -> Floats:
-    """Trace rays and keep every hit, in the meridional frame.
+    """Trace rays and keep every hit; the rays run in the lens' y-z plane, or askew to it where x is not 0.
 
     Parameters
     ----------
@@ -89,7 +91,8 @@ def trace_polylines(
     distance = first_order(lens).sensor_distance if sensor_distance is None else sensor_distance
     # a stop neither bends nor shifts anything, so its curvature 0 is only a place holder in the arrays
     curvature = np.array([getattr(row, "curvature", 0.0) for row in lens.rows])
-    conic = np.array([getattr(row, "conic", 0.0) for row in lens.rows])
+    shapes = shape_table(lens)
+    conic = np.array([getattr(row, "conic", 0.0) for row in lens.rows]) if shapes is None else shapes
     hits = np.empty((len(x), len(path.rows) + 2, 3))
     n = gap_indices(lens, wavelength_nm)
     start_x, start_y = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)

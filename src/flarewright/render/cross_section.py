@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ProjectError
-from ..model import Lens, Surface
+from ..model import Lens, Row, Surface
 from ..optics.paraxial import FirstOrder, vertex_positions
+from ..optics.shape import places, sag
 
 Floats = NDArray[np.float64]
 
@@ -140,13 +141,14 @@ def _semi(row: object, order: FirstOrder) -> float:
     return order.stop_semi_diameter
 
 
-def _profile(row: object, vertex: float, semi: float) -> Floats:
+def _profile(row: Row, vertex: float, semi: float, place: tuple[Floats, Floats]) -> Floats:
     """Return points (z, y) along a surface, from its lower to its upper rim."""
-    curvature, conic = (row.curvature, row.conic) if isinstance(row, Surface) else (0.0, 0.0)
     y = np.linspace(-semi, semi, 65)
-    # Beyond the equator of a sphere there is no surface to draw.
-    root = np.sqrt(np.maximum(1.0 - (1.0 + conic) * curvature**2 * y**2, 0.0))
-    return np.stack([vertex + curvature * y**2 / (1.0 + root), y], axis=1)
+    own = np.stack([np.zeros_like(y), y, sag(row, np.zeros_like(y), y)], axis=1)
+    # A decentred or tilted surface is cut where it is; what lies before or behind the paper is left out.
+    origin, axes = place
+    seen = own @ axes + origin
+    return np.stack([vertex + seen[:, 2], seen[:, 1]], axis=1)
 
 
 def _draw_glass(sheet: _Sheet, lens: Lens, z: Floats, semi: list[float], k: int) -> None:
@@ -154,9 +156,13 @@ def _draw_glass(sheet: _Sheet, lens: Lens, z: Floats, semi: list[float], k: int)
     row = lens.rows[k]
     if not isinstance(row, Surface) or row.medium is None:
         return
-    front, back = _profile(row, float(z[k]), semi[k]), _profile(lens.rows[k + 1], float(z[k + 1]), semi[k + 1])
-    rim = max(semi[k], semi[k + 1])
-    outline = [*front, [front[-1, 0], rim], [back[-1, 0], rim], *back[::-1], [back[0, 0], -rim], [front[0, 0], -rim]]
+    at = places(lens)
+    front = _profile(row, float(z[k]), semi[k], at[k])
+    back = _profile(lens.rows[k + 1], float(z[k + 1]), semi[k + 1], at[k + 1])
+    top, bottom = max(front[-1, 1], back[-1, 1]), min(front[0, 1], back[0, 1])
+    outline = [
+        *front, [front[-1, 0], top], [back[-1, 0], top], *back[::-1], [back[0, 0], bottom], [front[0, 0], bottom],
+    ]  # fmt: skip
     flint = row.medium.v_d is not None and row.medium.v_d < 50.0
     points = " ".join(f"{px:.2f},{py:.2f}" for px, py in (sheet.at(a, b) for a, b in outline))
     sheet.parts.append(
@@ -169,10 +175,11 @@ def _draw_surfaces(sheet: _Sheet, lens: Lens, z: Floats, semi: list[float]) -> N
     """Draw every refracting surface over the rays, and number the rows above the glass."""
     top = sheet.middle - max(semi) * sheet.scale
     previous = -100.0
+    at = places(lens)
     level = 0
     for k, row in enumerate(lens.rows):
         if isinstance(row, Surface):
-            sheet.line(_profile(row, float(z[k]), semi[k]), f'stroke="{_EDGE}" stroke-width="1.3"')
+            sheet.line(_profile(row, float(z[k]), semi[k], at[k]), f'stroke="{_EDGE}" stroke-width="1.3"')
         px, _ = sheet.at(float(z[k]), 0.0)
         # Numbers of close rows step up so that they stay legible.
         level = (level + 1) % 3 if px - previous < 13.0 else 0

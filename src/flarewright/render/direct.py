@@ -69,7 +69,7 @@ def direct_image(lens: Lens, shot: Shot) -> DirectImage:
     place, mean = (0.0, 0.0), 0.0
     for w in range(count):
         data = trace_bundle(packed, w, bundle, tilt)
-        sums = measure_bundle(data, bundle.pupil, bundle.triangles, 1, opening.blades, axes)
+        sums = measure_bundle(data, bundle.pupil, bundle.triangles, 1, opening.blades, axes, bundle.halves)
         flux[w] = sums[0] * shot.incidence.cosine
         if opening.mask is not None and sums[0] > 0.0:
             flux[w] = _through_mask(shot, bundle, data, sums)
@@ -89,7 +89,7 @@ def _through_mask(shot: Shot, bundle: Bundle, data: Floats, sums: Floats) -> flo
     draw_bundle(
         data, bundle.pupil, bundle.triangles, densities, bundle.path.stop_crossings, opening.blades, opening.mask,
         opening.half, shot.incidence.axes, to_pixels, shot.incidence.cosine, np.array([1.0, 0.0, 0.0]), plane,
-        np.empty(side + 1, dtype=np.float32),
+        np.empty(side + 1, dtype=np.float32), bundle.halves,
     )  # fmt: skip
     return float(plane[0].sum(dtype=np.float64))
 

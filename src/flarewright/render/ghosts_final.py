@@ -168,7 +168,7 @@ def draw_final(
             draw_bundle(
                 data, bundle.pupil, bundle.triangles, node_densities(data, bundle.pupil, bundle.triangles),
                 path.stop_crossings, opening.blades, opening.mask, opening.half, shot.incidence.axes,
-                to_pixels, shot.gain, rgb, *canvas.scratch(detail),
+                to_pixels, shot.gain, rgb, *canvas.scratch(detail), bundle.halves,
             )  # fmt: skip
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..errors import LensError, ProjectError
+from ..io.height_image import read_heights
 from ..io.lens_file import read_lens
 from ..io.library import lens_path
 from ..io.media import complete as complete_media
@@ -66,7 +67,7 @@ def complete_lens(lens: Lens, *, remarks: list[str] | None = None) -> Lens:
     LensError
         When the lens makes no image by itself.
     """
-    known, found = complete_media(lens)
+    known, found = complete_media(_with_heights(lens))
     if remarks is not None:
         remarks.extend(found)
     order = first_order(known)
@@ -83,6 +84,19 @@ def complete_lens(lens: Lens, *, remarks: list[str] | None = None) -> Lens:
         if stated is not None and abs(order.efl / stated - 1.0) > 0.02:
             remarks.append(f"the focal length is {order.efl:.2f} mm, the file says {stated:g} mm")
     return full
+
+
+def _with_heights(lens: Lens) -> Lens:
+    """Read the images of figure errors."""
+    rows = []
+    for row in lens.rows:
+        figure = row.figure if isinstance(row, Surface) else None
+        if figure is not None and figure.image is not None and figure.heights is None:
+            rows.append(row.replace(figure=figure.replace(heights=read_heights(figure.image))))
+        else:
+            rows.append(row)
+    found: Lens = lens if all(a is b for a, b in zip(rows, lens.rows, strict=True)) else lens.replace(rows=tuple(rows))
+    return found
 
 
 def as_lens(lens: Lens | str | Path, *, remarks: list[str] | None = None) -> Lens:

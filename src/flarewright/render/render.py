@@ -10,6 +10,7 @@ from typing import Any
 from ..io.mask_image import read_mask
 from ..model import Layer, Project
 from ..optics.bundle import incidence
+from ..optics.pack import facing
 from ..optics.paths import ghost_paths
 from .art import ResolvedArt, graded, resolve_art
 from .compose import beauty
@@ -110,7 +111,8 @@ def _scene_scale(settled: Settled, shot: Shot) -> float:
     1 / (2 N), and it shrinks as the sensor moves away for a near plane.
     """
     order = settled.order
-    on_axis = direct_image(settled.lens, replace(shot, incidence=incidence((0.0, 0.0))))
+    axis = incidence((0.0, 0.0))
+    on_axis = direct_image(settled.lens, replace(shot, incidence=axis, packed=facing(shot.packed, axis.axes)))
     sensor_z = shot.packed.sensor_z
     slope = 0.5 / order.f_number
     if isfinite(order.exit_pupil_z):

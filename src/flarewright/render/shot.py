@@ -12,7 +12,7 @@ from ..model import Light, Project
 from ..model.camera import Colorspace
 from ..optics.bundle import Incidence, incidence
 from ..optics.iris import blade_edges, outline
-from ..optics.pack import PackedLens, pack_lens, resolve_coatings
+from ..optics.pack import PackedLens, facing, pack_lens, resolve_coatings
 from ..optics.spectrum import band_weights, traced_wavelengths
 from .prepare import Settled
 
@@ -172,7 +172,7 @@ def make_shots(settled: Settled, opening: Opening) -> tuple[Shot, ...]:
         if key not in packs:
             packs[key] = pack_lens(settled.lens, settled.order, coatings, wavelengths_nm)
         colorspace = project.output.colorspace
-        shots.append(
-            Shot(light, incidence(light.field_deg), packs[key], opening, to_pixels, (width, height), colorspace)
-        )
+        seen = incidence(light.field_deg)
+        packed = facing(packs[key], seen.axes)
+        shots.append(Shot(light, seen, packed, opening, to_pixels, (width, height), colorspace))
     return tuple(shots)

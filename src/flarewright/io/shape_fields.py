@@ -1,0 +1,270 @@
+"""The keys of a lens file that shape and move surfaces: aspheres, toroids, decentre, tilt, figure errors, elements."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from flarewright.model import Element, Figure, Surface
+from flarewright.model.figure import LARGEST_NM, MOST_NOLL
+from flarewright.model.lens import MOST_TERMS
+
+from .lens_fields import CURVATURE, NumberField
+from .sentences import did_you_mean, shorten, validation_sentences
+
+ELEMENT_KEYS = ("rows", "decentre", "tilt_deg")
+FIGURE_KEYS = ("zernike_nm", "zernike_waves", "image", "peak_valley_nm")
+
+CONIC_X = NumberField("conic constant in the x-z plane; left out: `conic`", -1e6, 1e6, unit="")
+TERM = NumberField("a term of A4 r^4 + A6 r^6 + ...", -1e3, 1e3, unit="")
+OFFSET = NumberField("decentre", -100.0, 100.0)
+TILT = NumberField("tilt", -45.0, 45.0, unit="degrees")
+HEIGHT_NM = NumberField("height", -LARGEST_NM, LARGEST_NM, unit="nm")
+
+WAVE_NM = 632.8
+"""Figure errors in waves are waves of the red helium-neon line, as test plates are read."""
+
+
+def read_shape(entry: dict[str, Any], where: str, folder: Path | None, problems: list[str]) -> dict[str, Any]:
+    """Check the shape keys of a row.
+
+    Parameters
+    ----------
+    entry : dict
+        The row as written; its `radius_x` and `curvature_x` are read by the caller, like `radius`.
+    where : str
+        "row 3", for messages.
+    folder : path or None
+        Where a relative image path starts.
+    problems : list of str
+        Findings are appended.
+
+    Returns
+    -------
+    dict
+        Fields for `model.Surface`.
+    """
+    values: dict[str, Any] = {}
+    if "conic_x" in entry and (number := _number(entry["conic_x"], f"{where}: conic_x", CONIC_X, problems)) is not None:
+        values["conic_x"] = number
+    if "asphere" in entry:
+        terms = _numbers(entry["asphere"], f"{where}: asphere", TERM, problems)
+        if terms is not None and not 1 <= len(terms) <= MOST_TERMS:
+            problems.append(f"{where}: asphere has {len(terms)} terms: give 1 to {MOST_TERMS}, A4 first, A6 next, ...")
+        elif terms is not None:
+            values["asphere"] = terms
+    for key, field in (("decentre", OFFSET), ("tilt_deg", TILT)):
+        if key in entry and (pair := _pair(entry[key], f"{where}: {key}", field, problems)) is not None:
+            values[key] = pair
+    if "figure" in entry:
+        values["figure"] = _figure(entry["figure"], f"{where}: figure", folder, problems)
+    return values
+
+
+def read_elements(table: object, problems: list[str]) -> tuple[Element, ...]:
+    """Check the `[[elements]]` of a lens file; what they make together the lens itself checks."""
+    if not isinstance(table, list):
+        problems.append(f"elements is {shorten(table)}: write [[elements]] with rows = [FIRST, LAST] below it")
+        return ()
+    found = []
+    for number, entry in enumerate(table):
+        where = f"element {number}"
+        if not isinstance(entry, dict):
+            problems.append(f"{where} is {shorten(entry)}: a table with rows = [FIRST, LAST] was expected")
+            continue
+        before = len(problems)
+        _unknown(entry, ELEMENT_KEYS, where, problems)
+        rows = entry.get("rows")
+        if not (isinstance(rows, list) and len(rows) == 2 and all(type(row) is int for row in rows)):
+            problems.append(f"{where}: rows is {shorten(rows)}: give its first and last row, rows = [0, 2] for example")
+        fields: dict[str, Any] = {"rows": rows}
+        for key, field in (("decentre", OFFSET), ("tilt_deg", TILT)):
+            if key in entry and (pair := _pair(entry[key], f"{where}: {key}", field, problems)) is not None:
+                fields[key] = pair
+        if len(problems) == before:
+            found.append(Element(**fields))
+    return tuple(found)
+
+
+def _figure(value: object, where: str, folder: Path | None, problems: list[str]) -> Figure | None:
+    if not isinstance(value, dict):
+        problems.append(f"{where} is {shorten(value)}: a table like {{ zernike_nm = {{ 5 = 30 }} }} was expected")
+        return None
+    before = len(problems)
+    _unknown(value, FIGURE_KEYS, where, problems)
+    fields: dict[str, Any] = {}
+    if "zernike_nm" in value and "zernike_waves" in value:
+        problems.append(f"{where}: zernike_nm and zernike_waves are both given: keep one")
+    for key, unit_nm in (("zernike_nm", 1.0), ("zernike_waves", WAVE_NM)):
+        if key in value:
+            fields["zernike_nm"] = _zernike(value[key], f"{where}.{key}", unit_nm, problems)
+    if "image" in value:
+        if not isinstance(value["image"], str) or not value["image"].strip():
+            problems.append(f"{where}: image is {shorten(value['image'])}, the path of a grey picture was expected")
+        else:
+            fields["image"] = str((folder or Path()) / value["image"])
+    if "peak_valley_nm" in value:
+        fields["peak_valley_nm"] = _number(value["peak_valley_nm"], f"{where}: peak_valley_nm", HEIGHT_NM, problems)
+    if not value:
+        problems.append(f"{where} is empty: give zernike_nm, or image and peak_valley_nm")
+    if len(problems) > before:
+        return None
+    try:
+        return Figure(**fields)
+    except ValidationError as error:
+        problems += [f"{where}: {sentence}" for sentence in validation_sentences(error)]
+        return None
+
+
+def _zernike(value: object, where: str, unit_nm: float, problems: list[str]) -> tuple[tuple[int, float], ...]:
+    if not isinstance(value, dict):
+        problems.append(f"{where} is {shorten(value)}: a table {{ NOLL_INDEX = amplitude }} was expected, {{ 5 = 30 }}")
+        return ()
+    terms = []
+    for key, amplitude in value.items():
+        if not (key.isdecimal() and 2 <= int(key) <= MOST_NOLL):
+            problems.append(f"{where}: {shorten(key)} is no term: Noll's index runs from 2 (tilt) to {MOST_NOLL}")
+            continue
+        number = _number(amplitude, f"{where}: term {key}", HEIGHT_NM, problems)
+        if number is not None and abs(number * unit_nm) > LARGEST_NM:
+            problems.append(
+                f"{where}: term {key} is {number:g}: no figure error is larger than {LARGEST_NM / 1e3:g} um"
+            )
+        elif number is not None:
+            terms.append((int(key), number * unit_nm))
+    return tuple(terms)
+
+
+def shape_parts(row: Surface, number: Any, quoted: Any, radius: Any) -> list[str]:
+    """Write the shape keys of a row, as `key = value`.
+
+    Parameters
+    ----------
+    row : Surface
+    number, quoted : callable
+        Write a number, a text.
+    radius : callable
+        Write a curvature under a radius' key.
+
+    Returns
+    -------
+    list of str
+    """
+    parts = []
+    if row.curvature_x is not None:
+        parts.append(radius(row.curvature_x, "_x"))
+    if row.conic_x is not None:
+        parts.append(f"conic_x = {number(row.conic_x)}")
+    for key in ("asphere", "decentre", "tilt_deg"):
+        values = getattr(row, key)
+        if values:
+            parts.append(f"{key} = [{', '.join(map(number, values))}]")
+    if row.figure is not None:
+        inner = []
+        if row.figure.zernike_nm:
+            terms = ", ".join(f"{index} = {number(value)}" for index, value in row.figure.zernike_nm)
+            inner.append(f"zernike_nm = {{ {terms} }}")
+        if row.figure.image is not None:
+            inner.append(f"image = {quoted(row.figure.image)}")
+            inner.append(f"peak_valley_nm = {number(row.figure.peak_valley_nm)}")
+        # a figure without a term is an ideal surface
+        if inner:
+            parts.append(f"figure = {{ {', '.join(inner)} }}")
+    return parts
+
+
+def shape_schema() -> dict[str, Any]:
+    """Return the JSON Schema of a row's shape keys, but for `radius_x`."""
+    pair = {"type": "array", "minItems": 2, "maxItems": 2}
+    return {
+        "curvature_x": CURVATURE.schema(),
+        "conic_x": CONIC_X.schema(),
+        "asphere": {
+            "type": "array",
+            "minItems": 1,
+            "maxItems": MOST_TERMS,
+            "items": TERM.schema(),
+            "description": "A4, A6, ... of the sag's even terms, 1/mm^3, 1/mm^5, ...",
+        },
+        "decentre": {**pair, "items": OFFSET.schema(), "description": "x and y of the vertex beside the axis, mm"},
+        "tilt_deg": {**pair, "items": TILT.schema(), "description": "turns about x, then about y, at the vertex"},
+        "figure": {
+            "type": "object",
+            "additionalProperties": False,
+            "minProperties": 1,
+            "description": "departure from the ideal form",
+            "properties": {
+                "zernike_nm": _zernike_schema("rms in nm of each term by Noll's index"),
+                "zernike_waves": _zernike_schema(f"the same in waves of {WAVE_NM} nm"),
+                "image": {"type": "string", "minLength": 1, "description": "grey picture of the heights"},
+                "peak_valley_nm": {**HEIGHT_NM.schema(), "description": "height from black to white, nm"},
+            },
+            "dependentRequired": {"image": ["peak_valley_nm"], "peak_valley_nm": ["image"]},
+        },
+    }
+
+
+def _zernike_schema(about: str) -> dict[str, Any]:
+    return {
+        "type": "object",
+        "propertyNames": {"pattern": "^(0*[2-9]|0*1[0-9]|0*2[0-8])$"},
+        "additionalProperties": {"type": "number"},
+        "description": about,
+    }
+
+
+def elements_schema() -> dict[str, Any]:
+    """Return the JSON Schema of `elements`."""
+    shapes = shape_schema()
+    return {
+        "type": "array",
+        "description": "groups of rows that stand beside the axis or askew",
+        "items": {
+            "type": "object",
+            "additionalProperties": False,
+            "required": ["rows"],
+            "properties": {
+                "rows": {
+                    "type": "array",
+                    "minItems": 2,
+                    "maxItems": 2,
+                    "items": {"type": "integer", "minimum": 0},
+                    "description": "first and last row of it; it holds no stop",
+                },
+                "decentre": shapes["decentre"],
+                "tilt_deg": {**shapes["tilt_deg"], "description": "turns about x, then y, at its first row's vertex"},
+            },
+        },
+    }
+
+
+def _pair(value: object, where: str, field: NumberField, problems: list[str]) -> tuple[float, ...] | None:
+    numbers = _numbers(value, where, field, problems)
+    if numbers is not None and len(numbers) != 2:
+        problems.append(f"{where} has {len(numbers)} numbers: give two, [x, y]")
+        return None
+    return numbers
+
+
+def _numbers(value: object, where: str, field: NumberField, problems: list[str]) -> tuple[float, ...] | None:
+    if not isinstance(value, list):
+        problems.append(f"{where} is {shorten(value)}, a list of numbers was expected")
+        return None
+    found = [_number(item, f"{where}[{k}]", field, problems) for k, item in enumerate(value)]
+    return None if None in found else tuple(item for item in found if item is not None)
+
+
+def _number(value: object, where: str, field: NumberField, problems: list[str]) -> float | None:
+    refusal = field.refuse(value)
+    if refusal is None:
+        return float(value)  # type: ignore[arg-type]
+    problems.append(f"{where} {refusal}")
+    return None
+
+
+def _unknown(table: dict[str, Any], known: tuple[str, ...], where: str, problems: list[str]) -> None:
+    problems += [
+        f"{where}: {shorten(key)} is not a known key{did_you_mean(key, known)}" for key in table if key not in known
+    ]

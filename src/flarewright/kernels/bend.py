@@ -1,0 +1,84 @@
+"""What happens to a ray at a surface, and the words in which traces speak of it."""
+
+from math import sqrt
+
+from ._jit import inlined
+
+REFRACT = 0
+REFLECT = 1
+STOP = 2
+
+LANES = 64
+
+# columns of a traced node
+X, Y, WEIGHT, REL, ALIVE = 0, 1, 2, 3, 4
+STOP_X = 5  # then stop y, and the same for a second and third crossing
+
+
+@inlined
+def bend_at(gx, gy, gz, dx, dy, dz, root, heading, eta, mirror):
+    """Refract or reflect a ray where the gradient of the surface is known.
+
+    Parameters
+    ----------
+    gx, gy, gz : float
+        Gradient of sag(x, y) - z, or any multiple of it that points the same way.
+    dx, dy, dz : float
+        Unit direction.
+    root : float
+        -gradient . direction * heading.
+    heading : float
+        +1 or -1, the leg's direction.
+    eta : float
+        Index before over index behind.
+    mirror : float
+        1 reflects, 0 refracts.
+
+    Returns
+    -------
+    nx, ny, nz : float
+        New unit direction.
+    cos_in, cos_out : float
+        Cosines before and behind the surface, both >= 0.
+    inside : float
+        cos_out squared; negative beyond the critical angle.
+
+    Notes
+    -----
+    d' = eta d + (eta c - sqrt k) N and d' = d + 2 c N with c = -N.d, k = 1 - eta^2 (1 - c^2) (docs/physics.md). The
+    normal against the ray is heading * gradient / norm, which holds beyond a sphere's equator too.
+    """
+    inv_norm = 1.0 / sqrt(gx * gx + gy * gy + gz * gz)
+    cos_in = root * inv_norm
+    inside = 1.0 - eta * eta * (1.0 - cos_in * cos_in)
+    cos_out = sqrt(max(inside, 0.0))
+    along = (2.0 * cos_in if mirror > 0.0 else eta * cos_in - cos_out) * heading * inv_norm
+    scale = 1.0 if mirror > 0.0 else eta
+    return scale * dx + along * gx, scale * dy + along * gy, scale * dz + along * gz, cos_in, cos_out, inside
+
+
+@inlined
+def bend(curvature, conic, x, y, z, dx, dy, dz, root, heading, eta, mirror):
+    """Refract or reflect a ray at a hit on a conic.
+
+    Parameters
+    ----------
+    curvature, conic : float
+    x, y, z : float
+        The hit, mm, relative to the vertex.
+    dx, dy, dz : float
+        Unit direction.
+    root : float
+        From `intersect_conic`.
+    heading, eta, mirror
+        As in `bend_at`.
+
+    Returns
+    -------
+    nx, ny, nz, cos_in, cos_out, inside
+        As `bend_at`.
+    """
+    gx = curvature * x
+    gy = curvature * y
+    gz = curvature * (1.0 + conic) * z - 1.0
+    return bend_at(gx, gy, gz, dx, dy, dz, root, heading, eta, mirror)

@@ -1,0 +1,181 @@
+"""Tracing through rows of any shape and place: aspheres, cylinders, toroids, decentre, tilt, figure errors.
+
+Ray by ray, without lanes: compiled only for lenses that have such rows (`kernels.trace.trace_nodes` asks the type of
+its `conic`).
+"""
+
+from math import sqrt
+
+import numpy as np
+
+from ._jit import compiled
+from .bend import ALIVE, REFLECT, REL, STOP, STOP_X, WEIGHT, X, Y, bend_at
+from .intersect import (
+    AXES,
+    CENTRED,
+    CONIC_Y,
+    CURVATURE_Y,
+    KIND,
+    ORIGIN,
+    SAG,
+    intersect_conic,
+    intersect_sag,
+)
+
+
+@compiled
+def cross_shape(shapes, row, vertex, x, y, z, dx, dy, dz, heading, eta, mirror):
+    """Carry a ray to a row of the shape table and through it, or back from it.
+
+    Parameters
+    ----------
+    shapes : ndarray, shape (K, P)
+        The shape table (`kernels.intersect`), in the frame of the ray.
+    row : int
+    vertex : float
+        z of the row's place on the axis, mm.
+    x, y, z, dx, dy, dz : float
+        Start, mm, and unit direction in the lens' frame.
+    heading, eta, mirror
+        As in `kernels.bend.bend_at`.
+
+    Returns
+    -------
+    x, y, z, dx, dy, dz : float
+        The hit and the new direction in the lens' frame.
+    radius2 : float
+        Squared distance of the hit from the surface's own axis, mm^2.
+    cos_in, cos_out : float
+    ok : bool
+        False where the ray misses, is totally reflected where it should refract, or turns the wrong way along its leg.
+    """
+    if shapes[row, KIND] == CENTRED:
+        px, py, pz, ux, uy, uz = x, y, z - vertex, dx, dy, dz
+    else:
+        ox, oy, oz = x - shapes[row, ORIGIN], y - shapes[row, ORIGIN + 1], z - vertex - shapes[row, ORIGIN + 2]
+        px, py, pz = _turn(shapes, row, ox, oy, oz)
+        ux, uy, uz = _turn(shapes, row, dx, dy, dz)
+    if shapes[row, KIND] == SAG:
+        t, gx, gy, ok = intersect_sag(shapes, row, px, py, pz, ux, uy, uz, heading)
+        gz = -1.0
+        root = -heading * (gx * ux + gy * uy - uz)
+        ok = ok and root > 0.0
+        px, py, pz = px + t * ux, py + t * uy, pz + t * uz
+    else:
+        c, kappa = shapes[row, CURVATURE_Y], shapes[row, CONIC_Y]
+        t, root, discriminant = intersect_conic(c, kappa, px, py, pz, ux, uy, uz, heading)
+        ok = discriminant >= 0.0
+        px, py, pz = px + t * ux, py + t * uy, pz + t * uz
+        gx, gy, gz = c * px, c * py, c * (1.0 + kappa) * pz - 1.0
+    nx, ny, nz, cos_in, cos_out, inside = bend_at(gx, gy, gz, ux, uy, uz, max(root, 0.0), heading, eta, mirror)
+    if shapes[row, KIND] != CENTRED:
+        nx, ny, nz = _turn_back(shapes, row, nx, ny, nz)
+    ok = ok and (mirror > 0.0 or inside >= 0.0) and nz * heading * (1.0 - 2.0 * mirror) > 0.0
+    # the ray itself tells the hit in the lens' frame, so nothing has to be turned back for it
+    return x + t * dx, y + t * dy, z + t * dz, nx, ny, nz, px * px + py * py, cos_in, cos_out, ok
+
+
+@compiled
+def _turn(shapes, row, x, y, z):
+    """Components of a vector along a row's own axes."""
+    return (
+        shapes[row, AXES] * x + shapes[row, AXES + 1] * y + shapes[row, AXES + 2] * z,
+        shapes[row, AXES + 3] * x + shapes[row, AXES + 4] * y + shapes[row, AXES + 5] * z,
+        shapes[row, AXES + 6] * x + shapes[row, AXES + 7] * y + shapes[row, AXES + 8] * z,
+    )
+
+
+@compiled
+def _turn_back(shapes, row, x, y, z):
+    """Undo `_turn`."""
+    return (
+        shapes[row, AXES] * x + shapes[row, AXES + 3] * y + shapes[row, AXES + 6] * z,
+        shapes[row, AXES + 1] * x + shapes[row, AXES + 4] * y + shapes[row, AXES + 7] * z,
+        shapes[row, AXES + 2] * x + shapes[row, AXES + 5] * y + shapes[row, AXES + 8] * z,
+    )
+
+
+@compiled
+def trace_shapes(rows, actions, shapes, z_vertex, inv_semi, n_gap, reflectance, sensor_z, tilt, px, py, out):
+    """Trace rays as `kernels.trace.trace_nodes` does, through rows of any shape.
+
+    Parameters
+    ----------
+    rows, actions
+        As in `trace_nodes`.
+    shapes : ndarray, shape (K, P)
+        The shape table (`kernels.intersect`), in the frame of the rays.
+    z_vertex ... out
+        As in `trace_nodes`. A rim belongs to its surface: it is decentred and tilted with it.
+    """
+    samples = reflectance.shape[1]
+    for k in range(px.shape[0]):
+        x, y, z = px[k], py[k], 0.0
+        dx, dy, dz = 0.0, np.sin(tilt), np.cos(tilt)
+        weight, rel2, alive, heading = 1.0, 0.0, 1.0, 1.0
+        crossing = 0
+        for step in range(rows.shape[0]):
+            row = rows[step]
+            vertex = z_vertex[row]
+            if actions[step] == STOP:
+                t = (vertex - z) / dz
+                x, y, z = x + t * dx, y + t * dy, vertex
+                out[k, STOP_X + 2 * crossing], out[k, STOP_X + 2 * crossing + 1] = x, y
+                crossing += 1
+                continue
+            mirror = 1.0 if actions[step] == REFLECT else 0.0
+            n_in, n_out = (n_gap[row], n_gap[row + 1]) if heading > 0.0 else (n_gap[row + 1], n_gap[row])
+            x, y, z, dx, dy, dz, radius2, cos_in, cos_out, ok = cross_shape(
+                shapes, row, vertex, x, y, z, dx, dy, dz, heading, n_in / n_out, mirror
+            )
+            alive = alive if ok else 0.0
+            rel2 = max(rel2, radius2 * inv_semi[row] * inv_semi[row])
+            place = min(cos_in if n_in <= n_out else cos_out, 1.0) * (samples - 1)
+            cell = min(np.int64(place), samples - 2)
+            r = reflectance[row, cell] + (place - cell) * (reflectance[row, cell + 1] - reflectance[row, cell])
+            weight *= r if mirror > 0.0 else 1.0 - r
+            if mirror > 0.0:
+                heading = -heading
+        t = (sensor_z - z) / dz
+        out[k, X], out[k, Y] = x + t * dx, y + t * dy
+        out[k, WEIGHT], out[k, REL], out[k, ALIVE] = weight, sqrt(rel2), alive
+
+
+@compiled
+def hit_shapes(rows, actions, shapes, z_vertex, n_gap, sensor_z, tilt, px, py, hits):
+    """Keep every hit, as `kernels.trace.trace_hits` does, through rows of any shape.
+
+    Parameters
+    ----------
+    rows ... hits
+        As in `trace_hits`, `shapes` as in `trace_shapes`.
+    """
+    for k in range(px.shape[0]):
+        x, y, z = px[k], py[k], 0.0
+        dx, dy, dz = 0.0, np.sin(tilt), np.cos(tilt)
+        for step in range(hits.shape[1]):
+            hits[k, step, 0], hits[k, step, 1], hits[k, step, 2] = np.nan, np.nan, np.nan
+        hits[k, 0, 0], hits[k, 0, 1], hits[k, 0, 2] = x, y, z
+        heading = 1.0
+        ok = True
+        for step in range(rows.shape[0]):
+            row = rows[step]
+            vertex = z_vertex[row]
+            if actions[step] == STOP:
+                t = (vertex - z) / dz
+                x, y, z = x + t * dx, y + t * dy, vertex
+            else:
+                mirror = 1.0 if actions[step] == REFLECT else 0.0
+                n_in, n_out = (n_gap[row], n_gap[row + 1]) if heading > 0.0 else (n_gap[row + 1], n_gap[row])
+                x, y, z, dx, dy, dz, _, _, _, ok = cross_shape(
+                    shapes, row, vertex, x, y, z, dx, dy, dz, heading, n_in / n_out, mirror
+                )
+                if mirror > 0.0:
+                    heading = -heading
+            if not ok:
+                break
+            hits[k, step + 1, 0], hits[k, step + 1, 1], hits[k, step + 1, 2] = x, y, z
+        if ok:
+            t = (sensor_z - z) / dz
+            last = rows.shape[0] + 1
+            hits[k, last, 0], hits[k, last, 1], hits[k, last, 2] = x + t * dx, y + t * dy, sensor_z

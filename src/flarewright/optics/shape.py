@@ -1,0 +1,224 @@
+"""The form and place of every row: its sag, and the table that kernels trace through."""
+
+from __future__ import annotations
+
+from math import cos, radians, sin
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import LensError
+from ..kernels.intersect import (
+    ASPHERE,
+    AXES,
+    CENTRED,
+    CONIC,
+    CONIC_X,
+    CONIC_Y,
+    CURVATURE_X,
+    CURVATURE_Y,
+    DEGREE,
+    HALF,
+    HEIGHTS,
+    KIND,
+    ORIGIN,
+    POLYNOMIAL,
+    SAG,
+    SCALE,
+    SIDE,
+    TANGENT,
+)
+from ..model import Element, Lens, Stop, Surface
+from .zernike import MOST_DEGREE, figure_polynomial
+
+Floats = NDArray[np.float64]
+
+NM = 1e-6
+# an asphere goes on as a tangent from this part of its semi-diameter on: rays out there are blocked, but still traced
+ROOM = 1.1
+
+
+def turns(row: Surface | Stop) -> bool:
+    """Tell whether a row is a surface of revolution around its own axis without figure error, or the stop."""
+    return isinstance(row, Stop) or not (row.toroidal or row.figure is not None)
+
+
+def symmetric(lens: Lens) -> bool:
+    """Tell whether a lens is one of revolution, so that half a bundle tells all of it."""
+    moved = any(element.displaced for element in lens.elements)
+    return not moved and all(turns(row) and not getattr(row, "displaced", False) for row in lens.rows)
+
+
+def ideal(lens: Lens) -> Lens:
+    """Return the lens as it was designed: nothing decentred or tilted, no figure errors."""
+    if not lens.elements and not any(isinstance(row, Surface) and (row.displaced or row.figure) for row in lens.rows):
+        return lens
+    rows = [
+        row.replace(decentre=None, tilt_deg=None, figure=None) if isinstance(row, Surface) else row for row in lens.rows
+    ]
+    found: Lens = lens.replace(rows=tuple(rows), elements=())
+    return found
+
+
+def transposed(lens: Lens) -> Lens:
+    """Return the ideal lens with its two meridians exchanged."""
+
+    def exchange(row: Surface | Stop) -> Surface | Stop:
+        if not (isinstance(row, Surface) and row.toroidal):
+            return row
+        curvature, conic = row.meridian_x
+        found: Surface = row.replace(curvature=curvature, conic=conic, curvature_x=row.curvature, conic_x=row.conic)
+        return found
+
+    plain = ideal(lens)
+    found: Lens = plain.replace(rows=tuple(exchange(row) for row in plain.rows))
+    return found
+
+
+def sag(row: Surface | Stop, x: Floats, y: Floats) -> Floats:
+    """Height of a row's ideal form over its vertex' plane.
+
+    Parameters
+    ----------
+    row : Surface or Stop
+    x, y : ndarray
+        mm, broadcast against each other.
+
+    Returns
+    -------
+    ndarray
+        mm; defined, but of no meaning, beyond the equator of a sphere, where there is no surface.
+
+    Notes
+    -----
+    As `kernels.intersect.sag_of_shape` (tests/optics/test_shape.py compares them), for whole arrays and without
+    compiling.
+    """
+    if isinstance(row, Stop):
+        return np.zeros(np.broadcast(x, y).shape)
+    (cx, kx), cy, ky = row.meridian_x, row.curvature, row.conic
+    room = 1.0 - (1.0 + kx) * cx**2 * x**2 - (1.0 + ky) * cy**2 * y**2
+    found: Floats = (cx * x**2 + cy * y**2) / (1.0 + np.sqrt(np.maximum(room, 0.0)))
+    r2 = x**2 + y**2
+    for k, term in enumerate(row.asphere):
+        found = found + term * r2 ** (k + 2)
+    return found
+
+
+def shape_table(lens: Lens) -> Floats | None:
+    """Write down form and place of every row for `kernels.shapes`.
+
+    Parameters
+    ----------
+    lens : Lens
+
+    Returns
+    -------
+    ndarray, shape (K, P), or None
+        In the lens' frame; None when every row is a conic of revolution on the axis, which needs no table.
+
+    Raises
+    ------
+    LensError
+        When a figure's image has not been read, or a figure error has no semi-diameter to span.
+    """
+    if symmetric(lens) and not any(isinstance(row, Surface) and row.asphere for row in lens.rows):
+        return None
+    most = max((len(_heights(row)) ** 2 for row in lens.rows), default=0)
+    table = np.zeros((len(lens.rows), HEIGHTS + most))
+    table[:, TANGENT], table[:, DEGREE] = np.inf, -1.0
+    table[:, AXES : AXES + 9] = np.eye(3).ravel()
+    at = places(lens)
+    for k, row in enumerate(lens.rows):
+        if isinstance(row, Stop):
+            continue
+        origin, axes = at[k]
+        entry = table[k]
+        entry[ORIGIN : ORIGIN + 3], entry[AXES : AXES + 9] = origin, axes.ravel()
+        entry[CURVATURE_X], entry[CONIC_X] = row.meridian_x
+        entry[CURVATURE_Y], entry[CONIC_Y] = row.curvature, row.conic
+        moved = bool(np.any(origin != 0.0) or np.any(axes != np.eye(3)))
+        entry[KIND] = SAG if row.asphere or not turns(row) else CONIC if moved else CENTRED
+        entry[ASPHERE : ASPHERE + len(row.asphere)] = row.asphere
+        if row.semi_diameter is not None:
+            entry[TANGENT] = (ROOM * row.semi_diameter) ** 2
+        if row.figure is not None:
+            _write_figure(entry, row, f"{lens.name}, row {k}")
+    return table
+
+
+def _heights(row: Surface | Stop) -> tuple[tuple[float, ...], ...]:
+    return () if isinstance(row, Stop) or row.figure is None else (row.figure.heights or ())
+
+
+def _write_figure(entry: Floats, row: Surface, where: str) -> None:
+    figure = row.figure
+    assert figure is not None
+    if row.semi_diameter is None:
+        raise LensError(f"{where}: a figure error spans the semi-diameter, which is missing; give semi_diameter")
+    if figure.zernike_nm:
+        entry[SCALE], entry[DEGREE] = 1.0 / row.semi_diameter, MOST_DEGREE
+        coefficients = figure_polynomial(figure.zernike_nm) * NM
+        entry[POLYNOMIAL : POLYNOMIAL + coefficients.size] = coefficients.ravel()
+    if figure.image is None:
+        return
+    if figure.heights is None:
+        raise LensError(f"{where}: the figure's image {figure.image} has not been read; load the lens with load_lens")
+    assert figure.peak_valley_nm is not None
+    heights = np.array(figure.heights) * figure.peak_valley_nm * NM
+    entry[SIDE], entry[HALF] = len(heights), row.semi_diameter
+    entry[HEIGHTS : HEIGHTS + heights.size] = heights.ravel()
+
+
+def places(lens: Lens) -> list[tuple[Floats, Floats]]:
+    """Return each row's vertex relative to its place on the axis, and its own axes as rows of a matrix."""
+    z = np.concatenate([[0.0], np.cumsum([row.thickness for row in lens.rows[:-1]])])
+    element_of: dict[int, Element] = {
+        row: element for element in lens.elements for row in range(element.rows[0], element.rows[1] + 1)
+    }
+    found = []
+    for k, row in enumerate(lens.rows):
+        origin, turn = np.zeros(3), np.eye(3)
+        if isinstance(row, Surface) and row.displaced:
+            origin[:2] = row.decentre or (0.0, 0.0)
+            turn = _turn(row.tilt_deg or (0.0, 0.0))
+        element = element_of.get(k)
+        if element is not None and element.displaced:
+            # the element turns about the vertex of its first row, and its rows with it
+            whole = _turn(element.tilt_deg)
+            lever = np.array([0.0, 0.0, z[k] - z[element.rows[0]]])
+            origin = whole @ (origin + lever) - lever + np.array([*element.decentre, 0.0])
+            turn = whole @ turn
+        found.append((origin, turn.T))
+    return found
+
+
+def _turn(tilt_deg: tuple[float, float]) -> Floats:
+    """Rotate about the x axis, then about the lens' y axis; right-handed."""
+    a, b = radians(tilt_deg[0]), radians(tilt_deg[1])
+    about_x = np.array([[1.0, 0.0, 0.0], [0.0, cos(a), -sin(a)], [0.0, sin(a), cos(a)]])
+    about_y = np.array([[cos(b), 0.0, sin(b)], [0.0, 1.0, 0.0], [-sin(b), 0.0, cos(b)]])
+    both: Floats = about_y @ about_x
+    return both
+
+
+def seen_along(table: Floats, axes: Floats) -> Floats:
+    """Bring a shape table into the meridional frame of a light.
+
+    Parameters
+    ----------
+    table : ndarray, shape (K, P)
+        In the lens' frame.
+    axes : ndarray, shape (2, 2)
+        `optics.bundle.Incidence.axes`.
+
+    Returns
+    -------
+    ndarray, shape (K, P)
+    """
+    turn = np.eye(3)
+    turn[:2, :2] = axes
+    seen: Floats = table.copy()
+    seen[:, ORIGIN : ORIGIN + 3] = table[:, ORIGIN : ORIGIN + 3] @ turn.T
+    seen[:, AXES : AXES + 9] = (table[:, AXES : AXES + 9].reshape(-1, 3, 3) @ turn.T).reshape(-1, 9)
+    return seen
