@@ -44,6 +44,20 @@ LENS_FILES = {
     "index below 1": (lens(a=("n_d = 1.5168", "n_d = 0.9")), "row 0: n_d"),
     "misspelt key": (lens(a=("thickness = 2.0", "thicknes = 2.0")), "did you mean 'thickness'"),
     "coating nonsense": (lens(a=("thickness = 2.0", 'thickness = 2.0, coating = "shiny"')), "shiny"),
+    "asphere that is no list": (lens(a=("thickness = 2.0", "thickness = 2.0, asphere = 1e-6")), "row 1: asphere"),
+    "decentre of one number": (lens(a=("thickness = 2.0", "thickness = 2.0, decentre = [1]")), "row 1: decentre"),
+    "tilt beyond reason": (lens(a=("thickness = 2.0", "thickness = 2.0, tilt_deg = [0, 80]")), "at most 45"),
+    "figure without terms": (lens(a=("thickness = 2.0", "thickness = 2.0, figure = {}")), "figure is empty"),
+    "figure of a term that is none": (
+        lens(a=("thickness = 2.0", "thickness = 2.0, figure = { zernike_nm = { 99 = 1 } }")), "'99' is no term"),
+    "figure image that is not there": (
+        lens(a=("thickness = 2.0", 'thickness = 2.0, figure = { image = "no.png", peak_valley_nm = 9 }')),
+        "no such figure image"),
+    "element with the stop": (LENS + "[[elements]]\nrows = [1, 2]\n", "holds the stop"),
+    "element out of range": (LENS + "[[elements]]\nrows = [0, 7]\n", "between 0 and 2"),
+    "cylinder without power along y": (
+        lens(a=("radius = 50.0", 'radius = "flat", radius_x = 50.0'), b=(
+            "radius = -50.0", 'radius = "flat", radius_x = -50.0')), "afocal"),
     "preset too short": (LENS + '[coating_presets]\np = ["none"]\n', "preset 'p'"),
     "negative lens": (lens(a=("radius = 50.0", "radius = -50.0"), b=("radius = -50.0, thickness = 2.0",
                                                                      "radius = 50.0, thickness = 2.0")), "negative"),

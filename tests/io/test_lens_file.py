@@ -21,7 +21,9 @@ from flarewright.io.lens_writer import format_lens, write_lens
 from flarewright.io.media import attach, complete
 from flarewright.model import (
     Bare,
+    Element,
     Everywhere,
+    Figure,
     Film,
     Iris,
     Lens,
@@ -128,6 +130,58 @@ MISTAKES = [
     ("{ stop = true, thickness = 5.13 }", "5", "row 4: is 5, a table"),
     ("rows = [", "rows = 3\nlines = [", "rows is 3, a list of tables was expected"),
     ("]\n", ']\n[coating_presets]\nmine = ["none"]\n', "coating preset 'mine' has 1 entry, the lens 7 rows"),
+    (
+        'radius = "flat"',
+        'radius = "flat", radius_x = 0',
+        'row 1: radius_x is 0: for a plane surface write radius_x = "flat"',
+    ),
+    ('radius = "flat"', 'radius = "flat", radius_x = 5, curvature_x = 0.2', "row 1: radius_x and curvature_x are both"),
+    ('radius = "flat"', 'radius = "flat", conic_x = "one"', "row 1: conic_x is 'one', a number"),
+    ('radius = "flat"', 'radius = "flat", asphere = 1e-6', "row 1: asphere is 1e-06, a list of numbers"),
+    ('radius = "flat"', 'radius = "flat", asphere = []', "row 1: asphere has 0 terms: give 1 to 9"),
+    ('radius = "flat"', 'radius = "flat", asphere = [1e-6, "x"]', "row 1: asphere[1] is 'x', a number"),
+    ('radius = "flat"', 'radius = "flat", decentre = [0.1]', "row 1: decentre has 1 numbers: give two"),
+    ('radius = "flat"', 'radius = "flat", decentre = [0.1, 500]', "row 1: decentre[1] is 500: it must be at most 100"),
+    ('radius = "flat"', 'radius = "flat", tilt_deg = [0, 90]', "row 1: tilt_deg[1] is 90: it must be at most 45"),
+    ('radius = "flat"', 'radius = "flat", tilt = [0, 1]', "row 1: 'tilt' is not a known key; did you mean 'tilt_deg'?"),
+    ('radius = "flat"', 'radius = "flat", figure = 30', "row 1: figure is 30: a table like"),
+    ('radius = "flat"', 'radius = "flat", figure = {}', "row 1: figure is empty"),
+    (
+        'radius = "flat"',
+        'radius = "flat", figure = { zernike = { 5 = 1 } }',
+        "row 1: figure: 'zernike' is not a known key",
+    ),
+    (
+        'radius = "flat"',
+        'radius = "flat", figure = { zernike_nm = { 1 = 1 } }',
+        "row 1: figure.zernike_nm: '1' is no term",
+    ),
+    (
+        'radius = "flat"',
+        'radius = "flat", figure = { zernike_nm = { x = 1 } }',
+        "row 1: figure.zernike_nm: 'x' is no term",
+    ),
+    (
+        'radius = "flat"',
+        'radius = "flat", figure = { zernike_waves = { 5 = 900 } }',
+        "term 5 is 900: a figure error is at",
+    ),
+    (
+        'radius = "flat"',
+        'radius = "flat", figure = { image = "a.png" }',
+        "row 1: figure: an image needs peak_valley_nm",
+    ),
+    ("stop = true, ", "stop = true, decentre = [0, 1], ", "row 4: the stop has no decentre, it bends no light"),
+    ("rows = [", "elements = 3\nrows = [", "elements is 3: write [[elements]]"),
+    ("]\n", "]\n[[elements]]\ndecentre = [0, 1]\n", "element 0: rows is None: give its first and last row"),
+    (
+        "]\n",
+        "]\n[[elements]]\nrows = [0, 9]\n",
+        "element 0 (rows 0 to 9): give its first and last row, between 0 and 6",
+    ),
+    ("]\n", "]\n[[elements]]\nrows = [3, 5]\n", "element 0 (rows 3 to 5) holds the stop, row 4"),
+    ("]\n", "]\n[[elements]]\nrows = [0, 1]\n[[elements]]\nrows = [1, 2]\n", "shares row 1 with element 0"),
+    ("]\n", "]\n[[elements]]\nrows = [0, 1]\nmoved = 1\n", "element 0: 'moved' is not a known key"),
     ("rows = [", "rows = [[", "is not valid TOML"),
     ("f_number = 2.7", "f_number = = 2.7", "is not valid TOML: invalid value (at line 3, column 12)"),
 ]
@@ -340,8 +394,22 @@ media = st.one_of(
     st.tuples(st.sampled_from([None, "N-BK7", 'odd "name"\\']), st.floats(1.3, 2.2), st.none() | st.floats(15.0, 95.0)),
 ).map(_medium)
 curvatures = st.just(0.0) | st.floats(-100.0, 100.0) | st.floats(1.0, 1e4).map(lambda r: 1.0 / r)
+pairs = st.none() | st.tuples(st.floats(-45.0, 45.0), st.floats(-45.0, 45.0)).filter(any)
+figures = st.one_of(
+    st.none(),
+    st.dictionaries(st.integers(2, 28), st.floats(-1e5, 1e5), min_size=1, max_size=3).map(
+        lambda terms: Figure(zernike_nm=tuple(terms.items()))
+    ),
+    st.builds(Figure, image=st.just("/pictures/zero.png"), peak_valley_nm=st.floats(-1e5, 1e5)),
+)
 air_surfaces = st.builds(
     Surface,
+    curvature_x=st.none() | curvatures,
+    conic_x=st.none() | st.floats(-10.0, 10.0),
+    asphere=st.lists(st.floats(-1.0, 1.0), max_size=9).map(tuple),
+    decentre=pairs,
+    tilt_deg=pairs,
+    figure=figures,
     curvature=curvatures,
     conic=st.just(0.0) | st.floats(-10.0, 10.0),
     thickness=st.floats(0.0, 10000.0),
@@ -377,6 +445,9 @@ def lenses(draw):
             )
         ),
         rows=tuple(rows),
+        elements=() if isinstance(rows[0], Stop) else draw(
+            st.lists(st.builds(Element, rows=st.just((0, 0)), decentre=pairs.filter(bool)), max_size=1).map(tuple)
+        ),
         coating_presets=draw(st.dictionaries(texts, preset, max_size=2)),
     )
 
@@ -418,6 +489,10 @@ BEYOND_THE_SCHEMA = (
     "behind the last row",
     "the lens 7 rows",
     "1000",
+    "term 5 is 900",
+    "between 0 and 6",
+    "holds the stop",
+    "shares row",
 )
 
 

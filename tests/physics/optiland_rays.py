@@ -31,16 +31,35 @@ def chain(job):
     lens.surfaces.add(index=1, radius=np.inf, thickness=0.0, is_stop=True, material=IdealMaterial(1.0))
     at = [z[k] for k, _, _ in order] + [z[-1] + job["sensor_distance"]]
     for m, (k, mirror, forward) in enumerate(order):
-        c = rows[k]["curvature"]
         lens.surfaces.add(
             index=m + 2,
-            radius=np.inf if c == 0.0 else 1.0 / c,
-            conic=rows[k]["conic"],
             thickness=at[m + 1] - at[m],
             material="mirror" if mirror else IdealMaterial(behind[k] if forward else front[k]),
+            **form(rows[k]),
         )
     lens.surfaces.add(index=len(order) + 2)
     return lens
+
+
+def form(row):
+    """Shape and place of a row in optiland's words."""
+    radius = np.inf if row["curvature"] == 0.0 else 1.0 / row["curvature"]
+    place = {name: row[name] for name in ("dx", "dy", "rx", "ry") if row.get(name)}
+    exact = {"tol": 1e-13, "max_iter": 100}
+    if row.get("zernike"):
+        coefficients, norm_radius = row["zernike"]
+        words = {"surface_type": "zernike", "radius": radius, "conic": row["conic"], **exact}
+        return {**words, "coefficients": coefficients, "norm_radius": norm_radius, "zernike_type": "noll", **place}
+    if row.get("asphere"):
+        # optiland's first coefficient is that of r^2
+        coefficients = [0.0, *row["asphere"]]
+        words = {"surface_type": "even_asphere", "radius": radius, "conic": row["conic"], **exact}
+        return {**words, "coefficients": coefficients, **place}
+    if row.get("curvature_x") is not None:
+        across = np.inf if row["curvature_x"] == 0.0 else 1.0 / row["curvature_x"]
+        words = {"surface_type": "biconic", "radius_x": across, "radius_y": radius, **exact}
+        return {**words, "conic_x": row["conic_x"], "conic_y": row["conic"], **place}
+    return {"radius": radius, "conic": row["conic"], **place}
 
 
 def main():

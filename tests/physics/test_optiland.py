@@ -113,3 +113,84 @@ def test_the_program_traces_as_optiland_does(name):
             assert np.abs(-rays[axis][near] - np.array(answer[axis])[near]).max(initial=0.0) < 1e-9
         seen += int(near.sum())
     assert seen > 200
+
+
+SHAPES: dict[str, dict[int, dict[str, Any]]] = {
+    "aspheres": {
+        0: {"conic": -0.6, "asphere": (3e-6, -2e-8, 4e-11)},
+        3: {"asphere": (-2e-5, 1e-7, 0.0, 0.0, 0.0, 0.0, 3e-18)},
+    },
+    "cylinders": {0: {"curvature_x": 0.0}, 6: {"curvature": 0.0, "curvature_x": -0.05, "conic_x": -0.4}},
+    "decentred": {0: {"decentre": (0.4, -0.3)}, 5: {"decentre": (-0.2, 0.1)}},
+    "tilted about x": {2: {"tilt_deg": (1.5, 0.0)}},
+    "tilted about y": {2: {"tilt_deg": (0.0, -2.0)}},
+    "an asphere beside the axis and askew": {
+        5: {"asphere": (1e-5, 1e-7), "decentre": (0.2, 0.3), "tilt_deg": (0.7, -1.1)},
+        6: {"curvature_x": 0.0, "tilt_deg": (0.4, 0.2)},
+    },
+    # optiland refuses rays beyond the terms' disc, so that is wide
+    "figure errors": {1: {"figure": {5: 4000.0, 7: -3e4, 11: 2.5e4, 14: 1e4, 24: 5e4}, "semi_diameter": 60.0}},
+}
+
+
+def shaped(base: Any, changes: dict[int, dict[str, Any]]) -> Any:
+    from flarewright.model import Figure
+
+    rows = list(base.rows)
+    for k, fields in changes.items():
+        plain = dict(fields)
+        if "figure" in plain:
+            plain["figure"] = Figure(zernike_nm=tuple(plain["figure"].items()))
+        rows[k] = rows[k].replace(**plain)
+    return base.replace(rows=tuple(rows))
+
+
+def in_optilands_words(a_lens: Any, row: dict[str, Any], k: int) -> dict[str, Any]:
+    """The row of a job, with its shape."""
+    surface = a_lens.rows[k]
+    if not hasattr(surface, "asphere"):
+        return row
+    (cx, kx), tilt = surface.meridian_x, np.radians(surface.tilt_deg or (0.0, 0.0)).tolist()
+    dx, dy = surface.decentre or (0.0, 0.0)
+    words = {**row, "curvature": surface.curvature, "conic": surface.conic, "asphere": list(surface.asphere)}
+    words |= {"dx": dx, "dy": dy, "rx": tilt[0], "ry": tilt[1]}
+    if surface.toroidal:
+        words |= {"curvature_x": cx, "conic_x": kx}
+    if surface.figure is not None:
+        terms = dict(surface.figure.zernike_nm)
+        # Noll's first term is piston; optiland's terms are of root mean square 1 too
+        words["zernike"] = [terms.get(j, 0.0) * 1e-6 for j in range(1, 29)], surface.semi_diameter
+    return words
+
+
+@pytest.mark.usefixtures("optiland")
+@pytest.mark.parametrize("name", SHAPES)
+def test_surfaces_of_any_shape_and_place_trace_as_in_optiland(name):
+    from flarewright.optics.pack import pack_lens
+    from flarewright.optics.paraxial import first_order
+    from flarewright.optics.paths import direct_path, ghost_path
+    from flarewright.optics.trace import trace_rays
+
+    table, f_number, paths = CASES["triplet"]
+    a_lens, s = shaped(lens(table, f_number), SHAPES[name]), system(table, f_number)
+    order = first_order(lens(table, f_number))
+    packed = pack_lens(a_lens, order, (None,) * len(a_lens.rows), np.array([587.56]))
+    if name == "figure errors":
+        paths = [None]
+    cases = [(p, f) for p in paths for f in FIELDS]
+    jobs = [job(s, p, f) for p, f in cases]
+    for one in jobs:
+        one["rows"] = [in_optilands_words(a_lens, row, k) for k, row in enumerate(one["rows"])]
+    x, y = points()
+    seen, moved = 0, 0.0
+    plain = pack_lens(lens(table, f_number), order, (None,) * len(a_lens.rows), np.array([587.56]))
+    for (path, field), answer in zip(cases, ask_optiland(jobs), strict=True):
+        route = direct_path(a_lens) if path is None else ghost_path(a_lens, *path)
+        rays, before = trace_rays(packed, route, x, y, field), trace_rays(plain, route, x, y, field)
+        near = (rays["status"] > 0) & (rays["rel_radius"] < 1.0)
+        for axis in ("x", "y"):
+            assert np.abs(-rays[axis][near] - np.array(answer[axis])[near]).max(initial=0.0) < 1e-9
+        seen += int(near.sum())
+        moved = max(moved, float(np.abs(rays["x"] - before["x"])[near].max(initial=0.0)))
+    assert seen > 100
+    assert moved > 1e-3  # the shapes matter

@@ -12,7 +12,7 @@ from ..errors import ProjectError
 from .common import check_place, chosen_fstop, console, field_angles, print_json, tell
 
 if TYPE_CHECKING:
-    from ..model import Lens
+    from ..model import Lens, Surface
     from ..optics.paraxial import FirstOrder
 
 EPILOG = (
@@ -80,7 +80,7 @@ def as_data(lens: Lens, order: FirstOrder) -> dict[str, Any]:
             rows.append(
                 {"row": k, "stop": True, "radius_mm": None, "curvature": 0.0, "conic": 0.0, "thickness": row.thickness}
                 | {"n_d": None, "v_d": None, "glass": None, "semi_diameter": order.stop_semi_diameter}
-                | {"semi_diameter_estimated": False, "coating": None}
+                | {"semi_diameter_estimated": False, "coating": None, "radius_x_mm": None, "shape": None}
             )
             continue
         medium = row.medium
@@ -91,6 +91,8 @@ def as_data(lens: Lens, order: FirstOrder) -> dict[str, Any]:
                 "radius_mm": 1.0 / row.curvature if row.curvature else None,
                 "curvature": row.curvature,
                 "conic": row.conic,
+                "radius_x_mm": 1.0 / row.meridian_x[0] if row.toroidal and row.meridian_x[0] else None,
+                "shape": _shape(row),
                 "thickness": row.thickness,
                 "n_d": medium.n_d if medium else None,
                 "v_d": medium.v_d if medium else None,
@@ -106,6 +108,8 @@ def as_data(lens: Lens, order: FirstOrder) -> dict[str, Any]:
         "notes": lens.notes,
         "efl_mm": order.efl,
         "bfl_mm": order.bfl,
+        "efl_x_mm": order.efl_x,
+        "bfl_x_mm": order.bfl_x,
         "f_number": order.f_number,
         "field_deg": lens.field_deg,
         "entrance_pupil_diameter_mm": order.entrance_pupil_diameter,
@@ -115,9 +119,36 @@ def as_data(lens: Lens, order: FirstOrder) -> dict[str, Any]:
         "stop_semi_diameter_mm": order.stop_semi_diameter,
         "sensor_distance_mm": order.sensor_distance,
         "blades": lens.iris.blades,
+        "elements": [element.model_dump(mode="json") for element in lens.elements],
         "coating_presets": sorted(lens.coating_presets),
         "rows": rows,
     }
+
+
+def _shape(row: Surface) -> str | None:
+    """Say in a few words what makes a surface other than a centred conic; None for those."""
+    words = []
+    if row.toroidal:
+        curvature, conic = row.meridian_x
+        radius = "flat" if curvature == 0.0 else f"{1.0 / curvature:.3f}"
+        words.append(f"{radius} across" + (f", conic {conic:g}" if conic else ""))
+    words += [f"A{4 + 2 * k} {term:g}" for k, term in enumerate(row.asphere) if term]
+    if any(row.decentre or ()):
+        words.append("decentred {:g}, {:g}".format(*(row.decentre or ())))
+    if any(row.tilt_deg or ()):
+        words.append("tilted {:g}, {:g} degrees".format(*(row.tilt_deg or ())))
+    if row.figure is not None:
+        rms = sum(value**2 for _, value in row.figure.zernike_nm) ** 0.5
+        words += [f"figure {rms:.3g} nm rms"] if rms else []
+        words += [f"figure image, {row.figure.peak_valley_nm:g} nm"] if row.figure.image else []
+    return "; ".join(words) or None
+
+
+def _across(data: dict[str, Any]) -> str:
+    """Tell the focal length across where it is another."""
+    if data["efl_x_mm"] is None:
+        return ""
+    return f"; in the x-z plane {data['efl_x_mm']:.3f} and {data['bfl_x_mm']:.3f}"
 
 
 def _print(data: dict[str, Any]) -> None:
@@ -130,8 +161,11 @@ def _print(data: dict[str, Any]) -> None:
     out.add_column("row", justify="right")
     for column in ("radius", "conic", "thickness", "n_d", "v_d", "semi-diameter"):
         out.add_column(column, justify="right", no_wrap=True)
+    shaped = any(row["shape"] for row in data["rows"])
     out.add_column("glass", no_wrap=True)
     out.add_column("coating")
+    if shaped:
+        out.add_column("shape")
     for row in data["rows"]:
         radius = "stop" if row["stop"] else "flat" if row["radius_mm"] is None else f"{row['radius_mm']:.3f}"
         semi = "-" if row["semi_diameter"] is None else f"{row['semi_diameter']:.2f}"
@@ -145,16 +179,23 @@ def _print(data: dict[str, Any]) -> None:
             f"~{semi}" if row["semi_diameter_estimated"] else semi,
             row["glass"] or "",
             row["coating"] or "",
+            *([row["shape"] or ""] if shaped else []),
         )
     terminal = console()
     terminal.print(out)
     terminal.print(
-        f"focal length {data['efl_mm']:.3f}, back focus {data['bfl_mm']:.3f}, "
+        f"focal length {data['efl_mm']:.3f}, back focus {data['bfl_mm']:.3f}{_across(data)}, "
         f"sensor {data['sensor_distance_mm']:.3f} behind the last vertex\n"
         f"entrance pupil {data['entrance_pupil_diameter_mm']:.3f} wide at z = {data['entrance_pupil_z_mm']:.3f}, "
         f"exit pupil {data['exit_pupil_diameter_mm']:.3f} wide at z = {data['exit_pupil_z_mm']:.3f} "
         "(z from the first vertex)"
     )
+    for element in data["elements"]:
+        terminal.print(
+            "element of rows {}-{}: decentred {:g}, {:g} mm, tilted {:g}, {:g} degrees".format(
+                *element["rows"], *element["decentre"], *element["tilt_deg"]
+            )
+        )
     for key in ("source", "notes"):
         if data[key]:
             terminal.print(f"{key}: {data[key]}")

@@ -104,7 +104,7 @@ def _figure(value: object, where: str, folder: Path | None, problems: list[str])
         if not isinstance(value["image"], str) or not value["image"].strip():
             problems.append(f"{where}: image is {shorten(value['image'])}, the path of a grey picture was expected")
         else:
-            fields["image"] = str((folder or Path()) / value["image"])
+            fields["image"] = str(((folder or Path()) / value["image"]).absolute())
     if "peak_valley_nm" in value:
         fields["peak_valley_nm"] = _number(value["peak_valley_nm"], f"{where}: peak_valley_nm", HEIGHT_NM, problems)
     if not value:
@@ -129,9 +129,7 @@ def _zernike(value: object, where: str, unit_nm: float, problems: list[str]) -> 
             continue
         number = _number(amplitude, f"{where}: term {key}", HEIGHT_NM, problems)
         if number is not None and abs(number * unit_nm) > LARGEST_NM:
-            problems.append(
-                f"{where}: term {key} is {number:g}: no figure error is larger than {LARGEST_NM / 1e3:g} um"
-            )
+            problems.append(f"{where}: term {key} is {number:g}: a figure error is at most {LARGEST_NM / 1e3:g} um")
         elif number is not None:
             terms.append((int(key), number * unit_nm))
     return tuple(terms)

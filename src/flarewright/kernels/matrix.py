@@ -65,17 +65,21 @@ def path_matrices(rows, actions, curvature, z_vertex, n_gap, sensor_z, to_stop):
 
 
 @compiled
-def paraxial_weight(rows, actions, curvature, z_vertex, n_gap, reflectance, y, u):
+def paraxial_weight(rows, actions, curvature, curvature_x, z_vertex, n_gap, reflectance, y, u, x, ux):
     """Multiply R and T along one paraxial ray, at its angles of incidence.
 
     Parameters
     ----------
     rows, actions, curvature, z_vertex, n_gap
         As in `path_matrices`.
+    curvature_x : ndarray, shape (K,), or None
+        Curvatures across, where they are others; None: the ray stays in its plane, x and ux are not looked at.
     reflectance : ndarray, shape (K, M)
         As in `kernels.trace.trace_nodes`.
     y, u : float
         Height on the plane of the first vertex and slope.
+    x, ux : float
+        The same across.
 
     Returns
     -------
@@ -86,12 +90,17 @@ def paraxial_weight(rows, actions, curvature, z_vertex, n_gap, reflectance, y, u
     for step in range(rows.size):
         row = rows[step]
         y += heading * (z_vertex[row] - here) * u
+        if curvature_x is not None:
+            x += heading * (z_vertex[row] - here) * ux
         here = z_vertex[row]
         if actions[step] == STOP:
             continue
         power = curvature[row] * heading
         n1, n2 = (n_gap[row], n_gap[row + 1]) if heading > 0.0 else (n_gap[row + 1], n_gap[row])
         slope = u + power * y
+        if curvature_x is not None:
+            across = ux + curvature_x[row] * heading * x
+            slope = sqrt(slope * slope + across * across)
         sine = slope / sqrt(1.0 + slope * slope) * (1.0 if n1 <= n2 else n1 / n2)
         place = sqrt(max(1.0 - sine * sine, 0.0)) * (samples - 1)
         cell = min(int(place), samples - 2)
@@ -99,17 +108,21 @@ def paraxial_weight(rows, actions, curvature, z_vertex, n_gap, reflectance, y, u
         if actions[step] == REFLECT:
             weight *= r
             u += 2.0 * power * y
+            if curvature_x is not None:
+                ux += 2.0 * curvature_x[row] * heading * x
             heading = -heading
         else:
             weight *= 1.0 - r
             u = (n1 - n2) / n2 * power * y + n1 / n2 * u
+            if curvature_x is not None:
+                ux = (n1 - n2) / n2 * curvature_x[row] * heading * x + n1 / n2 * ux
     return weight
 
 
 @compiled
 def draw_matrix_ghosts(
-    rows, actions, starts, crossings, curvature, z_vertex, n_gap, reflectance, sensor_z,
-    entrance, slope, edges, iris_radius, mask, mask_half, axes, to_pixels, gain, rgb, plane, strip,
+    rows, actions, starts, crossings, curvature, curvature_x, z_vertex, n_gap, reflectance, sensor_z,
+    entrance, slope, slope_x, edges, iris_radius, mask, mask_half, axes, to_pixels, gain, rgb, plane, strip,
 ):  # fmt: skip
     """Draw many paths at many wavelengths with matrices (Lee and Eisemann 2013; Van Acoleyen 2025, chapter 4).
 
@@ -121,6 +134,8 @@ def draw_matrix_ghosts(
         Where each path starts.
     crossings : ndarray, shape (P,), int64
     curvature, z_vertex : ndarray, shape (K,)
+    curvature_x : ndarray, shape (K,), or None
+        Curvatures across where some row has others; then the frame is the lens' own instead of the meridional one.
     n_gap : ndarray, shape (W, K + 1)
     reflectance : ndarray, shape (W, K, M)
     sensor_z : float
@@ -128,6 +143,8 @@ def draw_matrix_ghosts(
         Semi-diameter of the first surface, mm.
     slope : float
         Slope of the rays in the meridional plane.
+    slope_x : float
+        Slope across it; 0 in the meridional frame.
     edges : ndarray, shape (B, 4)
         The iris as straight blades.
     iris_radius : float
@@ -144,21 +161,26 @@ def draw_matrix_ghosts(
     polygon, other = np.empty((MAX_VERTICES, PSTOP + 6)), np.empty((MAX_VERTICES, PSTOP + 6))
     values = np.empty(MAX_VERTICES)
     to_stop = np.empty((3, 2, 2))
+    across = to_stop if curvature_x is None else np.empty((3, 2, 2))
     for p in range(starts.size - 1):
         path_rows, path_actions = rows[starts[p] : starts[p + 1]], actions[starts[p] : starts[p + 1]]
         for w in range(n_gap.shape[0]):
             a, b, _, _ = path_matrices(path_rows, path_actions, curvature, z_vertex, n_gap[w], sensor_z, to_stop)
-            count = _project_entrance(polygon, entrance, slope, a, b, to_stop, crossings[p], axes)
+            ax, bx = a, b
+            if curvature_x is not None:
+                ax, bx, _, _ = path_matrices(path_rows, path_actions, curvature_x, z_vertex, n_gap[w], sensor_z, across)
+            count = _project_entrance(
+                polygon, entrance, slope, slope_x, a, b, ax, bx, to_stop, across, crossings[p], axes
+            )
             count = cut_by_blades(polygon, count, crossings[p], edges, other, values)
             if count == 0:
                 continue
-            centre = 0.0
-            ma, mb = to_stop[0, 0, 0], to_stop[0, 0, 1]
-            if iris_radius < entrance * abs(ma):
-                centre = -mb * slope / ma
+            centre = _centre(to_stop, slope, iris_radius, entrance)
+            beside = 0.0 if curvature_x is None else _centre(across, slope_x, iris_radius, entrance)
             weight = paraxial_weight(
-                path_rows, path_actions, curvature, z_vertex, n_gap[w], reflectance[w], centre, slope
-            )
+                path_rows, path_actions, curvature, curvature_x, z_vertex, n_gap[w], reflectance[w],
+                centre, slope, beside, slope_x,
+            )  # fmt: skip
             flux = gain * weight * abs(polygon_area(polygon, count, PP, PQ))
             for k in range(count):
                 x, y = polygon[k, PX], polygon[k, PY]
@@ -193,19 +215,26 @@ def _square(polygon, x, y):
 
 
 @compiled
-def _project_entrance(polygon, entrance, slope, a, b, to_stop, crossings, axes):
+def _centre(to_stop, slope, iris_radius, entrance):
+    """Height at the entrance of the ray that stands for a ghost's colour."""
+    ma, mb = to_stop[0, 0, 0], to_stop[0, 0, 1]
+    return -mb * slope / ma if iris_radius < entrance * abs(ma) else 0.0
+
+
+@compiled
+def _project_entrance(polygon, entrance, slope, slope_x, a, b, ax, bx, to_stop, across, crossings, axes):
     """Fill a polygon with the rim of the entrance: its images on the sensor and at each crossing of the stop."""
     # circumscribed a little, so that the polygon has the area of the circle
     radius = entrance * sqrt(2.0 * np.pi / (RIM * np.sin(2.0 * np.pi / RIM)))
     for k in range(RIM):
         angle = 2.0 * np.pi * k / RIM
         x, y = radius * np.cos(angle), radius * np.sin(angle)
-        polygon[k, PX], polygon[k, PY] = a * x, a * y + b * slope
+        polygon[k, PX], polygon[k, PY] = ax * x + bx * slope_x, a * y + b * slope
         polygon[k, PREL], polygon[k, PW] = 0.0, 1.0
         polygon[k, PP], polygon[k, PQ] = x, y
         for c in range(3):
             m = min(c, crossings - 1)
-            u, v = to_stop[m, 0, 0] * x, to_stop[m, 0, 0] * y + to_stop[m, 0, 1] * slope
+            u, v = across[m, 0, 0] * x + across[m, 0, 1] * slope_x, to_stop[m, 0, 0] * y + to_stop[m, 0, 1] * slope
             polygon[k, PSTOP + 2 * c] = u * axes[0, 0] + v * axes[1, 0]
             polygon[k, PSTOP + 2 * c + 1] = u * axes[0, 1] + v * axes[1, 1]
     return RIM

@@ -14,7 +14,7 @@ from ..model import AsLens, Coating, CoatingChoice, Everywhere, Lens, PerRow, Pr
 from ..model.coating import StandardName
 from .coatings import film_stack, reflectance_table
 from .paraxial import D_LINE_NM, FirstOrder, gap_indices, vertex_positions
-from .shape import seen_along, shape_table, symmetric
+from .shape import curvature_across, seen_along, shape_table, symmetric
 
 REFLECTANCE_SAMPLES = 1025
 
@@ -39,6 +39,8 @@ class PackedLens:
         Form and place of the rows in the lens' frame (`optics.shape.shape_table`); None when all are centred conics.
     symmetric : bool
         Whether the lens is one of revolution, so that half a bundle tells all of it.
+    curvature_x : ndarray, shape (K,), or None
+        Curvatures in the x-z plane; None when they are those in the y-z plane.
     faced : ndarray, shape (K, P), or None
         `shapes` in the meridional frame of one light (`facing`).
     """
@@ -56,6 +58,7 @@ class PackedLens:
     first_order: FirstOrder
     shapes: NDArray[np.float64] | None = None
     symmetric: bool = True
+    curvature_x: NDArray[np.float64] | None = None
     faced: NDArray[np.float64] | None = None
 
     @property
@@ -172,6 +175,7 @@ def pack_lens(
         first_order=first_order,
         shapes=shape_table(lens),
         symmetric=symmetric(lens),
+        curvature_x=curvature_across(lens),
     )
 
 

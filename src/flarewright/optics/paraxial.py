@@ -15,6 +15,7 @@ from ..kernels.matrix import path_matrices as _path_matrices
 from ..model import Lens, Stop, Surface
 from .dispersion import refractive_index
 from .paths import LightPath, direct_path
+from .shape import curvature_across
 
 Matrix = NDArray[np.float64]
 
@@ -174,8 +175,8 @@ def first_order(
 
 def _meridian_x(lens: Lens, wavelength_nm: float, last: float) -> dict[str, float]:
     """Focal length and back focus in the x-z plane, if it is another lens there."""
-    curvature = np.array([row.meridian_x[0] if isinstance(row, Surface) else 0.0 for row in lens.rows])
-    if all(c == getattr(row, "curvature", 0.0) for c, row in zip(curvature, lens.rows, strict=True)):
+    curvature = curvature_across(lens)
+    if curvature is None:
         return {}
     _, ((a, _), (c, _)) = _along(lens, direct_path(lens), curvature, wavelength_nm, last)
     afocal = abs(c) < 1e-9

@@ -49,6 +49,13 @@ def symmetric(lens: Lens) -> bool:
     return not moved and all(turns(row) and not getattr(row, "displaced", False) for row in lens.rows)
 
 
+def curvature_across(lens: Lens) -> Floats | None:
+    """Return each row's curvature in the x-z plane, shape (K,); None when it is that in the y-z plane everywhere."""
+    across = [0.0 if isinstance(row, Stop) else row.meridian_x[0] for row in lens.rows]
+    along = [0.0 if isinstance(row, Stop) else row.curvature for row in lens.rows]
+    return None if across == along else np.array(across)
+
+
 def ideal(lens: Lens) -> Lens:
     """Return the lens as it was designed: nothing decentred or tilted, no figure errors."""
     if not lens.elements and not any(isinstance(row, Surface) and (row.displaced or row.figure) for row in lens.rows):

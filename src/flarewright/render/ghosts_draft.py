@@ -1,7 +1,8 @@
 """Ghosts, draft quality: paraxial matrices (Lee and Eisemann 2013; Van Acoleyen 2025, chapter 4).
 
 The same paths, wavelengths, iris and units as final quality, in milliseconds: every ghost is the image of the entrance
-cut by the iris, evenly lit, its colour from one ray.
+cut by the iris, evenly lit, its colour from one ray. A toroid has a matrix for each meridian, so its ghosts are ovals;
+decentre, tilt, aspheric terms and figure errors are of higher order and left to final quality.
 """
 
 from __future__ import annotations
@@ -44,11 +45,18 @@ def draw_draft(
     packed, opening = shot.packed, shot.opening
     starts = np.cumsum([0, *(len(path.rows) for path in paths)])
     first = packed.first_surface
+    slope, axes = float(np.tan(shot.incidence.tilt)), shot.incidence.axes
+    slope_x = 0.0
+    if packed.curvature_x is not None:
+        # its two meridians are the lens' own, whatever the light's
+        slope_x, slope = float(axes[1, 0]) * slope, float(axes[1, 1]) * slope
+        axes = np.eye(2)
     draw_matrix_ghosts(
         np.concatenate([path.rows for path in paths]), np.concatenate([path.actions for path in paths]), starts,
-        np.array([path.stop_crossings for path in paths]), packed.curvature, packed.z_vertex, packed.n_gap,
-        packed.reflectance, packed.sensor_z, float(packed.semi[first]), float(np.tan(shot.incidence.tilt)),
-        opening.edges, opening.radius, opening.mask, opening.half, shot.incidence.axes, shot.to_pixels, shot.gain,
+        np.array([path.stop_crossings for path in paths]), packed.curvature, packed.curvature_x,
+        packed.z_vertex, packed.n_gap,
+        packed.reflectance, packed.sensor_z, float(packed.semi[first]), slope, slope_x,
+        opening.edges, opening.radius, opening.mask, opening.half, axes, shot.to_pixels, shot.gain,
         shot.weights(packed.wavelengths_nm) * rgb, differences, np.empty(0, dtype=np.float32),
     )  # fmt: skip
 
@@ -93,18 +101,29 @@ def draft_alone(shot: Shot, path: LightPath, art: PathArt) -> Floats:
 
 
 def _frame(shot: Shot, path: LightPath) -> Frame:
-    """Compute a ghost's centre and size at the middle wavelength by matrices."""
+    """Compute a ghost's centre and size at the middle wavelength by matrices; of an oval its larger size."""
+    packed, axes = shot.packed, shot.incidence.axes
+    slope = float(np.tan(shot.incidence.tilt))
+    if packed.curvature_x is None:
+        place, size = _meridian(shot, path, packed.curvature, slope)
+        centre = -place * axes[1]
+        return Frame((float(centre[0]), float(centre[1])), size)
+    x, across = _meridian(shot, path, packed.curvature_x, float(axes[1, 0]) * slope)
+    y, along = _meridian(shot, path, packed.curvature, float(axes[1, 1]) * slope)
+    return Frame((-x, -y), max(across, along))
+
+
+def _meridian(shot: Shot, path: LightPath, curvature: Floats, slope: float) -> tuple[float, float]:
+    """Return where a ghost's middle lands in one plane through the axis, and its radius there."""
     packed = shot.packed
     to_stop = np.empty((path.stop_crossings, 2, 2))
     middle = len(packed.wavelengths_nm) // 2
     a, b, _, _ = path_matrices(
-        path.rows, path.actions, packed.curvature, packed.z_vertex, packed.n_gap[middle], packed.sensor_z, to_stop
+        path.rows, path.actions, curvature, packed.z_vertex, packed.n_gap[middle], packed.sensor_z, to_stop
     )
-    slope = float(np.tan(shot.incidence.tilt))
     # the entrance, or the iris as seen from the front, whichever is smaller
     centre, radius = 0.0, float(packed.semi[packed.first_surface])
     for ma, mb in to_stop[:, 0]:
         if shot.opening.radius < radius * abs(ma):
             centre, radius = -mb * slope / ma, shot.opening.radius / abs(ma)
-    place = -(a * centre + b * slope) * shot.incidence.axes[1]
-    return Frame((float(place[0]), float(place[1])), abs(a) * radius)
+    return float(a * centre + b * slope), float(abs(a) * radius)

@@ -106,7 +106,7 @@ def _frame(shot: Shot, path: LightPath, region: Region) -> Frame:
     bundle = trace_grid(shot.packed, path, tilt, (opening.radius, opening.inner), region, tolerance=0.25, scale=1e-6)
     data = trace_bundle(shot.packed, len(shot.packed.wavelengths_nm) // 2, bundle, tilt)
     sums = measure_bundle(
-        data, bundle.pupil, bundle.triangles, path.stop_crossings, opening.blades, shot.incidence.axes
+        data, bundle.pupil, bundle.triangles, path.stop_crossings, opening.blades, shot.incidence.axes, bundle.halves
     )
     if sums[0] <= 0.0:
         return Frame((0.0, 0.0), 0.0)

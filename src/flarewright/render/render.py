@@ -130,6 +130,7 @@ def _summary(
         "lens": settled.lens.name,
         "efl_mm": order.efl,
         "bfl_mm": order.bfl,
+        **({} if order.efl_x is None else {"efl_x_mm": order.efl_x}),
         "f_number": order.f_number,
         "entrance_pupil_diameter_mm": order.entrance_pupil_diameter,
         "sensor_distance_mm": order.sensor_distance,

@@ -1,0 +1,89 @@
+"""Pictures through lenses that are not of revolution."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from flarewright.errors import LensError
+from flarewright.model import Camera, Figure, Iris, Light, Output, Project, Quality, Stop
+from flarewright.optics.paraxial import first_order
+from flarewright.optics.shape import transposed
+from flarewright.render.prepare import load_lens
+from flarewright.render.render import render
+
+SIZE = (96, 96)
+
+
+def picture(lens, field, mode="draft", blades=0, rotation=0.0, f_number=None, distance=None):
+    project = Project(
+        lens=lens, lights=(Light(field_deg=field),), f_number=f_number,
+        camera=Camera(size_px=SIZE, sensor_mm=(36.0, 36.0), sensor_distance=distance),
+        quality=Quality(mode=mode, wavelengths=3), output=Output(starburst=False, layers="beauty"),
+        iris=Iris(blades=blades, rotation_deg=rotation),
+    )  # fmt: skip
+    return render(project).layers[0].pixels.sum(axis=2, dtype=np.float64)
+
+
+def everywhere(lens, change):
+    return lens.replace(rows=tuple(row if isinstance(row, Stop) else row.replace(**change(row)) for row in lens.rows))
+
+
+def nearly_round(row):
+    return {"curvature_x": float(np.nextafter(row.curvature, 1.0))}
+
+
+def blurred(image, side=8):
+    return image.reshape(SIZE[1] // side, side, SIZE[0] // side, side).sum(axis=(1, 3))
+
+
+@pytest.mark.parametrize("field", [(9.0, 4.0), (-6.0, 11.0)])
+def test_draft_draws_a_round_toroid_as_the_sphere_it_is(field):
+    lens = load_lens("heliar-tronnier")
+    plain, toroid = picture(lens, field, blades=5), picture(everywhere(lens, nearly_round), field, blades=5)
+    # the rim of the entrance is a polygon whose corners lie elsewhere in the lens' frame
+    assert toroid.sum() == pytest.approx(plain.sum(), rel=1e-3)
+    assert np.abs(blurred(toroid) - blurred(plain)).max() < 2e-3 * blurred(plain).max()
+
+
+@pytest.mark.parametrize("mode", ["draft", "final"])
+def test_a_picture_through_exchanged_meridians_is_the_exchanged_picture(mode):
+    lens = load_lens("triplet-pestrecov")
+    lens = lens.replace(rows=(lens.rows[0].replace(curvature_x=0.7 * lens.rows[0].curvature), *lens.rows[1:]))
+    other = transposed(lens)
+    # the y meridian decides stop and focus, so both are held
+    order = first_order(lens, 8.0)
+    f_number = 8.0 * first_order(other, 8.0).stop_semi_diameter / order.stop_semi_diameter
+    one = picture(lens, (7.0, 3.0), mode, f_number=8.0, distance=order.sensor_distance)
+    two = picture(other, (3.0, 7.0), mode, f_number=f_number, distance=order.sensor_distance)
+    exchanged = two[::-1, ::-1].T
+    assert one.sum() == pytest.approx(exchanged.sum(), rel=1e-3)
+    assert np.abs(blurred(one) - blurred(exchanged)).max() < 1e-2 * blurred(one).max()
+    # and it is not the picture itself
+    assert np.abs(blurred(one) - blurred(two)).max() > 0.2 * blurred(one).max()
+
+
+def test_final_draws_a_whole_pupil_as_two_halves():
+    lens = load_lens("heliar-tronnier")
+    plain, whole = (picture(one, (9.0, 4.0), "final", blades=6, rotation=10.0) for one in (
+        lens, everywhere(lens, lambda row: {"figure": Figure()})
+    ))  # fmt: skip
+    assert whole.sum() == pytest.approx(plain.sum(), rel=1e-3)
+    assert np.abs(blurred(whole) - blurred(plain)).max() < 1e-2 * blurred(plain).max()
+
+
+def test_a_figure_image_is_read_and_tears_the_symmetry(tmp_path):
+    from PIL import Image
+
+    grey = np.random.default_rng(2).integers(0, 255, (16, 16), dtype=np.uint8)
+    Image.fromarray(grey).save(tmp_path / "bumps.png")
+    lens = load_lens("triplet-pestrecov")
+    figure = Figure(image=str(tmp_path / "bumps.png"), peak_valley_nm=4000.0)
+    bumpy = lens.replace(rows=(lens.rows[0].replace(figure=figure), *lens.rows[1:]))
+    plain, torn = (picture(one, (0.0, 8.0), "final") for one in (lens, bumpy))
+    assert np.abs(plain - plain[:, ::-1]).max() < 0.05 * plain.max()
+    assert np.abs(torn - torn[:, ::-1]).max() > 0.1 * torn.max()
+    assert torn.sum() == pytest.approx(plain.sum(), rel=0.05)
+    with pytest.raises(LensError, match="no such figure image"):
+        missing = bumpy.rows[0].replace(figure=figure.replace(image="no.png"))
+        picture(lens.replace(rows=(missing, *lens.rows[1:])), (0, 0))
