@@ -84,6 +84,6 @@ def test_a_figure_image_is_read_and_tears_the_symmetry(tmp_path):
     assert np.abs(plain - plain[:, ::-1]).max() < 0.05 * plain.max()
     assert np.abs(torn - torn[:, ::-1]).max() > 0.1 * torn.max()
     assert torn.sum() == pytest.approx(plain.sum(), rel=0.05)
+    missing = lens.replace(rows=(bumpy.rows[0].replace(figure=figure.replace(image="no.png")), *lens.rows[1:]))
     with pytest.raises(LensError, match="no such figure image"):
-        missing = bumpy.rows[0].replace(figure=figure.replace(image="no.png"))
-        picture(lens.replace(rows=(missing, *lens.rows[1:])), (0, 0))
+        picture(missing, (0, 0))
