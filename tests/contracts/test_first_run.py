@@ -188,7 +188,27 @@ def test_shares_hold_every_root_once(processes):
 
 def test_only_commands_start_processes():
     sources = Path(first_run.__file__).parents[1]
-    users = [path for path in sources.rglob("*.py") if "compile_for_" in path.read_text(encoding="utf-8")]
-    assert {str(path.relative_to(sources).as_posix()) for path in users} == {
-        "cli/ghosts.py", "cli/render.py", "render/first_run.py"
-    }  # fmt: skip
+    users = [path for path in sources.rglob("*.py") if "import compile_for_" in path.read_text(encoding="utf-8")]
+    assert {str(path.relative_to(sources).as_posix()) for path in users} == {"cli/ghosts.py", "cli/render.py"}
+
+
+def test_python_cannot_call_what_only_kernels_call():
+    # without its guard this would be a crash, not an exception
+    code = """
+import numpy as np
+from flarewright.kernels.clip import blade_value
+
+def twice():
+    for _ in range(2):
+        try:
+            blade_value(np.zeros((3, 4)), 0, 0.0, 0.0)
+        except TypeError as error:
+            print(error)
+
+twice()
+blade_value.compile("(f8[:,::1], i8, f8, f8)")
+twice()
+print(blade_value.py_func(np.ones((3, 4)), 0, 0.0, 0.0))
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines() == ["blade_value is for kernels; Python may call its py_func"] * 4 + ["-1.0"]

@@ -445,7 +445,9 @@ def lenses(draw):
             )
         ),
         rows=tuple(rows),
-        elements=() if isinstance(rows[0], Stop) else draw(
+        elements=()
+        if isinstance(rows[0], Stop)
+        else draw(
             st.lists(st.builds(Element, rows=st.just((0, 0)), decentre=pairs.filter(bool)), max_size=1).map(tuple)
         ),
         coating_presets=draw(st.dictionaries(texts, preset, max_size=2)),

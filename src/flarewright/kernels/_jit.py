@@ -11,13 +11,37 @@ from numba import njit
 _FASTMATH = {"contract", "reassoc", "arcp", "nsz", "afn"}
 
 
+# its stubs know fewer options than Numba has
+_njit: Any = njit
+# nothing takes a kernel's address, and calls from other kernels do not need it
+_OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": _FASTMATH, "no_cfunc_wrapper": True}
+
+
 def compiled(function: Callable[..., Any]) -> Any:
     """Compile a kernel that Python calls."""
     try:
-        return njit(function, cache=True, nogil=True, error_model="numpy", fastmath=_FASTMATH)
+        return _njit(function, cache=True, **_OPTIONS)
     except RuntimeError:
         # no folder to cache in can be written: every run compiles
-        return njit(function, nogil=True, error_model="numpy", fastmath=_FASTMATH)
+        return _njit(function, **_OPTIONS)
+
+
+def inner(function: Callable[..., Any]) -> Any:
+    """Compile a kernel that only kernels call; from Python it raises TypeError.
+
+    It has neither what Python needs to call it nor a cache of its own, for its callers hold its code: a tenth of the
+    work and several files less.
+    """
+
+    def refuse(*_: Any, **__: Any) -> None:
+        raise TypeError(f"{function.__name__} is for kernels; Python may call its py_func")
+
+    kernel = _njit(function, no_cpython_wrapper=True, **_OPTIONS)
+    if hasattr(kernel, "_insert"):
+        # Numba itself would jump to the code that is not there
+        kernel._insert = lambda *_: None
+        kernel._compile_for_args = refuse
+    return kernel
 
 
 def inlined(function: Callable[..., Any]) -> Any:

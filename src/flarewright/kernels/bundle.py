@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ._jit import compiled
+from ._jit import compiled, inner
 from .clip import (
     MAX_VERTICES,
     PP,
@@ -24,7 +24,7 @@ from .trace import ALIVE, REL, STOP_X, WEIGHT, X, Y
 SLIVER = 1e-4
 
 
-@compiled
+@inner
 def _triangle_flux(data, pupil, a, b, c):
     """Return the flux entering a triangle of the pupil times its mean weight, and its signed area on the sensor."""
     spread = (data[b, X] - data[a, X]) * (data[c, Y] - data[a, Y])
@@ -167,7 +167,7 @@ def draw_bundle(
             fill_polygon(polygon, count, base, gx, gy, dense_low, dense_high, rgb, plane, strip)
 
 
-@compiled
+@inner
 def _place_nodes(data, mirror, crossings, blades, axes, to_pixels, spots, inside):
     """Fill the nodes' places in pixels, and whether nothing blocks them."""
     for k in range(data.shape[0]):
@@ -184,14 +184,14 @@ def _place_nodes(data, mirror, crossings, blades, axes, to_pixels, spots, inside
         inside[k] = clear
 
 
-@compiled
+@inner
 def _pupil_area(pupil, a, b, c):
     """Area of a triangle of the pupil; its nodes run counter-clockwise."""
     area = (pupil[b, 0] - pupil[a, 0]) * (pupil[c, 1] - pupil[a, 1])
     return 0.5 * (area - (pupil[b, 1] - pupil[a, 1]) * (pupil[c, 0] - pupil[a, 0]))
 
 
-@compiled
+@inner
 def _plane_through(corner, mean, unit, drawn):
     """Return the linear density through three nodes, scaled to a mean: value at the origin, gradient, bounds.
 
@@ -212,7 +212,7 @@ def _plane_through(corner, mean, unit, drawn):
     return base, gx, gy, min(min(d0, d1), d2), max(max(d0, d1), d2)
 
 
-@compiled
+@inner
 def _splat_polygon(polygon, count, flux, rgb, plane):
     """Draw a polygon without area as the line between its two farthest vertices."""
     best, a, b = -1.0, 0, 0

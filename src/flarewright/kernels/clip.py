@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ._jit import compiled
+from ._jit import compiled, inner
 from .trace import REL, STOP_X, WEIGHT, X, Y
 
 # columns of a polygon's vertex; then u, v for each crossing of the stop
@@ -10,7 +10,7 @@ PX, PY, PREL, PP, PQ, PW, PSTOP = 0, 1, 2, 3, 4, 5, 6
 MAX_VERTICES = 256
 
 
-@compiled
+@inner
 def _cut(polygon, count, values, other):
     """Keep the part of a convex polygon where linearly interpolated values are <= 0 (Sutherland and Hodgman 1974)."""
     kept = 0
@@ -33,14 +33,14 @@ def _cut(polygon, count, values, other):
     return kept
 
 
-@compiled
+@inner
 def blade_value(blades, b, u, v):
     """Evaluate a blade's edge: <= 0 on the open side, its gradient 1 on the border (`optics.iris.blade_edges`)."""
     qx, qy = u - blades[b, 2] * blades[b, 0], v - blades[b, 2] * blades[b, 1]
     return blades[b, 0] * qx + blades[b, 1] * qy + 0.5 * blades[b, 3] * (qx * qx + qy * qy)
 
 
-@compiled
+@inner
 def cut_by_blades(polygon, count, crossings, blades, other, values):
     """Cut a polygon by every blade at every crossing of the stop; return its vertices, 0 when nothing passes."""
     for c in range(crossings):

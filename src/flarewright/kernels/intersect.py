@@ -6,7 +6,7 @@ Every kind of surface has its case here and nowhere else: conics of revolution i
 
 from math import sqrt
 
-from ._jit import compiled, inlined
+from ._jit import compiled, inlined, inner
 
 # columns of a shape table, one row of it a row of the lens (`optics.shape.shape_table`)
 KIND = 0  # CENTRED, CONIC or SAG
@@ -71,7 +71,7 @@ def intersect_conic(curvature, conic, x, y, z, dx, dy, dz, heading):
     return t, root, discriminant
 
 
-@compiled
+@inner
 def _asphere(shapes, row, x, y):
     """Return the even asphere's sum A4 r^4 + A6 r^6 + ... and its gradient; tangential beyond the rim's neighbourhood.
 
@@ -89,7 +89,7 @@ def _asphere(shapes, row, x, y):
     return value, 2.0 * x * slope, 2.0 * y * slope
 
 
-@compiled
+@inner
 def _polynomial(shapes, row, x, y):
     """Return the figure's polynomial in x / radius and y / radius, mm, and its gradient."""
     scale = shapes[row, SCALE]
@@ -107,7 +107,7 @@ def _polynomial(shapes, row, x, y):
     return value, along_x * scale, along_y * scale
 
 
-@compiled
+@inner
 def _image(shapes, row, x, y):
     """Return the height of the image's uniform cubic B-spline, mm, and its gradient; flat beyond its border."""
     side = int(shapes[row, SIDE])
@@ -131,7 +131,7 @@ def _image(shapes, row, x, y):
     return value, along_x / step if inside_x else 0.0, along_y / step if inside_y else 0.0
 
 
-@compiled
+@inner
 def _spline(knot, t):
     """Weight and slope of one of the four knots of a uniform cubic B-spline around a place t in [0, 1]."""
     if knot == 0:

@@ -4,12 +4,12 @@ from math import ceil, floor
 
 import numpy as np
 
-from ._jit import compiled
+from ._jit import inner
 from .clip import MAX_VERTICES, PSTOP, PX, PY, cut_to_rectangle
 from .raster import fill_polygon
 
 
-@compiled
+@inner
 def mask_value(mask, half, u, v):
     """Interpolate a mask that spans [-half, half] squared, row 0 at +v; 0 outside."""
     rows, columns = mask.shape
@@ -25,7 +25,7 @@ def mask_value(mask, half, u, v):
     return upper * (1.0 - fy) + lower * fy
 
 
-@compiled
+@inner
 def _uniform(polygon, count, crossing, mask, half):
     """Return the mask's value where it does not vary over a polygon, else -1."""
     rows, columns = mask.shape
@@ -50,7 +50,7 @@ def _uniform(polygon, count, crossing, mask, half):
     return first
 
 
-@compiled
+@inner
 def _pieces(polygon, k, crossings, mask, half):
     """How finely to divide a fan triangle: to a texel of the mask or to a pixel, whichever is coarser."""
     texels, pixels = 1.0, 1.0
@@ -63,7 +63,7 @@ def _pieces(polygon, k, crossings, mask, half):
     return int(ceil(min(min(texels, pixels), 256.0)))
 
 
-@compiled
+@inner
 def fill_through_mask(
     polygon, count, crossings, mask, half, density, gx, gy, density_low, density_high, rgb, plane, strip
 ):

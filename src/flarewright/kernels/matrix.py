@@ -4,7 +4,7 @@ from math import sqrt
 
 import numpy as np
 
-from ._jit import compiled
+from ._jit import compiled, inner
 from .clip import MAX_VERTICES, PP, PQ, PREL, PSTOP, PW, PX, PY, cut_by_blades, cut_to_rectangle, polygon_area
 from .mask import fill_through_mask
 from .raster import fill_polygon
@@ -64,7 +64,7 @@ def path_matrices(rows, actions, curvature, z_vertex, n_gap, sensor_z, to_stop):
     return a + gap * c, b + gap * d, c, d
 
 
-@compiled
+@inner
 def paraxial_weight(rows, actions, curvature, curvature_x, z_vertex, n_gap, reflectance, y, u, x, ux):
     """Multiply R and T along one paraxial ray, at its angles of incidence.
 
@@ -203,7 +203,7 @@ def draw_matrix_ghosts(
                 fill_polygon(polygon, count, even, 0.0, 0.0, even, even, rgb[w], plane, strip)
 
 
-@compiled
+@inner
 def _square(polygon, x, y):
     """Replace a polygon without area by a small square around a point, its places in the stop kept."""
     for k in range(4):
@@ -214,14 +214,14 @@ def _square(polygon, x, y):
     return 4
 
 
-@compiled
+@inner
 def _centre(to_stop, slope, iris_radius, entrance):
     """Height at the entrance of the ray that stands for a ghost's colour."""
     ma, mb = to_stop[0, 0, 0], to_stop[0, 0, 1]
     return -mb * slope / ma if iris_radius < entrance * abs(ma) else 0.0
 
 
-@compiled
+@inner
 def _project_entrance(polygon, entrance, slope, slope_x, a, b, ax, bx, to_stop, across, crossings, axes):
     """Fill a polygon with the rim of the entrance: its images on the sensor and at each crossing of the stop."""
     # circumscribed a little, so that the polygon has the area of the circle

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ._jit import compiled
+from ._jit import compiled, inner
 from .prepass import rejected
 from .trace import ALIVE, REL, STOP_X, WEIGHT, X, Y, trace_nodes
 
@@ -14,7 +14,7 @@ INNER_BEND = 0.02
 RIM_LEVEL = 2
 
 
-@compiled
+@inner
 def _judge(
     data, nodes, crossings, iris_radius, iris_inner, level, max_level, h, tolerance, flux_tolerance, scale, view_radius,
 ):  # fmt: skip
@@ -70,7 +70,7 @@ def _judge(
     return LEAF if error > 1.0 else FLAT
 
 
-@compiled
+@inner
 def _limit_range(data, nodes, limit, iris_radius):
     """Return a limit's least and largest value over a cell and how much it bends: 0 the rims, then each crossing."""
     values = np.empty(9)
@@ -91,7 +91,7 @@ def _limit_range(data, nodes, limit, iris_radius):
     return low, high, bend
 
 
-@compiled
+@inner
 def _bend(data, nodes, column):
     """Return the largest departure of a quantity from its bilinear interpolation between the corners."""
     a, b, c, d = data[nodes[0], column], data[nodes[2], column], data[nodes[6], column], data[nodes[8], column]
@@ -100,7 +100,7 @@ def _bend(data, nodes, column):
     return max(bend, abs(data[nodes[4], column] - 0.25 * (a + b + c + d)))
 
 
-@compiled
+@inner
 def _fan_areas(data, nodes):
     """Return the least and largest signed area on the sensor of the eight triangles around a cell's centre."""
     ring = (0, 3, 6, 7, 8, 5, 2, 1, 0)
@@ -212,7 +212,7 @@ def build_mesh(
     return pupil, data, _triangulate(state, offsets, lattice, nx, ny, max_level)
 
 
-@compiled
+@inner
 def _cell_nodes(lattice, a, b, level, max_level, nodes):
     """Look up the 3 x 3 nodes of a cell, row by row in x."""
     half = 1 << (max_level - level)
@@ -220,7 +220,7 @@ def _cell_nodes(lattice, a, b, level, max_level, nodes):
         nodes[m] = lattice[(2 * a + m // 3) * half, (2 * b + m % 3) * half] - 1
 
 
-@compiled
+@inner
 def _resized(pupil, data, n_nodes, room):
     """Copy nodes into arrays of another size; loops compile in a tenth of the time that slices take."""
     new_pupil, new_data = np.empty((room, 2)), np.empty((data.shape[0], room, data.shape[2]))
@@ -232,7 +232,7 @@ def _resized(pupil, data, n_nodes, room):
     return new_pupil, new_data
 
 
-@compiled
+@inner
 def _trace(
     rows, actions, curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, tilt, pupil, data, first, end
 ):
@@ -247,7 +247,7 @@ def _trace(
         )  # fmt: skip
 
 
-@compiled
+@inner
 def _add_nodes(lattice, pupil, data, n_nodes, cells, level, max_level, ny, da, db, box):
     """Give a number to the nodes of cells that have none yet; the arrays grow as needed."""
     half = 1 << (max_level - level)
@@ -266,7 +266,7 @@ def _add_nodes(lattice, pupil, data, n_nodes, cells, level, max_level, ny, da, d
     return pupil, data, n_nodes
 
 
-@compiled
+@inner
 def _leaves(state, offsets, level):
     """List the leaf cells of a level."""
     part = state[offsets[level] : offsets[level + 1]]
@@ -283,7 +283,7 @@ def _leaves(state, offsets, level):
     return found
 
 
-@compiled
+@inner
 def _balance(state, offsets, nx, ny, max_level):
     """Split leaves until neighbours differ by one level at most, from the finest cells up."""
     for level in range(max_level - 1, 0, -1):
@@ -299,7 +299,7 @@ def _balance(state, offsets, nx, ny, max_level):
                     _ensure(state, offsets, ny, level, i, j)
 
 
-@compiled
+@inner
 def _ensure(state, offsets, ny, level, a, b):
     """Make a cell exist by splitting the leaf that covers it, if there is one."""
     # find the ancestor that is settled, then split downwards
@@ -319,7 +319,7 @@ def _ensure(state, offsets, ny, level, a, b):
             state[offsets[mid + 1] + child] = kind
 
 
-@compiled
+@inner
 def _triangulate(state, offsets, lattice, nx, ny, max_level):
     """Fan every leaf around its centre; an edge is halved where one side asks for it and none is coarser."""
     total = 0

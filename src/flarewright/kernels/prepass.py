@@ -6,7 +6,7 @@ symmetric in x and only x >= 0 is traced (Hullin 2011, section 4.2, "Symmetries"
 
 import numpy as np
 
-from ._jit import compiled
+from ._jit import compiled, inner
 from .trace import ALIVE, REL, STOP_X, WEIGHT, X, Y, trace_nodes
 
 # paths seen by fewer cells of the pre-pass than this are searched for spots between its samples
@@ -14,13 +14,13 @@ FEW_CELLS = 12
 PROBES = 8
 
 
-@compiled
+@inner
 def _outside(value_low, value_high, slack):
     """Tell whether a quantity stays above 1 between samples, allowing for `slack` of its range below the least."""
     return value_low - slack * (value_high - value_low) > 1.0
 
 
-@compiled
+@inner
 def _stop_outside(data, nodes, crossing, iris_radius, slack):
     """Tell whether a patch misses the iris at one crossing: its widened box in the stop plane lies outside."""
     u_low, u_high, v_low, v_high = np.inf, -np.inf, np.inf, -np.inf
@@ -36,7 +36,7 @@ def _stop_outside(data, nodes, crossing, iris_radius, slack):
     return du * du + dv * dv > iris_radius * iris_radius
 
 
-@compiled
+@inner
 def rejected(data, nodes, crossings, iris_radius, slack):
     """Tell whether no ray of a patch can pass: all samples dead, all beyond a rim, or all beside the iris."""
     low, high, alive = np.inf, -np.inf, 0
@@ -140,7 +140,7 @@ def find_box(
     return found, sums
 
 
-@compiled
+@inner
 def _doubtful(data, nodes, nx, ny, crossings, iris_radius):
     """Tell whether a rejected cell may still hold a spot: limits change so fast around it that they may dip below 1."""
     low, change, alive = np.inf, 0.0, 0
@@ -168,7 +168,7 @@ def _doubtful(data, nodes, nx, ny, crossings, iris_radius):
     return True
 
 
-@compiled
+@inner
 def _passes(data, k, crossings, iris_radius):
     """Tell whether a ray passes every rim, and the circle around the iris at each crossing."""
     if data[k, ALIVE] == 0.0 or data[k, REL] > 1.0:
@@ -180,7 +180,7 @@ def _passes(data, k, crossings, iris_radius):
     return True
 
 
-@compiled
+@inner
 def _probe(
     rows, actions, curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, tilt,
     crossings, iris_radius, corners, hx, hy, found, sums,
@@ -202,7 +202,7 @@ def _probe(
             sums[3] += 1.0
 
 
-@compiled
+@inner
 def _weigh(data, nodes, share, view_radius, sums):
     """Add a pre-pass cell's flux, seen flux, flux times irradiance and visibility, for both halves of the pupil."""
     weight, alive = 0.0, 0

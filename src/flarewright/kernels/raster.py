@@ -9,7 +9,7 @@ from math import floor, sqrt
 
 import numpy as np
 
-from ._jit import compiled, inlined
+from ._jit import compiled, inlined, inner
 from .clip import PX, PY
 
 
@@ -27,14 +27,14 @@ def _share(c, la, lb, l_inverse, ra, rb, r_inverse):
     return left - _right_of(c + 1.0, ra, rb, r_inverse) + _right_of(c, ra, rb, r_inverse)
 
 
-@compiled
+@inner
 def _step(k, way, count):
     """Walk around a polygon."""
     k += way
     return k - count if k >= count else k
 
 
-@compiled
+@inner
 def _fill_strip(flat, width, size, row, depth, xl0, xl1, xr0, xr1, start, gx, density_low, density_high, rgb, strip):
     """Add a strip of a polygon between two edges: exact coverage times the density at each pixel's centre.
 
@@ -74,7 +74,7 @@ def _fill_strip(flat, width, size, row, depth, xl0, xl1, xr0, xr1, start, gx, de
             flat[place + np.uint64(c)] += colour * strip[c]
 
 
-@compiled
+@inner
 def _mark_strip(flat, width, size, row, depth, xl0, xl1, xr0, xr1, density, rgb):
     """Add a strip of even density to a picture of differences along its rows: only the pixels at its edges change."""
     la, lb = min(xl0, xl1), max(xl0, xl1)

@@ -8,7 +8,7 @@ from math import sqrt
 
 import numpy as np
 
-from ._jit import compiled
+from ._jit import compiled, inner
 from .bend import ALIVE, REFLECT, REL, STOP, STOP_X, WEIGHT, X, Y, bend_at
 from .intersect import (
     AXES,
@@ -75,7 +75,7 @@ def cross_shape(shapes, row, vertex, x, y, z, dx, dy, dz, heading, eta, mirror):
     return x + t * dx, y + t * dy, z + t * dz, nx, ny, nz, px * px + py * py, cos_in, cos_out, ok
 
 
-@compiled
+@inner
 def _turn(shapes, row, x, y, z):
     """Components of a vector along a row's own axes."""
     return (
@@ -85,7 +85,7 @@ def _turn(shapes, row, x, y, z):
     )
 
 
-@compiled
+@inner
 def _turn_back(shapes, row, x, y, z):
     """Undo `_turn`."""
     return (

@@ -11,13 +11,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import LensError
-from ..kernels.matrix import path_matrices as _path_matrices
+from ..kernels import matrix
 from ..model import Lens, Stop, Surface
 from .dispersion import refractive_index
 from .paths import LightPath, direct_path
 from .shape import curvature_across
 
 Matrix = NDArray[np.float64]
+
+# a few dozen steps: Python has them done before a compiled kernel would be loaded
+_path_matrices = getattr(matrix.path_matrices, "py_func", matrix.path_matrices)
 
 D_LINE_NM = 587.56
 
