@@ -29,7 +29,7 @@ import numpy as np
 
 import flarewright
 from flarewright.kernels.raster import fill_polygon
-from flarewright.model import Camera, Iris, Lens, Light, Output, Project, Quality
+from flarewright.model import Art, Camera, Iris, Lens, Light, Output, Project, Quality, Rule
 from flarewright.optics.bundle import find_region, front_box, trace_points
 from flarewright.optics.pack import pack_lens
 from flarewright.optics.paraxial import first_order
@@ -39,7 +39,7 @@ from flarewright.render.prepare import load_lens, settle
 from flarewright.render.render import render
 from flarewright.render.shot import make_opening, make_shots
 
-PARTS = ("yardsticks", "trace", "raster", "frame", "startup", "memory")
+PARTS = ("yardsticks", "trace", "raster", "frame", "art", "startup", "memory")
 
 LIGHT = (10.0, 5.0)
 """Field angles of the frames' light, degrees."""
@@ -229,6 +229,26 @@ def frame(repeat: int) -> Rows:
     return found
 
 
+def art(repeat: int) -> Rows:
+    """The Heliar's frame with every ghost changed by hand; the first row is the frame without."""
+    plain = heliar_frame("final", starburst=False)
+    changes: dict[str, dict[str, Any]] = {
+        "unchanged": {},
+        "gain, tint and offset": {"gain": 2.0, "tint": (1.0, 0.5, 0.2), "offset_px": (5.0, 0.0)},
+        "scale": {"scale": 1.5},
+        "ramp": {"ramp": ((0.0, 1.0, 1.0, 1.0), (1.0, 1.0, 0.5, 0.2))},
+        "blur of 3 pixels": {"blur_px": 3.0},
+        "blur of 40 pixels": {"blur_px": 40.0},
+    }
+    found: Rows = []
+    for name, change in changes.items():
+        project = plain.replace(art=Art(rules=(Rule(select="all", **change),)))
+        seconds = median_seconds(lambda project=project: render(project), repeat)  # type: ignore[misc]
+        ratio = 1e3 * seconds / found[0]["value"] if found else None
+        found.append(row("art", f"Heliar final 1280x720, {name}", 1e3 * seconds, "ms", ratio, "unchanged"))
+    return found
+
+
 # --- commands
 
 
@@ -337,6 +357,7 @@ def main(arguments: list[str] | None = None) -> None:
         "trace": lambda: trace(asked.repeat, scalar),
         "raster": lambda: raster(asked.repeat, bandwidth),
         "frame": lambda: frame(asked.repeat),
+        "art": lambda: art(asked.repeat),
         "startup": lambda: startup(asked.repeat),
         "memory": memory,
     }

@@ -17,6 +17,8 @@ COATINGS = {
         coating=fw.Stack(layers=(fw.Film(index=1.38, thickness_nm=99.6), fw.Film(index=1.70, thickness_nm=80.9)))
     ),
     "staggered": fw.Preset(name="staggered"),
+    "1970s": fw.Everywhere(coating=fw.Standard(name="early-multicoat")),
+    "modern": fw.Everywhere(coating=fw.Standard(name="modern-broadband")),
 }
 
 

@@ -188,6 +188,37 @@ def test_a_blur_keeps_flux_and_adds_its_variance(mode):
 
 
 @pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("sigma", [1.5, 9.0, 16.5, 24.0])
+def test_a_blur_is_the_convolution(mode, sigma):
+    """Against samples of a Gaussian, convolved directly; wide blurs are drawn coarsely, which must not show."""
+    plain, blurred = single(mode), single(mode, Rule(select=SOME, blur_px=sigma))
+    reach = int(6 * sigma)
+    taps = np.exp(-0.5 * (np.arange(-reach, reach + 1) / sigma) ** 2)
+    expected = plain
+    for axis in (0, 1):
+        expected = np.apply_along_axis(np.convolve, axis, expected, taps / taps.sum(), "full")
+    expected = expected[reach:-reach, reach:-reach]
+    error = np.abs(blurred - expected)[10:-10, 10:-10]
+    # the discrete analogue of a Gaussian has an excess kurtosis of 1 / sigma^2, which a narrow one shows at edges
+    assert error.max() < max(4e-3, 0.025 / sigma**2) * expected.max()
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_ghosts_blurred_together_are_the_sum_of_each(mode):
+    lights = [Light(field_deg=(8.0, 5.0)), Light(field_deg=(-3.0, 1.0), intensity=0.3)]
+    rules = [Rule(select="row:4", blur_px=3.0, gain=2.0), Rule(select="row:8", blur_px=4.0, offset_px=(5, 0))]
+    both = project(mode, *rules, Rule(select="4-2", ramp=((0, 1, 1, 1), (1, 0, 1, 1)))).replace(lights=lights)
+    layers = layers_of(both)
+    total = sum(picture(layer, SIZE) for name, layer in layers.items() if name.startswith("ghost."))
+    without = layers_of(both.replace(output={"layers": "passes", "starburst": False}))
+    np.testing.assert_allclose(picture(layers["ghosts"], SIZE), total, rtol=1e-4, atol=1e-6 * total.max())
+    # fewer sharp details only; what is blurred is drawn in full in both
+    summed = picture(without["ghosts"], SIZE)
+    assert np.abs(summed - total).max() < 0.05 * total.max()
+    np.testing.assert_allclose(summed.sum(axis=(0, 1)), total.sum(axis=(0, 1)), rtol=2e-3)
+
+
+@pytest.mark.parametrize("mode", MODES)
 def test_a_blur_is_that_of_the_whole_ghost_at_the_picture_s_edge(mode):
     """Light just outside the picture is blurred into it, and no border darkens."""
     rules = [Rule(select="all", enable=False), Rule(select=SOME, enable=True, blur_mm=2.0)]

@@ -7,6 +7,7 @@ import threading
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -150,17 +151,23 @@ def _final(
 
     def draw(group: list[int]) -> list[Plane | None]:
         canvas = blank(shots[0].size_px)
+        # blurring is linear, so ghosts of one blur are blurred together
+        alike: dict[float, list[FinalPass]] = {}
         for k in group:
             if meter.cancelled.is_set():
                 break
             for item in found[k]:
-                if item.region.seen_flux > 0.0 and item.art.alone:
-                    draw_alone(item, quality, canvas, meter.cancelled)
+                if item.region.seen_flux > 0.0 and item.art.ramps:
+                    draw_alone([item], quality, canvas, meter.cancelled)
+                elif item.region.seen_flux > 0.0 and item.art.blur:
+                    alike.setdefault(item.art.blur, []).append(item)
                 elif item.region.seen_flux > 0.0:
                     # a layer of its own may be graded up, so it is drawn in full
                     visibility = float("inf") if k in alone else contrast(item, level)
                     draw_final(item, quality, canvas, visibility, meter.cancelled)
             meter.step(f"ghost {found[k][0].path.name}")
+        for together in alike.values():
+            draw_alone(together, quality, canvas, meter.cancelled)
         return canvas.planes
 
     named = [found[k][0].path for k in order]
@@ -187,10 +194,14 @@ def _draft(
                 if not changed.alone:
                     draw_draft_by_hand(shot, path, changed, picture)
         sum_rows(picture)
-        for shot in shots:
-            for path, changed in by_hand:
-                if changed.alone:
-                    picture += draft_alone(shot, path, changed)
+        # blurring is linear, so ghosts of one blur are blurred together
+        alike: dict[object, list[tuple[Shot, LightPath, PathArt]]] = {}
+        for number, (shot, (path, changed)) in enumerate(product(shots, by_hand)):
+            if changed.alone:
+                key = ("ramp", number) if changed.ramps else changed.blur
+                alike.setdefault(key, []).append((shot, path, changed))
+        for together in alike.values():
+            picture += draft_alone([(shot, path) for shot, path, _ in together], [art for *_, art in together])
         for k in group:
             meter.step(f"ghost {paths[k].name}")
         return [picture]

@@ -17,7 +17,8 @@ from ..kernels.matrix import draw_matrix_ghosts, path_matrices
 from ..kernels.raster import sum_rows
 from ..optics.paths import LightPath
 from .art import Frame, PathArt
-from .grade import finish
+from .canvas import DETAILS, Plane, merge
+from .grade import coarseness, finish
 from .shot import Shot
 
 Floats = NDArray[np.float64]
@@ -76,28 +77,35 @@ def draw_draft_by_hand(shot: Shot, path: LightPath, art: PathArt, differences: F
     draw_draft(replace(shot, to_pixels=placed), [path], differences, art.rgb)
 
 
-def draft_alone(shot: Shot, path: LightPath, art: PathArt) -> Floats:
-    """Draw one path on a plane of its own, ramped and blurred.
+def draft_alone(ghosts: Sequence[tuple[Shot, LightPath]], art: Sequence[PathArt]) -> Floats:
+    """Draw ghosts on a plane of their own, ramped and blurred.
 
     Parameters
     ----------
-    shot : Shot
-    path : LightPath
-    art : PathArt
+    ghosts : sequence of (Shot, LightPath)
+        One with a ramp, or any number without that share a blur: blurring is linear.
+    art : sequence of PathArt
+        One a ghost.
 
     Returns
     -------
     ndarray, shape (3, H, W)
         Flux per pixel.
     """
-    (width, height), (mx, my) = shot.size_px, art.margin(shot.to_pixels)
-    frame = _frame(shot, path) if art.framed else None
-    placed = art.place(shot.to_pixels, frame)
+    shot, first = ghosts[0][0], art[0]
+    detail = coarseness(first, shot.to_pixels)
+    own = shot.to_pixels / 2.0**detail
+    width, height = (-(-side // 2**detail) for side in shot.size_px)
+    mx, my = first.margin(own)
     sheet = np.zeros((3, height + 2 * my, width + 2 * mx))
-    moved = replace(shot, to_pixels=placed + np.array([mx, my, 0.0, 0.0]))
-    draw_draft(moved, [path], sheet, art.rgb)
+    frames = [_frame(shot, path) if each.framed else None for (shot, path), each in zip(ghosts, art, strict=True)]
+    places = [each.place(shot.to_pixels, frame) / 2.0**detail for each, frame in zip(art, frames, strict=True)]
+    for (lit, path), each, placed in zip(ghosts, art, places, strict=True):
+        draw_draft(replace(lit, to_pixels=placed + np.array([mx, my, 0.0, 0.0])), [path], sheet, each.rgb)
     sum_rows(sheet)
-    return np.asarray(finish(sheet, art, frame, placed, shot.to_pixels), dtype=np.float64)
+    planes: list[Plane | None] = [None] * DETAILS
+    planes[detail] = finish(sheet, first, frames[0], places[0], own)
+    return np.asarray(merge(planes, shot.size_px), dtype=np.float64)
 
 
 def _frame(shot: Shot, path: LightPath) -> Frame:

@@ -7,6 +7,7 @@ colour runs smoothly instead of in steps.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import sqrt
@@ -22,7 +23,7 @@ from ..optics.bundle import Region, find_region, trace_bundle, trace_grid
 from ..optics.paths import LightPath
 from .art import PLAIN, Frame, PathArt
 from .canvas import Canvas, blank, merge
-from .grade import finish
+from .grade import coarseness, finish
 from .shot import Shot
 
 Floats = NDArray[np.float64]
@@ -172,24 +173,29 @@ def draw_final(
             )  # fmt: skip
 
 
-def draw_alone(item: FinalPass, quality: Quality, canvas: Canvas, stop: Event | None = None) -> None:
-    """Draw one path of one light on a plane of its own, ramp and blur it, and add it to a canvas.
+def draw_alone(items: Sequence[FinalPass], quality: Quality, canvas: Canvas, stop: Event | None = None) -> None:
+    """Draw ghosts on a plane of their own, ramp and blur it, and add it to a canvas.
 
     Parameters
     ----------
-    item : FinalPass
+    items : sequence of FinalPass
+        One with a ramp, or any number without that share a blur: blurring is linear.
     quality : Quality
     canvas : Canvas
-        Added to, at full resolution.
+        Added to.
     stop : Event, optional
         Set to leave off between two wavelengths.
     """
-    own, art = item.shot.to_pixels, item.art
-    (width, height), (mx, my) = canvas.size_px, art.margin(own)
-    sheet = blank((width + 2 * mx, height + 2 * my))
-    draw_final(replace(item, to_pixels=item.to_pixels + np.array([mx, my, 0.0, 0.0])), quality, sheet, stop=stop)
-    plane, _ = canvas.scratch()
-    plane += finish(merge(sheet.planes, sheet.size_px), art, item.frame, item.to_pixels, own)
+    art, shot, frame = items[0].art, items[0].shot, items[0].frame
+    detail = coarseness(art, shot.to_pixels)
+    own = shot.to_pixels / 2.0**detail
+    plane, _ = canvas.scratch(detail)
+    mx, my = art.margin(own)
+    sheet = blank((plane.shape[2] + 2 * mx, plane.shape[1] + 2 * my))
+    for item in items:
+        shifted = item.to_pixels / 2.0**detail + np.array([mx, my, 0.0, 0.0])
+        draw_final(replace(item, to_pixels=shifted), quality, sheet, stop=stop)
+    plane += finish(merge(sheet.planes, sheet.size_px), art, frame, items[0].to_pixels / 2.0**detail, own)
 
 
 def _bridges(traced: list[Floats], view_radius: float, scale: float, visibility: float) -> list[int]:
