@@ -89,7 +89,11 @@ PROJECT_FILES = {
     "unknown preset": ('coating = "preset:gold"\n' + PROJECT, "gold"),
     "faster than the lens": ("f_number = 1.0\n" + PROJECT, "f/1 is faster"),
     "huge picture": (PROJECT + "[camera]\nsize_px = [100000, 10]\n", "between 1 and 32768"),
-    "unknown quality": (PROJECT + '[quality]\nmode = "best"\n', "'draft' or 'final'"),
+    "unknown quality": (PROJECT + '[quality]\nmode = "best"\n', "'draft', 'final' or 'reference'"),
+    "error of nothing": (PROJECT + "[quality]\nreference_error = 0\n", "quality.reference_error should be greater"),
+    "error of pixels": (PROJECT + '[quality]\nreference_error_of = "pixels"\n', "'total' or 'blocks'"),
+    "no samples": (PROJECT + "[quality]\nreference_samples = 0\n", "quality.reference_samples should be greater"),
+    "seed is negative": (PROJECT + "[quality]\nseed = -1\n", "quality.seed should be greater"),
     "two blades": (PROJECT + "[iris]\nblades = 2\n", "at least 3"),
     "rule without ghosts": (PROJECT + "[[art.rules]]\ngain = 2\n", "art.rules[0].select is missing"),
     "rule for nonsense": (PROJECT + '[[art.rules]]\nselect = "big"\n', "'big' chooses no ghosts"),
@@ -114,6 +118,7 @@ PROJECT_FILES = {
 
 H = ["render", "heliar-tronnier"]
 GOOD = ["--light", "10,5", "-o", "a.exr"]
+REF = ["--quality", "reference"]
 
 COMMAND_LINES = {
     "unknown command": (["rendre"], "no such command 'rendre'"),
@@ -163,8 +168,19 @@ COMMAND_LINES = {
     "gain of a nonsense row": ([*H, *GOOD, "--gain", "row:x=2"], "chooses no ghosts"),
     "unknown preset": ([*H, *GOOD, "--coating", "preset:gold"], "gold"),
     "coating file missing": ([*H, *GOOD, "--coating", "no.toml"], "no.toml"),
-    "unknown quality": ([*H, *GOOD, "--quality", "best"], "--quality should be 'draft' or 'final'"),
+    "unknown quality": ([*H, *GOOD, "--quality", "best"], "--quality should be 'draft', 'final' or 'reference'"),
     "no wavelengths": ([*H, *GOOD, "--wavelengths", "0"], "--wavelengths"),
+    "error above 1": ([*H, *GOOD, *REF, "--error", "2"], "--error should be less than or equal to 1"),
+    "error nan": ([*H, *GOOD, *REF, "--error", "nan"], "--error should be a finite number"),
+    "error of pixels": ([*H, *GOOD, *REF, "--error-of", "pixels"], "--error-of should be 'total' or 'blocks'"),
+    "no samples": ([*H, *GOOD, *REF, "--samples", "0"], "--samples should be greater than or equal to 1"),
+    "half a sample": ([*H, *GOOD, *REF, "--samples", "0.5"], "'--samples'"),
+    "negative seed": ([*H, *GOOD, *REF, "--seed", "-1"], "--seed should be greater than or equal to 0"),
+    "no time": ([*H, *GOOD, *REF, "--time-limit", "0"], "--time-limit 0 is no time"),
+    "time nan": ([*H, *GOOD, *REF, "--time-limit", "nan"], "--time-limit nan is no time"),
+    "time for final quality": ([*H, *GOOD, "--time-limit", "5"], "works with --quality reference only"),
+    "resume from nothing": ([*H, *GOOD, *REF, "--resume", "no.npz"], "no.npz does not exist"),
+    "resume from a lens": ([*H, *GOOD, *REF, "--resume", "lens.toml"], "no state file of a reference render"),
     "size is one number": ([*H, *GOOD, "--size", "640"], "--size '640'"),
     "size is not whole": ([*H, *GOOD, "--size", "640.5x480"], "whole numbers"),
     "size zero": ([*H, *GOOD, "--size", "0x480"], "--size: 0x480"),

@@ -56,6 +56,7 @@ class FakeRendering:
     layers: tuple[Layer, ...]
     summary: dict = field(default_factory=lambda: {"efl_mm": 1.0, "far": float("inf")})
     remarks: tuple[str, ...] = ("a remark",)
+    ledger: None = None
 
 
 @pytest.fixture
@@ -63,7 +64,7 @@ def projects(monkeypatch):
     """Replace the renderer by one that notes what it was asked for."""
     seen = []
 
-    def fake(project, *, threads=None, progress=None):
+    def fake(project, **options):
         seen.append(project)
         width, height = project.camera.size_px
         beauty = Layer("beauty", np.full((height, width, 3), 1e5, np.float32), (0, 0, width, height))
@@ -116,7 +117,8 @@ def test_every_flag_reaches_the_project(capsys, projects, folder):
         "--iris-image", "iris.png", "--coating", "quarter-wave:550", "--quality", "draft", "--wavelengths", "3",
         "--size", "10x8", "--sensor", "24x18", "--layers", "ghosts", "--brightest", "4", "--colorspace", "acescg",
         "--half", "--paths", "same-side", "--focus", "2000", "--sensor-distance", "82.5", "--no-starburst",
-        "--full-windows", "--exposure", "-2", "--view", "filmic", "--threads", "1", "-o", "a.exr",
+        "--full-windows", "--exposure", "-2", "--view", "filmic", "--threads", "1", "--seed", "5", "--error", "0.1",
+        "--error-of", "total", "--samples", "1000", "-o", "a.exr",
     )  # fmt: skip
     (project,) = projects
     flat = Tabulated(wavelength_nm=(400, 700), power=(1, 1))
@@ -126,6 +128,9 @@ def test_every_flag_reaches_the_project(capsys, projects, folder):
     assert project.iris is not None
     assert project.iris.model_dump() == {"blades": 7, "rotation_deg": -5.0, "rounding": 0.5, "mask": "iris.png"}
     assert (project.quality.mode, project.quality.wavelengths, project.quality.paths) == ("draft", 3, "same-side")
+    quality = project.quality
+    assert (quality.seed, quality.reference_samples) == (5, 1000)
+    assert (quality.reference_error, quality.reference_error_of) == (0.1, "total")
     assert (project.camera.size_px, project.camera.sensor_mm) == ((10, 8), (24, 18))
     assert (project.camera.focus_distance, project.camera.sensor_distance) == (2000, 82.5)
     output = project.output

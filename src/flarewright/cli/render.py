@@ -12,6 +12,9 @@ from .common import check_place, print_json, tell
 
 if TYPE_CHECKING:
     from ..model import Layer, Project
+    from ..model.reference_state import ReferenceState
+    from ..render.ledger import Ledger
+    from ..render.reference import ReferenceRun
     from ..render.render import Rendering
 
 EPILOG = (
@@ -23,6 +26,7 @@ EPILOG = (
 )
 
 _LIGHT, _LENS, _CAMERA, _WORK, _ART, _OUT = "Light", "Lens", "Camera", "Quality", "Art direction", "Output"
+_REFERENCE = "Reference quality"
 
 
 def render(
@@ -88,7 +92,10 @@ def render(
     ] = None,
     quality: Annotated[
         str | None,
-        typer.Option(help="draft: matrices, milliseconds; final: traced rays.", rich_help_panel=_WORK),
+        typer.Option(
+            help="draft: matrices, milliseconds; final: traced rays; reference: random rays, all orders, with errors.",
+            rich_help_panel=_WORK,
+        ),
     ] = None,
     wavelengths: Annotated[
         int | None, typer.Option(help="Traced wavelengths: 3 for a draft, 7 to 31 for final.", rich_help_panel=_WORK)
@@ -120,6 +127,25 @@ def render(
     threads: Annotated[
         int | None, typer.Option(min=1, help="All cores when left out; pixels do not change.", rich_help_panel=_WORK)
     ] = None,
+    seed: Annotated[int | None, typer.Option(help="Begins the random numbers.", rich_help_panel=_REFERENCE)] = None,
+    error: Annotated[
+        float | None,
+        typer.Option(help="Go on to this relative standard error (0.02).", rich_help_panel=_REFERENCE),
+    ] = None,
+    error_of: Annotated[
+        str | None,
+        typer.Option(help="Of blocks (16x16 pixels) or of the total of all ghosts.", rich_help_panel=_REFERENCE),
+    ] = None,
+    samples: Annotated[
+        int | None, typer.Option(help="Trace no more points of the front than this.", rich_help_panel=_REFERENCE)
+    ] = None,
+    time_limit: Annotated[
+        float | None, typer.Option(metavar="SECONDS", help="End after this time.", rich_help_panel=_REFERENCE)
+    ] = None,
+    resume: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Go on from a .state.npz file.", rich_help_panel=_REFERENCE),
+    ] = None,
     layers: Annotated[
         str | None,
         typer.Option(help="beauty; passes: also starburst, ghosts; ghosts: also each ghost.", rich_help_panel=_OUT),
@@ -145,6 +171,9 @@ def render(
     no_png: Annotated[
         bool, typer.Option("--no-png", help="Write no PNG beside the EXR.", rich_help_panel=_OUT)
     ] = False,
+    ledger: Annotated[
+        bool, typer.Option("--ledger", help="Tell what became of the light.", rich_help_panel=_OUT)
+    ] = False,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print a summary as one JSON object.", rich_help_panel=_OUT)
     ] = False,
@@ -160,19 +189,31 @@ def render(
         raise ProjectError(f"--exposure {exposure:g} is out of range; choose between -100 and 100 stops")
     from .render_flags import Flags, build_project
 
+    state = _read_state(resume)
     flags = Flags(
         lens=lens, project=project, light=light or [], intensity=intensity or [], spectrum=spectrum or [],
         fstop=fstop, blades=blades, rotation=rotation, rounding=rounding, iris_image=iris_image, coating=coating,
         focus=focus, size=size, sensor=sensor, sensor_distance=sensor_distance, quality=quality,
         wavelengths=wavelengths, paths=paths, layers=layers, brightest=brightest, no_starburst=no_starburst,
         colorspace=colorspace, half=half, mute=mute or [], solo=solo or [], gain=gain or [], physical=physical,
+        seed=seed, error=error, error_of=error_of, samples=samples, resumed=None if state is None else state.project,
     )  # fmt: skip
     settings = build_project(flags)
+    run = _reference_run(settings, output, state, time_limit)
     _keep_inputs(settings, project, [output] if no_png else [output, output.with_suffix(".png")])
-    rendering = _render(settings, threads)
+    try:
+        rendering = _render(settings, threads, run, ledger)
+    except KeyboardInterrupt:
+        if run is not None and run.state_file is not None and run.state_file.exists():
+            tell([f"to go on: flarewright render --resume {run.state_file} -o {output}"])
+        raise
     files, remarks = _write(rendering, output, full_windows, None if no_png else (exposure, view))
     remarks = [*rendering.remarks, *remarks]
+    if run is not None:
+        remarks.append(f"to go on to a smaller --error: --resume {run.state_file}")
     tell(remarks)
+    if rendering.ledger is not None:
+        _print_ledger(rendering.ledger)
     if as_json:
         print_json({**rendering.summary, **files, "remarks": remarks})
     else:
@@ -189,7 +230,51 @@ def _keep_inputs(settings: Project, project_file: Path | None, outputs: list[Pat
                 raise ProjectError(f"{output} would replace the file it is made from; choose another name for -o")
 
 
-def _render(project: Project, threads: int | None) -> Rendering:
+def _read_state(path: Path | None) -> ReferenceState | None:
+    if path is None:
+        return None
+    from ..io.reference_state import read_state
+
+    return read_state(path)
+
+
+def _reference_run(
+    project: Project, output: Path, state: ReferenceState | None, time_limit: float | None
+) -> ReferenceRun | None:
+    """Check what only reference quality understands; None for the other qualities."""
+    if time_limit is not None and not 0.0 < time_limit < float("inf"):
+        raise ProjectError(f"--time-limit {time_limit:g} is no time; give seconds above 0")
+    if project.quality.mode != "reference":
+        for flag, given in (("--resume", state), ("--time-limit", time_limit)):
+            if given is not None:
+                raise ProjectError(
+                    f"{flag} works with --quality reference only, not with {project.quality.mode}; add it or leave "
+                    f"{flag} out"
+                )
+        return None
+    from ..io.reference_state import SUFFIX
+    from ..render.reference import ReferenceRun
+
+    return ReferenceRun(state, output.with_name(output.stem + SUFFIX), time_limit)
+
+
+def _print_ledger(ledger: Ledger) -> None:
+    """Print the ledger as a table to stderr."""
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(title=f"What became of the light: {ledger.entered_mm2:.6g} mm² entered")
+    table.add_column("light")
+    table.add_column("share of what entered", justify="right")
+    table.add_column("standard error", justify="right")
+    for line in ledger.lines:
+        table.add_row(line.words, f"{line.share:.6%}", f"{line.standard_error:.1e}")
+    table.add_section()
+    table.add_row("sum", f"{ledger.total.share:.6%}", f"{ledger.total.standard_error:.1e}")
+    Console(stderr=True, markup=False, highlight=False).print(table)
+
+
+def _render(project: Project, threads: int | None, run: ReferenceRun | None, ledger: bool) -> Rendering:
     """Render with a progress bar where someone looks at it."""
     import sys
 
@@ -198,7 +283,7 @@ def _render(project: Project, threads: int | None) -> Rendering:
 
     compile_for_render(project, threads)
     if not sys.stderr.isatty():
-        return render_project(project, threads=threads)
+        return render_project(project, threads=threads, run=run, ledger=ledger)
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
@@ -209,6 +294,8 @@ def _render(project: Project, threads: int | None) -> Rendering:
             project,
             threads=threads,
             progress=lambda done, what: bar.update(task, completed=done, description=what),
+            run=run,
+            ledger=ledger,
         )
 
 

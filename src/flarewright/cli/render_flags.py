@@ -29,6 +29,10 @@ _FLAG_OF = {
     "quality.mode": "--quality",
     "quality.wavelengths": "--wavelengths",
     "quality.paths": "--paths",
+    "quality.seed": "--seed",
+    "quality.reference_error": "--error",
+    "quality.reference_error_of": "--error-of",
+    "quality.reference_samples": "--samples",
     "output.layers": "--layers",
     "output.brightest": "--brightest",
     "output.colorspace": "--colorspace",
@@ -67,10 +71,15 @@ class Flags:
     solo: list[str]
     gain: list[str]
     physical: bool
+    seed: int | None = None
+    error: float | None = None
+    error_of: str | None = None
+    samples: int | None = None
+    resumed: Project | None = None
 
 
 def build_project(flags: Flags) -> Project:
-    """Return the project that the flags mean, on top of the project file if there is one.
+    """Return the project that the flags mean, on top of the project file or of a resumed render if there is one.
 
     Parameters
     ----------
@@ -85,7 +94,7 @@ def build_project(flags: Flags) -> Project:
     ProjectError
         When a flag cannot be used or something is missing; several findings are all listed.
     """
-    base = read_project(flags.project) if flags.project is not None else None
+    base = read_project(flags.project) if flags.project is not None else flags.resumed
     if base is None and flags.lens is None:
         raise ProjectError("no lens is given; name one (flarewright lenses lists them) or give a --project file")
     if base is None and not flags.light:
@@ -132,7 +141,15 @@ def _sections(flags: Flags) -> dict[str, dict[str, Any]]:
             "sensor_distance": flags.sensor_distance,
             "focus_distance": flags.focus,
         },
-        "quality": {"mode": flags.quality, "wavelengths": flags.wavelengths, "paths": flags.paths},
+        "quality": {
+            "mode": flags.quality,
+            "wavelengths": flags.wavelengths,
+            "paths": flags.paths,
+            "seed": flags.seed,
+            "reference_error": flags.error,
+            "reference_error_of": flags.error_of,
+            "reference_samples": flags.samples,
+        },
         "output": {
             "layers": flags.layers,
             "brightest": flags.brightest,

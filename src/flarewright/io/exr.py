@@ -121,7 +121,9 @@ def write_exr(
         # Passes always cover the picture; only a single ghost has a window worth cropping to.
         whole = k == 0 or full_windows or not layer.name.startswith("ghost.")
         pixels, window = _over_picture(layer, size_px) if whole else (layer.pixels, layer.window)
-        channels, lost = _channels(pixels, "" if k == 0 else f"{layer.name}.", pixel_type)
+        # a variance is an irradiance squared, far too small for half floats
+        kind: Literal["half", "float"] = "float" if layer.name.endswith(".variance") else pixel_type
+        channels, lost = _channels(pixels, "" if k == 0 else f"{layer.name}.", kind)
         clipped += lost
         header = _header(layer, window, size_px, pixel_aspect, colorspace)
         if k == 0:

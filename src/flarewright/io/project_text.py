@@ -30,9 +30,13 @@ ABOUT = {
     "camera.sensor_mm": "[36.0, 20.25]   # left out: 36 mm wide, square pixels",
     "camera.sensor_distance": "80.0   # last vertex to sensor, mm; left out: the paraxial focus",
     "camera.focus_distance": "2000.0   # mm in front of the first vertex; left out: infinity",
-    "quality.mode": '"draft": paraxial matrices, "final": traced ray bundles',
+    "quality.mode": '"draft": paraxial matrices, "final": traced ray bundles, "reference": random rays, all orders',
     "quality.wavelengths": "3 for a draft of the colours, 7 to 31 for final pictures",
     "quality.paths": '"all" or "same-side" of the stop',
+    "quality.seed": "begins the random numbers",
+    "quality.reference_error": "where reference quality ends: relative standard error of the ghosts",
+    "quality.reference_error_of": '"total": of their flux in the picture, "blocks": of blocks of 16 x 16 pixels',
+    "quality.reference_samples": "10000000   # left out: as many points of the front as the error needs",
     "output.layers": '"beauty", "passes" or "ghosts" (one layer a ghost)',
     "output.brightest": "20   # of the single ghosts only so many",
     "output.colorspace": '"rec709" or "acescg", linear',
@@ -120,7 +124,12 @@ def _without_none(value: Any) -> Any:
 def _left_out(project: Project) -> dict[tuple[str, ...], list[str]]:
     """Return by section the keys whose value is None and which are worth a commented line."""
     found: dict[tuple[str, ...], list[str]] = {}
-    for section, record in (("", project), ("camera", project.camera), ("output", project.output)):
+    for section, record in (
+        ("", project),
+        ("camera", project.camera),
+        ("quality", project.quality),
+        ("output", project.output),
+    ):
         for name in type(record).model_fields:
             if getattr(record, name) is None and f"{section}.{name}".strip(".") in ABOUT:
                 found.setdefault((section,) if section else (), []).append(name)

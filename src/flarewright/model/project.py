@@ -50,26 +50,39 @@ class Quality(Frozen):
 
     Attributes
     ----------
-    mode : {"draft", "final"}
-        draft: paraxial matrices; final: traced ray bundles.
+    mode : {"draft", "final", "reference"}
+        draft: paraxial matrices; final: traced ray bundles; reference: random rays, all orders of reflection.
     wavelengths : int
         Traced wavelengths; 3 is a draft of the colours, 7 to 31 for final pictures.
     bridge : bool
-        Fill the gap between neighbouring wavelengths so that lateral colour shows no steps (final only).
+        Fill the gap between neighbouring wavelengths so that lateral colour shows no steps (final); sample the spectrum
+        in steps of 5 nm or finer instead of at the traced wavelengths alone (reference).
     paths : {"all", "same-side"}
         Which two-reflection paths: all, or those that reflect twice on one side of the stop.
     tolerance_px : float
         The bundle's grid is refined until interpolation errs by less than this, in pixels.
     cull : float
         Paths that carry less than this part of all ghost flux are left out, and said so.
+    seed : int
+        Begins the random numbers.
+    reference_error : float
+        Reference quality ends when the ghosts' relative standard error is below this.
+    reference_error_of : {"total", "blocks"}
+        Whose error: of the ghosts' whole flux in the picture, or of its blocks of 16 x 16 pixels.
+    reference_samples : int or None
+        Reference quality traces no more points of the front than this; None: as many as the error needs.
     """
 
-    mode: Literal["draft", "final"] = "final"
+    mode: Literal["draft", "final", "reference"] = "final"
     wavelengths: int = Field(7, ge=1, le=81)
     bridge: bool = True
     paths: Literal["all", "same-side"] = "all"
     tolerance_px: float = Field(0.25, gt=0.0, le=10.0)
     cull: float = Field(0.0, ge=0.0, lt=1.0)
+    seed: int = Field(0, ge=0, lt=2**63)
+    reference_error: float = Field(0.02, gt=0.0, le=1.0)
+    reference_error_of: Literal["total", "blocks"] = "blocks"
+    reference_samples: int | None = Field(None, ge=1)
 
 
 class Output(Frozen):

@@ -5,7 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from math import isfinite, pi
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from ..io.mask_image import read_mask
 from ..model import Layer, Project
@@ -15,9 +18,13 @@ from ..optics.paths import ghost_paths
 from .art import ResolvedArt, graded, resolve_art
 from .compose import beauty
 from .direct import DirectImage, direct_image, starburst_of
-from .ghosts import GhostPass, render_ghosts
+from .ghosts import render_ghosts
 from .prepare import Settled, settle
 from .shot import Shot, make_opening, make_shots
+
+if TYPE_CHECKING:
+    from .ledger import Ledger
+    from .reference import ReferenceRun
 
 Progress = Callable[[float, str], None]
 
@@ -35,15 +42,25 @@ class Rendering:
         Facts about lens and picture, ready for JSON.
     remarks : tuple of str
         What a person should know: repairs, estimates, what was left out.
+    ledger : Ledger or None
+        What became of the light, when asked for.
     """
 
     project: Project
     layers: tuple[Layer, ...]
     summary: dict[str, Any]
     remarks: tuple[str, ...]
+    ledger: Ledger | None = None
 
 
-def render(project: Project, *, threads: int | None = None, progress: Progress | None = None) -> Rendering:
+def render(
+    project: Project,
+    *,
+    threads: int | None = None,
+    progress: Progress | None = None,
+    run: ReferenceRun | None = None,
+    ledger: bool = False,
+) -> Rendering:
     """Render the flare of a project.
 
     Parameters
@@ -53,6 +70,10 @@ def render(project: Project, *, threads: int | None = None, progress: Progress |
         None: all cores. The pixels do not depend on it.
     progress : callable, optional
         Called with the finished part (0 to 1) and what was finished.
+    run : ReferenceRun, optional
+        Reference quality: where to go on, where to keep the state, how long to run.
+    ledger : bool
+        Whether to tell what became of the light; costs a second or so, nothing in reference quality.
 
     Returns
     -------
@@ -67,34 +88,95 @@ def render(project: Project, *, threads: int | None = None, progress: Progress |
     """
     settled = settle(project)
     mask = None if settled.iris.mask is None else read_mask(settled.iris.mask)
-    art = resolve_art(settled)
+    # the judge shows the physics and nothing else
+    art = ResolvedArt() if project.quality.mode == "reference" else resolve_art(settled)
     opening = make_opening(settled, mask)
     shots = make_shots(settled, opening)
+    if project.quality.mode == "reference":
+        drawn = _reference(settled, mask, run, threads, progress)
+    else:
+        drawn = _ghosts(settled, shots, art, threads, progress)
+    images = [direct_image(settled.lens, shot) for shot in shots]
+    passes = list(drawn.passes)
+    if project.output.starburst:
+        passes.insert(0, starburst_of(settled, shots, images, mask))
+    passes = [graded(layer, art.gain.get(layer.name, 1.0)) for layer in passes]
+    others = [graded(layer, art.gain.get("ghosts", 1.0)) for layer in drawn.others]
+    whole = beauty(passes, project.camera.size_px)
+    layers = (whole,) if project.output.layers == "beauty" else (whole, *passes, *others)
+    account = drawn.ledger
+    if ledger and account is None:
+        from .ledger import trace_ledger
+
+        account = trace_ledger(shots, project.quality.seed, threads=threads)
+    summary = {**_summary(settled, shots, images, art), **drawn.facts}
+    return Rendering(
+        project,
+        layers,
+        {**summary, "ledger": account.as_data()} if ledger and account is not None else summary,
+        (*settled.remarks, *drawn.remarks, *_remarks(settled, shots[0])),
+        account if ledger else None,
+    )
+
+
+@dataclass(frozen=True)
+class _Drawn:
+    """The ghosts as either kind of renderer made them: light that adds, further layers, and what to tell."""
+
+    passes: tuple[Layer, ...]
+    others: tuple[Layer, ...]
+    facts: dict[str, Any]
+    remarks: tuple[str, ...]
+    ledger: Ledger | None = None
+
+
+def _ghosts(
+    settled: Settled,
+    shots: tuple[Shot, ...],
+    art: ResolvedArt,
+    threads: int | None,
+    progress: Progress | None,
+) -> _Drawn:
+    project = settled.project
     paths = ghost_paths(settled.lens, project.quality.paths)
     singles = project.output.brightest if project.output.layers == "ghosts" else 0
     ghosts = render_ghosts(
         shots, paths, project.quality, singles=singles, art=art.paths, threads=threads, progress=progress
     )
-    images = [direct_image(settled.lens, shot) for shot in shots]
-    passes = [ghosts.total]
-    if project.output.starburst:
-        passes.insert(0, starburst_of(settled, shots, images, mask))
-    passes = [graded(layer, art.gain.get(layer.name, 1.0)) for layer in passes]
-    alone = [graded(layer, art.gain.get("ghosts", 1.0)) for layer in ghosts.singles]
-    whole = beauty(passes, project.camera.size_px)
-    layers = (whole,) if project.output.layers == "beauty" else (whole, *passes, *alone)
-    return Rendering(
-        project,
-        layers,
-        _summary(settled, shots, images, ghosts, art),
-        (*settled.remarks, *_remarks(settled, shots[0], ghosts)),
-    )
+    facts = {
+        "drawn": ghosts.drawn,
+        "dark": ghosts.dark,
+        "culled": ghosts.culled,
+        "culled_share": ghosts.culled_share,
+        "muted": ghosts.muted,
+    }
+    told = (f"{ghosts.culled} ghosts that carry {ghosts.culled_share:.2e} of the ghost light were left out",)
+    return _Drawn((ghosts.total,), ghosts.singles, {"ghosts": facts}, told if ghosts.culled else ())
 
 
-def _remarks(settled: Settled, shot: Shot, ghosts: GhostPass) -> tuple[str, ...]:
+def _reference(
+    settled: Settled,
+    mask: NDArray[np.float64] | None,
+    run: ReferenceRun | None,
+    threads: int | None,
+    progress: Progress | None,
+) -> _Drawn:
+    from .reference import ReferenceRun, render_reference
+
+    found = render_reference(settled, mask, run or ReferenceRun(), threads=threads, progress=progress)
+    told = list(found.remarks)
+    if settled.project.output.layers == "ghosts":
+        told.append("reference quality has no layer for each ghost; final quality has")
+    art = settled.project.art
+    if not art.physical and (art.rules or art.gain):
+        told.append("reference quality shows the physics: art direction is left out")
+    if settled.project.quality.paths != "all":
+        told.append(f"reference quality traces every path, not only {settled.project.quality.paths} ones")
+    return _Drawn(found.layers, found.variances, {"reference": found.facts}, tuple(told), found.ledger)
+
+
+def _remarks(settled: Settled, shot: Shot) -> tuple[str, ...]:
     told = []
-    if ghosts.culled:
-        told.append(f"{ghosts.culled} ghosts that carry {ghosts.culled_share:.2e} of the ghost light were left out")
     order = settled.order
     blur_px = abs(order.sensor_distance - order.bfl) / order.f_number * float(shot.to_pixels[2])
     if settled.project.output.starburst and blur_px > 1.0:
@@ -122,9 +204,7 @@ def _scene_scale(settled: Settled, shot: Shot) -> float:
     return float(pi * on_axis.transmittance * opened * slope**2)
 
 
-def _summary(
-    settled: Settled, shots: tuple[Shot, ...], images: list[DirectImage], ghosts: GhostPass, art: ResolvedArt
-) -> dict[str, Any]:
+def _summary(settled: Settled, shots: tuple[Shot, ...], images: list[DirectImage], art: ResolvedArt) -> dict[str, Any]:
     order, project = settled.order, settled.project
     return {
         "lens": settled.lens.name,
@@ -150,13 +230,6 @@ def _summary(
             }
             for shot, image in zip(shots, images, strict=True)
         ],
-        "ghosts": {
-            "drawn": ghosts.drawn,
-            "dark": ghosts.dark,
-            "culled": ghosts.culled,
-            "culled_share": ghosts.culled_share,
-            "muted": ghosts.muted,
-        },
     }
 
 

@@ -1,0 +1,268 @@
+"""Monte Carlo through the whole lens: at every surface a ray reflects or refracts, to any order of reflection.
+
+Nothing here knows of paths. A ray that leaves a surface meets the neighbour in its direction of travel, until it is
+absorbed by a rim or the stop, lands on the sensor's plane, or leaves through the front.
+"""
+
+import numpy as np
+
+from ._jit import compiled
+from .clip import blade_value
+from .intersect import intersect_conic
+from .mask import mask_value
+from .philox import refill
+from .trace import bend
+
+# what became of the light; in the picture and beside it by order of reflection 0, 2, 4 and more than 4
+ENTERED, AT_STOP, AT_BARREL, RETURNED, LOST, IN_PICTURE, BESIDE = 0, 1, 2, 3, 4, 5, 9
+TALLIES = 13
+
+# a ray that still runs after so many surfaces is given up, and told as lost
+MOST_STEPS = 4096
+# above this reflectance a ray of high order is not split: one of its two parts would carry next to nothing
+SPLIT_BELOW = 0.5
+# rays that wait to be traced
+STACK = 512
+
+# columns of a waiting ray
+_X, _Y, _Z, _DX, _DY, _DZ, _WEIGHT, _ROW, _HEADING, _ORDER, _FIRST, _SECOND = range(12)
+
+
+@compiled
+def _passes_stop(blades, x, y):
+    for b in range(blades.shape[0]):
+        if blade_value(blades, b, x, y) > 0.0:
+            return False
+    return True
+
+
+@compiled
+def _enters(curvature, conic, z_vertex, inv_semi, row, x, y, direction):
+    """Tell whether a ray from the first vertex' plane meets the first surface within its rim."""
+    t, _, discriminant = intersect_conic(
+        curvature[row], conic[row], x, y, -z_vertex[row], direction[0], direction[1], direction[2], 1.0
+    )
+    hx, hy = x + t * direction[0], y + t * direction[1]
+    return discriminant >= 0.0 and (hx * hx + hy * hy) * inv_semi[row] * inv_semi[row] <= 1.0
+
+
+@compiled
+def trace_batch(
+    curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, rows, direction, axes, box, side,
+    cumulative, luminances, rgbs, heroes, boost, key, batch, light, blades, mask, half, to_pixels, size,
+    planes, tallies, paths,
+):  # fmt: skip
+    """Trace one batch of points of the front, each at several wavelengths, through all orders of reflection.
+
+    Parameters
+    ----------
+    curvature, conic, z_vertex, inv_semi : ndarray, shape (K,)
+        Geometry of the rows.
+    n_gap : ndarray, shape (S, K + 1)
+        Index before row 0 and behind each row, per spectral sample.
+    reflectance : ndarray, shape (S, K, M)
+        R against the cosine on the lower-index side, uniform over [0, 1].
+    sensor_z : float
+    rows : tuple of int
+        The stop's row and that of the first surface.
+    direction : ndarray, shape (3,)
+        Of the light's rays.
+    axes : ndarray, shape (2, 2)
+        Upright (x, y) of the axes in which `box` is given.
+    box : ndarray, shape (4,)
+        x0, x1, y0, y1 of the first vertex' plane; points are spread evenly in it.
+    side : int
+        The batch has side x side points, one at random in each cell of the box.
+    cumulative : ndarray, shape (S,)
+        Chance of a spectral sample or one before it.
+    luminances : ndarray, shape (S,)
+        Luminance of each sample over its chance.
+    rgbs : ndarray, shape (S, 3)
+        Colour of each sample over its chance.
+    heroes : int
+        Wavelengths traced from each point, evenly spread over the chances.
+    boost : float
+        Chance over reflectance of a reflection's being followed, from the third on.
+    key : ndarray, shape (2,), uint64
+    batch, light : int
+        Which stream of random numbers.
+    blades, mask, half
+        As in `draw_bundle`; the mask may be None.
+    to_pixels : ndarray, shape (4,)
+    size : tuple of int
+        Width and height of the picture.
+    planes : ndarray, shape (2, 3, H, W), float32
+        Added to: light after two reflections, after more; of height 0 when no picture is wanted.
+    tallies : ndarray, shape (TALLIES,)
+        Added to: luminous flux by what became of it.
+    paths : ndarray, shape (2, K, K)
+        Added to: luminous flux of two reflections by their rows (j, i), in the picture and beside it.
+
+    Notes
+    -----
+    Each point stands for an equal part of the box. The first two reflections are split: both parts of the light are
+    followed, with weights R and 1 - R. Later reflections are followed by chance, with weights that keep the mean.
+    Chaumond 2007 chooses one part at random at every surface, which has the same mean and more noise.
+    """
+    points = side * side
+    unit = (box[1] - box[0]) * (box[3] - box[2]) / (points * heroes)
+    cell_x, cell_y = (box[1] - box[0]) / side, (box[3] - box[2]) / side
+    stream, pool = np.empty(6, dtype=np.uint64), np.empty(4)
+    stack = np.empty((STACK, 12))
+    stream[4], stream[5] = key[0], key[1]
+    for point in range(points):
+        stream[0], stream[1] = np.uint64(0), np.uint64(point)
+        stream[2], stream[3] = np.uint64(batch), np.uint64(2 * light)
+        refill(stream, pool)
+        px = box[0] + (point % side + pool[0]) * cell_x
+        py = box[2] + (point // side + pool[1]) * cell_y
+        x, y = px * axes[0, 0] + py * axes[1, 0], px * axes[0, 1] + py * axes[1, 1]
+        if not _enters(curvature, conic, z_vertex, inv_semi, rows[1], x, y, direction):
+            continue
+        chance = pool[2]
+        for hero in range(heroes):
+            place = (hero + chance) / heroes
+            s = 0
+            while s < cumulative.shape[0] - 1 and cumulative[s] < place:
+                s += 1
+            stream[0], stream[1] = np.uint64(0), np.uint64(point * heroes + hero)
+            stream[2], stream[3] = np.uint64(batch), np.uint64(2 * light + 1)
+            _trace_tree(
+                curvature, conic, z_vertex, inv_semi, n_gap[s], reflectance[s], sensor_z, rows[0], x, y, direction,
+                unit, luminances[s], rgbs[s], boost, stream, pool, stack, blades, mask, half, to_pixels, size,
+                planes, tallies, paths,
+            )  # fmt: skip
+
+
+@compiled
+def _trace_tree(
+    curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, stop_row, start_x, start_y, direction,
+    unit, luminance, rgb, boost, stream, pool, stack, blades, mask, half, to_pixels, size, planes, tallies, paths,
+):  # fmt: skip
+    """Follow one ray and everything that splits off it."""
+    count = curvature.shape[0]
+    samples = reflectance.shape[1]
+    bright = unit * luminance
+    tallies[ENTERED] += bright
+    drawn = 4
+    x, y, z, dx, dy, dz = start_x, start_y, 0.0, direction[0], direction[1], direction[2]
+    weight = 1.0
+    row, heading, order, first, second = np.int64(0), np.int64(1), np.int64(0), np.int64(0), np.int64(0)
+    waiting = 0
+    steps = 0
+    while True:
+        ended = False
+        if row < 0:
+            tallies[RETURNED] += bright * weight
+            ended = True
+        elif row >= count:
+            t = (sensor_z - z) / dz
+            _land(
+                x + t * dx, y + t * dy, order, first, second, bright * weight, unit * weight, rgb, to_pixels, size,
+                planes, tallies, paths,
+            )  # fmt: skip
+            ended = True
+        elif steps >= MOST_STEPS:
+            tallies[LOST] += bright * weight
+            ended = True
+        elif row == stop_row:
+            t = (z_vertex[row] - z) / dz
+            x, y, z = x + t * dx, y + t * dy, z_vertex[row]
+            passing = 1.0 if _passes_stop(blades, x, y) else 0.0
+            if mask is not None:
+                passing *= mask_value(mask, half, x, y)
+            tallies[AT_STOP] += bright * weight * (1.0 - passing)
+            weight *= passing
+            ended = weight == 0.0
+            row += heading
+        else:
+            steps += 1
+            c, kappa, towards = curvature[row], conic[row], np.float64(heading)
+            zl = z - z_vertex[row]
+            t, root, discriminant = intersect_conic(c, kappa, x, y, zl, dx, dy, dz, towards)
+            x, y, zl = x + t * dx, y + t * dy, zl + t * dz
+            z = zl + z_vertex[row]
+            n_in = n_gap[row] if heading > 0 else n_gap[row + 1]
+            n_out = n_gap[row + 1] if heading > 0 else n_gap[row]
+            if discriminant < 0.0:
+                tallies[LOST] += bright * weight
+                ended = True
+            elif (x * x + y * y) * inv_semi[row] * inv_semi[row] > 1.0:
+                tallies[AT_BARREL] += bright * weight
+                ended = True
+            else:
+                tx, ty, tz, cos_in, cos_out, inside = bend(
+                    c, kappa, x, y, zl, dx, dy, dz, root, towards, n_in / n_out, 0.0
+                )
+                R = 1.0
+                if inside >= 0.0:
+                    place = min(cos_in if n_in <= n_out else cos_out, 1.0) * (samples - 1)
+                    cell = min(np.int64(place), samples - 2)
+                    R = reflectance[row, cell] + (place - cell) * (reflectance[row, cell + 1] - reflectance[row, cell])
+                # the shares of the reflected and of the refracted ray that are followed
+                up, on = 0.0, 1.0 - R
+                if R > 0.0:
+                    # beyond these the light is split: R and 1 - R
+                    chance = 1.0 if order < 2 else min(1.0, boost * R)
+                    alone = (order >= 2 and R > SPLIT_BELOW) or waiting == STACK
+                    up = R
+                    if alone or chance < 1.0:
+                        if drawn == 4:
+                            refill(stream, pool)
+                            drawn = 0
+                        u = pool[drawn]
+                        drawn += 1
+                        if alone:
+                            up, on = (1.0, 0.0) if u < R else (0.0, 1.0)
+                        else:
+                            up = R / chance if u < chance else 0.0
+                if up > 0.0:
+                    rx, ry, rz, _, _, _ = bend(c, kappa, x, y, zl, dx, dy, dz, root, towards, 1.0, 1.0)
+                    if rz * heading >= 0.0:
+                        tallies[LOST] += bright * weight * up
+                    elif on > 0.0:
+                        ray = stack[waiting]
+                        ray[_X], ray[_Y], ray[_Z], ray[_DX], ray[_DY], ray[_DZ] = x, y, z, rx, ry, rz
+                        ray[_WEIGHT], ray[_ROW], ray[_HEADING] = weight * up, row - heading, -heading
+                        ray[_ORDER] = order + 1
+                        ray[_FIRST], ray[_SECOND] = row if order == 0 else first, row if order == 1 else second
+                        waiting += 1
+                if on > 0.0:
+                    weight *= on
+                    dx, dy, dz = tx, ty, tz
+                    row += heading
+                    if dz * heading <= 0.0:
+                        tallies[LOST] += bright * weight
+                        ended = True
+                elif up > 0.0 and rz * heading < 0.0:
+                    weight *= up
+                    dx, dy, dz = rx, ry, rz
+                    first, second = row if order == 0 else first, row if order == 1 else second
+                    order += 1
+                    heading = -heading
+                    row += heading
+                else:
+                    ended = True
+        if ended:
+            if waiting == 0:
+                return
+            waiting -= 1
+            ray = stack[waiting]
+            x, y, z, dx, dy, dz = ray[_X], ray[_Y], ray[_Z], ray[_DX], ray[_DY], ray[_DZ]
+            weight, row, heading = ray[_WEIGHT], np.int64(ray[_ROW]), np.int64(ray[_HEADING])
+            order, first, second = np.int64(ray[_ORDER]), np.int64(ray[_FIRST]), np.int64(ray[_SECOND])
+            steps = 0
+
+
+@compiled
+def _land(x, y, order, first, second, bright, amount, rgb, to_pixels, size, planes, tallies, paths):
+    """Put light on the sensor's plane: into a pixel if it meets one."""
+    column, line = to_pixels[0] - to_pixels[2] * x, to_pixels[1] + to_pixels[3] * y
+    inside = 0.0 <= column < size[0] and 0.0 <= line < size[1]
+    kind = min(order // 2, 3)
+    tallies[(IN_PICTURE if inside else BESIDE) + kind] += bright
+    if order == 2:
+        paths[0 if inside else 1, first, second] += bright
+    if inside and order > 0 and planes.shape[2] > 0:
+        for channel in range(3):
+            planes[min(kind, 2) - 1, channel, int(line), int(column)] += amount * rgb[channel]

@@ -1,0 +1,130 @@
+"""The energy ledger: what became of the light that entered the lens."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from contextlib import closing
+from dataclasses import dataclass
+from itertools import islice
+from math import sqrt
+from typing import Any
+
+from ..kernels.montecarlo import AT_BARREL, AT_STOP, BESIDE, ENTERED, IN_PICTURE, LOST, RETURNED
+from .montecarlo import BALANCE, Sums, batches_in_order, ray_source, run_batch
+from .shot import Shot
+
+# random rays of a ledger without a picture: batches of so many points squared
+BATCHES, SIDE = 16, 64
+
+_ENDS = (
+    ("absorbed at the stop", "stop", AT_STOP),
+    ("absorbed at the barrel", "barrel", AT_BARREL),
+    ("back out of the front", "returned", RETURNED),
+    ("lost", "lost", LOST),
+    ("direct, in the picture", "direct.in_picture", IN_PICTURE),
+    ("direct, beside it", "direct.beside", BESIDE),
+    ("two reflections, in the picture", "ghosts.order2.in_picture", IN_PICTURE + 1),
+    ("two reflections, beside it", "ghosts.order2.beside", BESIDE + 1),
+    ("four reflections, in the picture", "ghosts.order4.in_picture", IN_PICTURE + 2),
+    ("four reflections, beside it", "ghosts.order4.beside", BESIDE + 2),
+    ("six or more, in the picture", "ghosts.order6+.in_picture", IN_PICTURE + 3),
+    ("six or more, beside it", "ghosts.order6+.beside", BESIDE + 3),
+)
+
+
+@dataclass(frozen=True)
+class LedgerLine:
+    """One end of the light.
+
+    Attributes
+    ----------
+    words : str
+        For a person.
+    name : str
+        For a program.
+    share : float
+        Part of the light that entered.
+    standard_error : float
+        Of the share.
+    """
+
+    words: str
+    name: str
+    share: float
+    standard_error: float
+
+
+@dataclass(frozen=True)
+class Ledger:
+    """What became of the light that entered.
+
+    Attributes
+    ----------
+    entered_mm2 : float
+        Luminous flux through the first surface within its rim, all lights; mm^2 per unit irradiance.
+    lines : tuple of LedgerLine
+    total : LedgerLine
+        The sum of all lines, which is 1 but for the chances taken with high orders of reflection.
+    """
+
+    entered_mm2: float
+    lines: tuple[LedgerLine, ...]
+    total: LedgerLine
+
+    def as_data(self) -> dict[str, Any]:
+        """Return the ledger as JSON holds it."""
+        return {
+            "entered_mm2": self.entered_mm2,
+            "shares": {line.name: line.share for line in self.lines},
+            "standard_errors": {line.name: line.standard_error for line in self.lines},
+            "sum": self.total.share,
+            "sum_standard_error": self.total.standard_error,
+        }
+
+
+def ledger_of(sums: Sums) -> Ledger:
+    """Read the ledger off the sums of batches.
+
+    Parameters
+    ----------
+    sums : Sums
+
+    Returns
+    -------
+    Ledger
+        All zero when no light entered.
+    """
+    mean, variance = sums.mean("figures"), sums.variance("figures")
+    entered = float(mean[ENTERED])
+    scale = 1.0 / entered if entered > 0.0 else 0.0
+
+    def line(words: str, name: str, k: int) -> LedgerLine:
+        return LedgerLine(words, name, float(mean[k]) * scale, sqrt(float(variance[k])) * scale)
+
+    balance = line("sum", "sum", BALANCE)
+    total = LedgerLine("sum", "sum", (1.0 if entered > 0.0 else 0.0) + balance.share, balance.standard_error)
+    return Ledger(entered, tuple(line(*end) for end in _ENDS), total)
+
+
+def trace_ledger(shots: Sequence[Shot], seed: int, *, threads: int | None = None) -> Ledger:
+    """Make the ledger of some lights by random rays, without a picture.
+
+    Parameters
+    ----------
+    shots : sequence of Shot
+    seed : int
+    threads : int, optional
+        None: all cores; the numbers do not depend on it.
+
+    Returns
+    -------
+    Ledger
+    """
+    sources = [ray_source(shot, seed, side=SIDE, light=k) for k, shot in enumerate(shots)]
+    sums = Sums(0, {}, {})
+    at_once = min(threads or os.cpu_count() or 1, BATCHES)
+    with closing(batches_in_order(lambda k: run_batch(sources, k, picture=False), 0, at_once)) as results:
+        for result in islice(results, BATCHES):
+            sums.add(result)
+    return ledger_of(sums)

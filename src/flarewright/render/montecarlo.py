@@ -1,0 +1,199 @@
+"""Random rays through the whole lens, in numbered batches: what the reference renderer and the ledger share."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Generator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
+from threading import Event
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..kernels.montecarlo import BESIDE, ENTERED, IN_PICTURE, TALLIES, trace_batch
+from ..optics.bundle import front_box
+from ..optics.color import luminance_weights
+from .shot import Shot
+
+Floats = NDArray[np.float64]
+Batch = dict[str, NDArray[Any]]
+
+# wavelengths traced from one point of the front: light of one place in several colours makes grey noise of coloured
+HEROES = 4
+# reflections to follow, on average, while a ray of high order crosses the lens once
+FOLLOWED = 0.5
+# side of the blocks for which errors are kept, pixels
+BLOCK = 16
+# figures behind the kernel's tallies: what all ends of light differ by from what entered, and all ghosts in the picture
+BALANCE, GHOSTS = TALLIES, TALLIES + 1
+
+
+@dataclass(frozen=True)
+class RaySource:
+    """One light and lens as the kernel reads them.
+
+    Attributes
+    ----------
+    shot : Shot
+    before, behind : tuple
+        What the kernel takes before and behind the number of the batch.
+    """
+
+    shot: Shot
+    before: tuple[Any, ...]
+    behind: tuple[Any, ...]
+
+
+def ray_source(shot: Shot, seed: int, *, side: int, light: int) -> RaySource:
+    """Prepare a light for random rays.
+
+    Parameters
+    ----------
+    shot : Shot
+        Its wavelengths are the spectral samples.
+    seed : int
+    side : int
+        A batch has side x side points of the front.
+    light : int
+        Its number, which keeps its random numbers apart from those of other lights.
+
+    Returns
+    -------
+    RaySource
+    """
+    packed, tilt, axes = shot.packed, shot.incidence.tilt, shot.incidence.axes
+    box = front_box(packed, tilt)
+    box[0] = -box[1]
+    direction = np.array([np.sin(tilt) * axes[1, 0], np.sin(tilt) * axes[1, 1], np.cos(tilt)])
+    rgb = shot.weights(packed.wavelengths_nm)
+    # a sample is drawn as often as it colours the picture
+    chance = np.abs(rgb).sum(axis=1)
+    chance /= chance.sum()
+    over = np.divide(1.0, chance, out=np.zeros_like(chance), where=chance > 0.0)[:, None] * shot.gain
+    middle = len(rgb) // 2
+    # R of the whole lens at normal incidence decides how many reflections of high order are worth following
+    total = float(packed.reflectance[middle, :, -1].sum())
+    before = (
+        packed.curvature, packed.conic, packed.z_vertex, packed.inv_semi, packed.n_gap, packed.reflectance,
+        packed.sensor_z, (int(np.flatnonzero(packed.inv_semi == 0.0)[0]), packed.first_surface), direction, axes, box,
+        side, np.cumsum(chance), (over * rgb) @ luminance_weights(shot.colorspace), over * rgb,
+        min(HEROES, len(rgb)), FOLLOWED / total if total > 0.0 else 0.0,
+        np.array([seed & 0xFFFFFFFF, seed >> 32], dtype=np.uint64),
+    )  # fmt: skip
+    opening = shot.opening
+    behind = (light, opening.blades, opening.mask, opening.half, shot.to_pixels, shot.size_px)
+    return RaySource(shot, before, behind)
+
+
+def run_batch(sources: Sequence[RaySource], batch: int, *, picture: bool) -> Batch:
+    """Trace one batch of every light.
+
+    Parameters
+    ----------
+    sources : sequence of RaySource
+    batch : int
+        Its number; the same number gives the same light.
+    picture : bool
+        Whether pixels are wanted, or numbers only.
+
+    Returns
+    -------
+    dict of str to ndarray
+        "figures", shape (15,): luminous flux by what became of it (`kernels.montecarlo`), then BALANCE and GHOSTS;
+        "paths", shape (2, K, K): of two reflections, in the picture and beside it. With a picture also "planes",
+        shape (2, 3, H, W), float32: flux per pixel after two reflections and after more; "blocks", shape (2, A, B):
+        luminous flux in blocks of 16 x 16 pixels, after two reflections and of all ghosts.
+    """
+    width, height = sources[0].shot.size_px
+    rows = len(sources[0].shot.packed.curvature)
+    planes = np.zeros((2, 3, height if picture else 0, width if picture else 0), dtype=np.float32)
+    figures, paths = np.zeros(TALLIES + 2), np.zeros((2, rows, rows))
+    for source in sources:
+        trace_batch(*source.before, batch, *source.behind, planes, figures[:TALLIES], paths)
+    figures[BALANCE] = figures[ENTERED + 1 : TALLIES].sum() - figures[ENTERED]
+    figures[GHOSTS] = figures[IN_PICTURE + 1 : BESIDE].sum()
+    result: Batch = {"figures": figures, "paths": paths}
+    if picture:
+        light = np.tensordot(luminance_weights(sources[0].shot.colorspace), planes, (0, 1))
+        two, more = (_in_blocks(plane) for plane in light)
+        result |= {"planes": planes, "blocks": np.stack([two, two + more])}
+    return result
+
+
+def _in_blocks(plane: Floats) -> Floats:
+    """Add up a picture in blocks of 16 x 16 pixels; those at the right and lower edge may be smaller."""
+    height, width = plane.shape
+    rows = np.add.reduceat(plane, np.arange(0, height, BLOCK), axis=0)
+    blocks: Floats = np.add.reduceat(rows, np.arange(0, width, BLOCK), axis=1)
+    return blocks
+
+
+class Sums:
+    """Sums over batches and of their squares; the memory is used again, so nobody else holds them."""
+
+    def __init__(self, batches: int, sums: dict[str, Floats], squares: dict[str, Floats]) -> None:
+        self.batches = batches
+        self.sums = {name: array.copy() for name, array in sums.items()}
+        self.squares = {name: array.copy() for name, array in squares.items()}
+
+    def add(self, result: Batch) -> None:
+        """Add the next batch."""
+        for name, value in result.items():
+            if name not in self.sums:
+                self.sums[name], self.squares[name] = np.zeros(value.shape), np.zeros(value.shape)
+            wide = value.astype(np.float64)
+            self.sums[name] += wide
+            wide *= wide
+            self.squares[name] += wide
+        self.batches += 1
+
+    def mean(self, name: str) -> Floats:
+        """Mean over the batches."""
+        return self.sums[name] / self.batches
+
+    def variance(self, name: str) -> Floats:
+        """Variance of that mean, without bias; 0 before the second batch."""
+        n = self.batches
+        if n < 2:
+            return np.zeros(self.sums[name].shape)
+        spread = self.squares[name] - self.sums[name] ** 2 / n
+        # rounding may leave a little below 0 where every batch gave the same
+        variance: Floats = np.maximum(spread, 0.0) / (n * (n - 1.0))
+        return variance
+
+
+def batches_in_order(work: Callable[[int], Batch], first: int, threads: int) -> Generator[Batch, None, None]:
+    """Work on batches in threads and hand them out in the order of their numbers, without end.
+
+    Parameters
+    ----------
+    work : callable
+        Gets a batch's number.
+    first : int
+    threads : int
+        As many batches are in work at once.
+
+    Yields
+    ------
+    dict of str to ndarray
+        What `work` returned.
+    """
+    waiting: deque[Future[Batch]] = deque()
+    left_off = Event()
+
+    def unless_left_off(number: int) -> Batch:
+        return {} if left_off.is_set() else work(number)
+
+    with ThreadPoolExecutor(threads) as pool:
+        try:
+            while True:
+                while len(waiting) < threads:
+                    waiting.append(pool.submit(unless_left_off, first))
+                    first += 1
+                yield waiting.popleft().result()
+        finally:
+            left_off.set()
+            for future in waiting:
+                future.cancel()

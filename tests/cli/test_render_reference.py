@@ -1,0 +1,74 @@
+"""Reference quality and the ledger from the command line."""
+
+import json
+
+import numpy as np
+import pytest
+
+from flarewright.cli.app import run
+from flarewright.io.exr import read_exr
+from flarewright.io.reference_state import read_state
+from flarewright.render import reference
+
+SMALL = ["render", "triplet-pestrecov", "--light", "8,4", "--size", "24x16", "--no-starburst", "--no-png", "--ledger"]
+REFERENCE = [*SMALL, "--quality", "reference"]
+
+
+@pytest.fixture(autouse=True)
+def _folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(reference, "SIDE", 16)
+
+
+def test_render_and_go_on(capsys, tmp_path):
+    assert run([*REFERENCE, "--samples", "2048", "--half", "--json", "-o", "a.exr"]) == 0
+    out, err = capsys.readouterr()
+    summary = json.loads(out)
+    assert summary["quality"] == "reference"
+    assert summary["reference"]["points"] == 2048
+    assert summary["layers"][-1] == "ghosts.order4+.variance"
+    assert "What became of the light" in err
+    assert "six or more, beside it" in err
+    assert summary["ledger"]["sum"] == pytest.approx(1.0, abs=1e-3)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.exr", "a.state.npz"]
+    layers = {layer.name: layer.pixels for layer in read_exr("a.exr").layers}
+    # variances are too small for half floats and are floats all the same
+    assert np.median(layers["ghosts.variance"]) < 1e-6
+    assert np.count_nonzero(layers["ghosts.variance"]) > 100
+
+    assert run(["render", "--resume", "a.state.npz", "--samples", "4096", "--no-png", "-o", "b.exr"]) == 0
+    capsys.readouterr()
+    assert run([*REFERENCE, "--samples", "4096", "--half", "-o", "c.exr"]) == 0
+    for b, c in zip(read_exr("b.exr").layers, read_exr("c.exr").layers, strict=True):
+        np.testing.assert_array_equal(b.pixels, c.pixels)
+
+
+def test_interrupted_says_how_to_go_on(capsys, monkeypatch):
+    add, calls = reference.Sums.add, []
+
+    def interrupt(sums, result):
+        add(sums, result)
+        calls.append(1)
+        if len(calls) == 3:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(reference.Sums, "add", interrupt)
+    assert run([*REFERENCE, "-o", "a.exr"]) == 130
+    assert "to go on: flarewright render --resume a.state.npz -o a.exr" in capsys.readouterr().err
+    assert read_state("a.state.npz").batches == 3
+
+
+def test_a_state_of_another_light_is_refused(capsys):
+    assert run([*REFERENCE, "--samples", "512", "-o", "a.exr"]) == 0
+    capsys.readouterr()
+    assert run(["render", "--resume", "a.state.npz", "--light", "1,1", "-o", "b.exr"]) == 2
+    assert "the state to resume belongs to another light" in capsys.readouterr().err
+    assert run(["render", "--resume", "a.state.npz", "--quality", "final", "-o", "b.exr"]) == 2
+    assert "--resume works with --quality reference only" in capsys.readouterr().err
+
+
+def test_ledger_of_final_quality(capsys):
+    assert run([*SMALL, "--json", "-o", "a.exr"]) == 0
+    out, err = capsys.readouterr()
+    assert json.loads(out)["ledger"]["shares"]["direct.in_picture"] > 0.1
+    assert "back out of the front" in err
