@@ -1,0 +1,129 @@
+"""The reference as the judge of final quality: block by block, with regard to its own variance.
+
+Two tests. Chi-squared over all blocks asks whether there is more difference than chance makes; the largest deviation,
+with Bonferroni's correction, asks whether any one block is wrong. Both allow final quality the 0.2 % of flux that it
+states for itself (docs/accuracy.md), added to the variance.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import stats
+
+from flarewright.kernels.montecarlo import BESIDE, IN_PICTURE
+from flarewright.model import Project
+from flarewright.optics.color import luminance_weights
+from flarewright.render.montecarlo import BLOCK, Sums, ray_source, run_batch
+from flarewright.render.prepare import settle
+from flarewright.render.render import Rendering, render
+from flarewright.render.shot import make_opening, make_shots
+
+STATED = 2e-3
+
+
+@dataclass(frozen=True)
+class Judged:
+    """Luminous flux by final quality and by the reference.
+
+    Attributes
+    ----------
+    final, mean, variance : ndarray, shape (A, B)
+        Blocks of 16 x 16 pixels, two reflections only.
+    paths : dict of str to tuple of float
+        By path: final quality's flux in the picture, the reference's, its standard error.
+    batches : int
+    total : tuple of float
+        Final quality's flux in the picture, the reference's, its standard error.
+    high_share : float
+        Part of the ghosts' flux in the picture that comes by more than two reflections, from the reference.
+    """
+
+    final: np.ndarray
+    mean: np.ndarray
+    variance: np.ndarray
+    paths: dict[str, tuple[float, float, float]]
+    batches: int
+    total: tuple[float, float, float]
+    high_share: float
+
+
+def blocks_of(pixels: np.ndarray, window: tuple[int, int, int, int], project: Project) -> np.ndarray:
+    """Integrate a layer's luminance over blocks, mm^2."""
+    width, height = project.camera.size_px
+    sensor = project.camera.sensor
+    whole = np.zeros((height, width))
+    x, y, w, h = window
+    whole[y : y + h, x : x + w] = pixels.astype(np.float64) @ luminance_weights(project.output.colorspace)
+    rows = np.add.reduceat(whole, np.arange(0, height, BLOCK), axis=0)
+    area = sensor[0] / width * sensor[1] / height
+    return np.add.reduceat(rows, np.arange(0, width, BLOCK), axis=1) * area
+
+
+def gather(project: Project, batches: int, side: int, seed: int = 0) -> Sums:
+    """Trace the reference at the wavelengths that final quality traces."""
+    settled = settle(project)
+    shots = make_shots(settled, make_opening(settled, None))
+    sources = [ray_source(shot, seed, side=side, light=k) for k, shot in enumerate(shots)]
+    sums = Sums(0, {}, {})
+    for batch in range(batches):
+        sums.add(run_batch(sources, batch, picture=True))
+    return sums
+
+
+def judge(project: Project, *, batches: int = 64, side: int = 128) -> Judged:
+    """Render a project by both.
+
+    Parameters
+    ----------
+    project : Project
+        With `output.layers = "ghosts"`, so that every path is drawn in full detail.
+    batches, side : int
+        Of the reference.
+    """
+    sums = gather(project, batches, side)
+    rendering: Rendering = render(project)
+    ghosts = next(layer for layer in rendering.layers if layer.name == "ghosts")
+    final = blocks_of(ghosts.pixels, ghosts.window, project)
+    figures, errors = sums.mean("figures"), np.sqrt(sums.variance("figures"))
+    mean, spread = sums.mean("paths")[0], np.sqrt(sums.variance("paths")[0])
+    paths = {}
+    for layer in rendering.layers:
+        if layer.name.startswith("ghost."):
+            j, i = (int(row) for row in str(layer.about["path"]).split("-"))
+            paths[f"{j}-{i}"] = (float(layer.about["flux_mm2"]), float(mean[j, i]), float(spread[j, i]))
+    every = figures[IN_PICTURE + 1 : BESIDE].sum()
+    return Judged(
+        final,
+        sums.mean("blocks")[0],
+        sums.variance("blocks")[0],
+        paths,
+        batches,
+        (float(final.sum()), float(figures[IN_PICTURE + 1]), float(errors[IN_PICTURE + 1])),
+        float(figures[IN_PICTURE + 2 : BESIDE].sum() / every),
+    )
+
+
+def deviations(judged: Judged, final: np.ndarray | None = None) -> np.ndarray:
+    """Return each lit block's difference in standard errors, those of a normal variable if final quality is right.
+
+    Raises
+    ------
+    AssertionError
+        When final quality puts more than 1e-4 of its light where the reference saw none.
+    """
+    F = judged.final if final is None else final
+    lit = judged.variance > 0.0
+    assert F[~lit].sum() <= 1e-4 * F.sum()
+    z = (F - judged.mean)[lit] / np.sqrt(judged.variance[lit] + (STATED * F[lit]) ** 2)
+    # a variance from n batches makes it a t variable; to the same probability of a normal one
+    return stats.norm.isf(stats.t.sf(z, judged.batches - 1))
+
+
+def probabilities(judged: Judged, final: np.ndarray | None = None) -> tuple[float, float]:
+    """Return how probable so much difference is by chance: over all blocks, and of the worst one."""
+    z = deviations(judged, final)
+    everywhere = float(stats.chi2.sf((z**2).sum(), z.size))
+    worst = float(min(1.0, 2.0 * z.size * stats.norm.sf(np.abs(z).max())))
+    return everywhere, worst

@@ -1,0 +1,115 @@
+"""Final quality against the reference: every block of 16 x 16 pixels, every path, with regard to the variance."""
+
+import numpy as np
+import pytest
+from judge import blocks_of, deviations, judge, probabilities
+from scipy import stats
+
+from flarewright.model import Camera, Everywhere, Iris, Light, Lines, Output, Project, Quality, QuarterWave
+from flarewright.render.prepare import load_lens
+from flarewright.render.render import render
+
+D_LINE = Lines(lines=((587.56, 1.0),))
+
+LENSES = {
+    "heliar-tronnier": (10.0, 5.0),
+    "tessar-brendel": (9.0, 4.0),
+    "canon-28-80": (10.0, 5.0),
+    "biotar-50-f1.4": (8.0, 4.0),
+    "double-gauss-tronnier": (8.0, 4.0),
+    "flektogon-35": (14.0, 8.0),
+    "nikkor-180-ed": (3.0, 1.5),
+    "nikon-28-75": (15.0, 8.0),
+}
+
+# thirty-two judgements are made; less probable than this is no chance
+CHANCE = 1e-4
+# a path's flux, apart from chance; and of which paths: those above this part of all ghosts
+PATH, FAINTEST = 5e-3, 1e-3
+
+
+def scene(lens, field, f_number=None, *, size=(256, 160), light=None, wavelengths=1, **parts):
+    return Project(
+        lens=lens,
+        f_number=f_number,
+        lights=(Light(field_deg=field, spectrum=D_LINE) if light is None else light,),
+        camera=Camera(size_px=size),
+        quality=Quality(wavelengths=wavelengths, bridge=False),
+        output=Output(layers="ghosts", starburst=False),
+        **parts,
+    )
+
+
+def assert_paths_agree(judged):
+    flux = judged.total[1]
+    worth = {name: path for name, path in judged.paths.items() if path[1] > FAINTEST * flux}
+    assert sum(mean for _, mean, _ in worth.values()) > 0.9 * flux
+    # a t variable's bound for the worst of so many
+    bound = stats.t.isf(CHANCE / (2 * len(worth)), judged.batches - 1)
+    for name, (final, mean, error) in worth.items():
+        assert abs(final - mean) < PATH * mean + bound * error, name
+
+
+@pytest.fixture(scope="module")
+def small():
+    """A coated triplet with a pentagonal iris, two wavelengths, a small picture."""
+    coated = Everywhere(coating=QuarterWave(center_wavelength_nm=550.0))
+    project = scene(
+        "triplet-pestrecov", (8.0, 4.0), 4.0, size=(96, 64), coating=coated, iris=Iris(blades=5), wavelengths=2,
+        light=Light(field_deg=(8.0, 4.0)),
+    )  # fmt: skip
+    return project, judge(project, batches=64, side=64)
+
+
+def test_a_small_picture_agrees(small):
+    _, judged = small
+    everywhere, worst = probabilities(judged)
+    assert everywhere > CHANCE
+    assert worst > CHANCE
+    assert_paths_agree(judged)
+    final, mean, error = judged.total
+    assert abs(final - mean) < 2e-3 * mean + 4.0 * error
+
+
+def test_wrong_pictures_are_refused(small):
+    """The judgement has teeth: 5 % too bright, a path left out, a shift by half a block, a mirrored picture."""
+    project, judged = small
+    ghosts = next(layer for layer in render(project).layers if layer.name == "ghosts")
+    x, y, w, h = ghosts.window
+    assert blocks_of(ghosts.pixels, ghosts.window, project) == pytest.approx(judged.final)
+    whole = np.zeros((64, 96, 3), np.float32)
+    whole[y : y + h, x : x + w] = ghosts.pixels
+    shifted = np.roll(whole, 8, axis=1)
+    wrong = [
+        1.05 * judged.final,
+        blocks_of(shifted, (0, 0, 96, 64), project),
+        blocks_of(whole[:, ::-1], (0, 0, 96, 64), project),
+    ]
+    third = sorted((layer for layer in render(project).layers if layer.name.startswith("ghost.")),
+                   key=lambda layer: -float(layer.about["flux_mm2"]))[2]  # fmt: skip
+    wrong.append(judged.final - blocks_of(third.pixels, third.window, project))
+    for picture in wrong:
+        everywhere, worst = probabilities(judged, picture)
+        assert min(everywhere, worst) < 1e-6
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("stopped", [False, True])
+@pytest.mark.parametrize("lens", LENSES)
+def test_lenses_agree_block_by_block(lens, stopped):
+    widest = load_lens(lens).f_number
+    f_number = (4.0 if widest < 2.0 else 2.8) * widest if stopped else None
+    judged = judge(scene(lens, LENSES[lens], f_number), batches=64, side=192 if stopped else 128)
+    everywhere, worst = probabilities(judged)
+    final, mean, error = judged.total
+    print(
+        f"{lens} {'stopped down' if stopped else 'open'}: total {final / mean - 1.0:+.2%} +- {error / mean:.2%}, "
+        f"{deviations(judged).size} blocks p = {everywhere:.3f}, worst p = {worst:.3f}, "
+        f"four and more reflections {judged.high_share:.2%}"
+    )
+    assert everywhere > CHANCE
+    assert worst > CHANCE
+    assert abs(final - mean) < 2e-3 * mean + 4.0 * error
+    assert_paths_agree(judged)
+    # more than two reflections are always there, and never the larger part
+    assert 0.0 < judged.high_share < 0.3
