@@ -35,11 +35,13 @@ from flarewright.optics.pack import pack_lens
 from flarewright.optics.paraxial import first_order
 from flarewright.optics.paths import direct_path, ghost_paths
 from flarewright.render.canvas import blank
+from flarewright.render.montecarlo import HEROES, ray_source, run_batch
 from flarewright.render.prepare import load_lens, settle
+from flarewright.render.reference import spectral_shots
 from flarewright.render.render import render
 from flarewright.render.shot import make_opening, make_shots
 
-PARTS = ("yardsticks", "trace", "raster", "frame", "art", "startup", "memory")
+PARTS = ("yardsticks", "trace", "raster", "frame", "art", "reference", "startup", "memory")
 
 LIGHT = (10.0, 5.0)
 """Field angles of the frames' light, degrees."""
@@ -249,6 +251,24 @@ def art(repeat: int) -> Rows:
     return found
 
 
+def reference(repeat: int) -> Rows:
+    """Random rays through the whole lens on one thread: what one batch traces, with and without a picture."""
+    found = []
+    for name in ("heliar-tronnier", "canon-28-80"):
+        project = Project(lens=name, lights=(Light(field_deg=LIGHT),), quality=Quality(mode="reference"))
+        shots = spectral_shots(settle(project), None)
+        side = 64
+        sources = [ray_source(shot, 0, side=side, light=k) for k, shot in enumerate(shots)]
+        for picture in (False, True):
+            seconds = median_seconds(
+                lambda sources=sources, picture=picture: run_batch(sources, 0, picture=picture),  # type: ignore[misc]
+                repeat,
+            )
+            label = f"{name}, {'1280x720' if picture else 'numbers only'}"
+            found.append(row("reference", label, HEROES * side**2 / seconds / 1e3, "k rays/s"))
+    return found
+
+
 # --- commands
 
 
@@ -358,6 +378,7 @@ def main(arguments: list[str] | None = None) -> None:
         "raster": lambda: raster(asked.repeat, bandwidth),
         "frame": lambda: frame(asked.repeat),
         "art": lambda: art(asked.repeat),
+        "reference": lambda: reference(asked.repeat),
         "startup": lambda: startup(asked.repeat),
         "memory": memory,
     }

@@ -1,6 +1,7 @@
 """Render one shot in reference and in final quality, and see whether they differ by more than chance.
 
-Writes judged.png: the reference, the final picture, and their difference in standard errors (red: final is brighter).
+Writes judged.png: the reference, the final picture, and their difference in standard errors: red where final quality is
+brighter, blue where the reference is, grey where too few rays fell to tell.
 
 Usage: python judge_a_render.py [FOLDER]
 """
@@ -41,12 +42,10 @@ def main(folder: Path, size: tuple[int, int] = (160, 90), error: float = 0.02) -
     lit = variance[..., 1] > 0.0
     z = np.zeros(mean.shape[:2])
     z[lit] = (drawn - mean)[lit, 1] / np.sqrt(variance[lit, 1])
-    # a variance is worth something where many rays fell
-    well = lit & (np.sqrt(variance[..., 1]) < 0.2 * mean[..., 1])
-    print(
-        f"{well.mean():.0%} of the pixels are known to 20 %; there the two differ by rms "
-        f"{np.sqrt((z[well] ** 2).mean()):.2f} standard errors"
-    )
+    # an error is worth something where many rays fell
+    known = lit & (np.sqrt(variance[..., 1]) < 0.3 * np.minimum(mean, drawn)[..., 1])
+    rms = np.sqrt((z[known] ** 2).mean())
+    print(f"{known.mean():.0%} of the pixels are known to 30 %; there the two differ by rms {rms:.2f} standard errors")
     print(f"all ghosts, final over reference: {drawn[..., 1].sum() / mean[..., 1].sum() - 1.0:+.2%}")
     if reference.ledger is not None:
         for line in reference.ledger.lines:
@@ -57,6 +56,7 @@ def main(folder: Path, size: tuple[int, int] = (160, 90), error: float = 0.02) -
     part = np.clip(z / 4.0, -1.0, 1.0)
     red, blue = 1.0 - np.maximum(-part, 0.0), 1.0 - np.maximum(part, 0.0)
     difference = (255.0 * np.stack([red, np.minimum(red, blue), blue], axis=-1)).astype(np.uint8)
+    difference[~known] = 128
     panels = [view(mean, stops), view(drawn, stops), difference]
     Image.fromarray(np.concatenate(panels, axis=1)).save(folder / "judged.png")
 

@@ -1,8 +1,9 @@
 """The reference as the judge of final quality: block by block, with regard to its own variance.
 
 Two tests. Chi-squared over all blocks asks whether there is more difference than chance makes; the largest deviation,
-with Bonferroni's correction, asks whether any one block is wrong. Both allow final quality the 0.2 % of flux that it
-states for itself (docs/accuracy.md), added to the variance.
+with Bonferroni's correction, asks whether any one block is wrong. Both allow final quality what it states for itself
+(docs/accuracy.md), added to the variance: 0.2 % of a block's flux, and 1e-4 of the mean block's, which decides where it
+is nearly dark.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from flarewright.render.prepare import settle
 from flarewright.render.render import Rendering, render
 from flarewright.render.shot import make_opening, make_shots
 
-STATED = 2e-3
+STATED, STATED_DARK = 2e-3, 1e-4
 
 
 @dataclass(frozen=True)
@@ -116,7 +117,8 @@ def deviations(judged: Judged, final: np.ndarray | None = None) -> np.ndarray:
     F = judged.final if final is None else final
     lit = judged.variance > 0.0
     assert F[~lit].sum() <= 1e-4 * F.sum()
-    z = (F - judged.mean)[lit] / np.sqrt(judged.variance[lit] + (STATED * F[lit]) ** 2)
+    stated = (STATED * F[lit]) ** 2 + (STATED_DARK * F.mean()) ** 2
+    z = (F - judged.mean)[lit] / np.sqrt(judged.variance[lit] + stated)
     # a variance from n batches makes it a t variable; to the same probability of a normal one
     return stats.norm.isf(stats.t.sf(z, judged.batches - 1))
 

@@ -30,7 +30,7 @@ def compile_for_render(project: Project, threads: int | None = None) -> None:
     names = [*_TRACING]
     if project.quality.mode == "final":
         names += ["draw" if iris.mask is None else "draw masked", "densities", "window", "pixels"]
-    elif iris.mask is None:
+    elif project.quality.mode == "draft" and iris.mask is None:
         # a draft through a mask is rare: its kernel is compiled when it is called
         names += ["matrices"]
     if project.output.starburst:
