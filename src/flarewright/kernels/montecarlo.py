@@ -7,11 +7,12 @@ absorbed by a rim or the stop, lands on the sensor's plane, or leaves through th
 import numpy as np
 
 from ._jit import compiled
+from .bend import bend
 from .clip import blade_value
 from .intersect import intersect_conic
 from .mask import mask_value
 from .philox import refill
-from .trace import bend
+from .shapes import cross_shape
 
 # what became of the light; in the picture and beside it by order of reflection 0, 2, 4 and more than 4
 ENTERED, AT_STOP, AT_BARREL, RETURNED, LOST, IN_PICTURE, BESIDE = 0, 1, 2, 3, 4, 5, 9
@@ -37,13 +38,29 @@ def _passes_stop(blades, x, y):
 
 
 @compiled
-def _enters(curvature, conic, z_vertex, inv_semi, row, x, y, direction):
-    """Tell whether a ray from the first vertex' plane meets the first surface within its rim."""
-    t, _, discriminant = intersect_conic(
-        curvature[row], conic[row], x, y, -z_vertex[row], direction[0], direction[1], direction[2], 1.0
-    )
-    hx, hy = x + t * direction[0], y + t * direction[1]
-    return discriminant >= 0.0 and (hx * hx + hy * hy) * inv_semi[row] * inv_semi[row] <= 1.0
+def _cross(curvature, conic, row, vertex, x, y, z, dx, dy, dz, heading, eta):
+    """Carry a ray to a surface, and both on through it and back from it.
+
+    Returns the hit, the refracted and the reflected direction, the squared distance from the surface's axis, the
+    cosines before and behind, and whether the surface is met, refraction and reflection each go the right way.
+    """
+    if conic.ndim == 2:
+        hx, hy, hz, rx, ry, rz, radius2, cos_in, cos_out, back = cross_shape(
+            conic, row, vertex, x, y, z, dx, dy, dz, heading, eta, 1.0
+        )
+        hx, hy, hz, tx, ty, tz, radius2, cos_in, cos_out, on = cross_shape(
+            conic, row, vertex, x, y, z, dx, dy, dz, heading, eta, 0.0
+        )
+        return hx, hy, hz, tx, ty, tz, rx, ry, rz, radius2, cos_in, cos_out, on or back, on, back
+    c, kappa = curvature[row], conic[row]
+    zl = z - vertex
+    t, root, discriminant = intersect_conic(c, kappa, x, y, zl, dx, dy, dz, heading)
+    hx, hy, hz = x + t * dx, y + t * dy, zl + t * dz
+    tx, ty, tz, cos_in, cos_out, _ = bend(c, kappa, hx, hy, hz, dx, dy, dz, root, heading, eta, 0.0)
+    rx, ry, rz, _, _, _ = bend(c, kappa, hx, hy, hz, dx, dy, dz, root, heading, eta, 1.0)
+    on, back = cos_out > 0.0 and tz * heading > 0.0, rz * heading < 0.0
+    radius2 = hx * hx + hy * hy
+    return hx, hy, hz + vertex, tx, ty, tz, rx, ry, rz, radius2, cos_in, cos_out, discriminant >= 0.0, on, back
 
 
 @compiled
@@ -57,7 +74,7 @@ def trace_batch(
     Parameters
     ----------
     curvature, conic, z_vertex, inv_semi : ndarray, shape (K,)
-        Geometry of the rows.
+        Geometry of the rows; `conic` may be the shape table in the lens' frame instead, as in `trace_nodes`.
     n_gap : ndarray, shape (S, K + 1)
         Index before row 0 and behind each row, per spectral sample.
     reflectance : ndarray, shape (S, K, M)
@@ -117,7 +134,11 @@ def trace_batch(
         px = box[0] + (point % side + pool[0]) * cell_x
         py = box[2] + (point // side + pool[1]) * cell_y
         x, y = px * axes[0, 0] + py * axes[1, 0], px * axes[0, 1] + py * axes[1, 1]
-        if not _enters(curvature, conic, z_vertex, inv_semi, rows[1], x, y, direction):
+        first = rows[1]
+        front = _cross(
+            curvature, conic, first, z_vertex[first], x, y, 0.0, direction[0], direction[1], direction[2], 1.0, 1.0
+        )
+        if not front[12] or front[9] * inv_semi[first] * inv_semi[first] > 1.0:
             continue
         chance = pool[2]
         for hero in range(heroes):
@@ -177,25 +198,21 @@ def _trace_tree(
             row += heading
         else:
             steps += 1
-            c, kappa, towards = curvature[row], conic[row], np.float64(heading)
-            zl = z - z_vertex[row]
-            t, root, discriminant = intersect_conic(c, kappa, x, y, zl, dx, dy, dz, towards)
-            x, y, zl = x + t * dx, y + t * dy, zl + t * dz
-            z = zl + z_vertex[row]
             n_in = n_gap[row] if heading > 0 else n_gap[row + 1]
             n_out = n_gap[row + 1] if heading > 0 else n_gap[row]
-            if discriminant < 0.0:
+            x, y, z, tx, ty, tz, rx, ry, rz, radius2, cos_in, cos_out, met, forth, back = _cross(
+                curvature, conic, row, z_vertex[row], x, y, z, dx, dy, dz, np.float64(heading), n_in / n_out
+            )
+            if not met:
                 tallies[LOST] += bright * weight
                 ended = True
-            elif (x * x + y * y) * inv_semi[row] * inv_semi[row] > 1.0:
+            elif radius2 * inv_semi[row] * inv_semi[row] > 1.0:
                 tallies[AT_BARREL] += bright * weight
                 ended = True
             else:
-                tx, ty, tz, cos_in, cos_out, inside = bend(
-                    c, kappa, x, y, zl, dx, dy, dz, root, towards, n_in / n_out, 0.0
-                )
                 R = 1.0
-                if inside >= 0.0:
+                # no cosine behind: beyond the critical angle
+                if cos_out > 0.0:
                     place = min(cos_in if n_in <= n_out else cos_out, 1.0) * (samples - 1)
                     cell = min(np.int64(place), samples - 2)
                     R = reflectance[row, cell] + (place - cell) * (reflectance[row, cell + 1] - reflectance[row, cell])
@@ -216,25 +233,24 @@ def _trace_tree(
                             up, on = (1.0, 0.0) if u < R else (0.0, 1.0)
                         else:
                             up = R / chance if u < chance else 0.0
-                if up > 0.0:
-                    rx, ry, rz, _, _, _ = bend(c, kappa, x, y, zl, dx, dy, dz, root, towards, 1.0, 1.0)
-                    if rz * heading >= 0.0:
-                        tallies[LOST] += bright * weight * up
-                    elif on > 0.0:
-                        ray = stack[waiting]
-                        ray[_X], ray[_Y], ray[_Z], ray[_DX], ray[_DY], ray[_DZ] = x, y, z, rx, ry, rz
-                        ray[_WEIGHT], ray[_ROW], ray[_HEADING] = weight * up, row - heading, -heading
-                        ray[_ORDER] = order + 1
-                        ray[_FIRST], ray[_SECOND] = row if order == 0 else first, row if order == 1 else second
-                        waiting += 1
+                if up > 0.0 and not back:
+                    tallies[LOST] += bright * weight * up
+                    up = 0.0
+                if on > 0.0 and not forth:
+                    tallies[LOST] += bright * weight * on
+                    on = 0.0
+                if up > 0.0 and on > 0.0:
+                    ray = stack[waiting]
+                    ray[_X], ray[_Y], ray[_Z], ray[_DX], ray[_DY], ray[_DZ] = x, y, z, rx, ry, rz
+                    ray[_WEIGHT], ray[_ROW], ray[_HEADING] = weight * up, row - heading, -heading
+                    ray[_ORDER] = order + 1
+                    ray[_FIRST], ray[_SECOND] = row if order == 0 else first, row if order == 1 else second
+                    waiting += 1
                 if on > 0.0:
                     weight *= on
                     dx, dy, dz = tx, ty, tz
                     row += heading
-                    if dz * heading <= 0.0:
-                        tallies[LOST] += bright * weight
-                        ended = True
-                elif up > 0.0 and rz * heading < 0.0:
+                elif up > 0.0:
                     weight *= up
                     dx, dy, dz = rx, ry, rz
                     first, second = row if order == 0 else first, row if order == 1 else second

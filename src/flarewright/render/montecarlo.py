@@ -65,18 +65,21 @@ def ray_source(shot: Shot, seed: int, *, side: int, light: int) -> RaySource:
     """
     packed, tilt, axes = shot.packed, shot.incidence.tilt, shot.incidence.axes
     box = front_box(packed, tilt)
-    box[0] = -box[1]
+    if packed.symmetric:
+        box[0] = -box[1]
     direction = np.array([np.sin(tilt) * axes[1, 0], np.sin(tilt) * axes[1, 1], np.cos(tilt)])
     rgb = shot.weights(packed.wavelengths_nm)
     # a sample is drawn as often as it colours the picture
     chance = np.abs(rgb).sum(axis=1)
     chance /= chance.sum()
     over = np.divide(1.0, chance, out=np.zeros_like(chance), where=chance > 0.0)[:, None] * shot.gain
+    # rays run in the lens' own frame here, whatever the light
+    form = packed.conic if packed.shapes is None else packed.shapes
     middle = len(rgb) // 2
     # R of the whole lens at normal incidence decides how many reflections of high order are worth following
     total = float(packed.reflectance[middle, :, -1].sum())
     before = (
-        packed.curvature, packed.conic, packed.z_vertex, packed.inv_semi, packed.n_gap, packed.reflectance,
+        packed.curvature, form, packed.z_vertex, packed.inv_semi, packed.n_gap, packed.reflectance,
         packed.sensor_z, (int(np.flatnonzero(packed.inv_semi == 0.0)[0]), packed.first_surface), direction, axes, box,
         side, np.cumsum(chance), (over * rgb) @ luminance_weights(shot.colorspace), over * rgb,
         min(HEROES, len(rgb)), FOLLOWED / total if total > 0.0 else 0.0,
