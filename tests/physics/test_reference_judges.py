@@ -5,7 +5,7 @@ import pytest
 from judge import blocks_of, deviations, judge, probabilities
 from scipy import stats
 
-from flarewright.model import Camera, Everywhere, Iris, Light, Lines, Output, Project, Quality, QuarterWave
+from flarewright.model import Camera, Everywhere, Iris, Light, Lines, Output, Project, Quality, QuarterWave, Surface
 from flarewright.render.prepare import load_lens
 from flarewright.render.render import render
 
@@ -91,6 +91,22 @@ def test_wrong_pictures_are_refused(small):
     for picture in wrong:
         everywhere, worst = probabilities(judged, picture)
         assert min(everywhere, worst) < 1e-6
+
+
+@pytest.mark.slow
+def test_a_lens_out_of_true_agrees():
+    """Aspheric, with a cylinder's share, its rear surface decentred and tilted: nothing is symmetric."""
+    lens = load_lens("triplet-pestrecov")
+    rows = list(lens.rows)
+    rows[0] = rows[0].replace(asphere=(-2e-6, 1e-9))
+    rows[1] = rows[1].replace(curvature_x=0.9 * rows[1].curvature)
+    last = max(k for k, row in enumerate(rows) if isinstance(row, Surface))
+    rows[last] = rows[last].replace(decentre=(0.3, -0.2), tilt_deg=(0.4, 0.7))
+    judged = judge(scene(lens.replace(rows=tuple(rows)), (8.0, 4.0), 4.0), batches=64, side=96)
+    everywhere, worst = probabilities(judged)
+    assert everywhere > CHANCE
+    assert worst > CHANCE
+    assert_paths_agree(judged)
 
 
 @pytest.mark.slow

@@ -6,7 +6,7 @@ absorbed by a rim or the stop, lands on the sensor's plane, or leaves through th
 
 import numpy as np
 
-from ._jit import compiled
+from ._jit import compiled, inner
 from .bend import bend
 from .clip import blade_value
 from .intersect import intersect_conic
@@ -29,7 +29,7 @@ STACK = 512
 _X, _Y, _Z, _DX, _DY, _DZ, _WEIGHT, _ROW, _HEADING, _ORDER, _FIRST, _SECOND = range(12)
 
 
-@compiled
+@inner
 def _passes_stop(blades, x, y):
     for b in range(blades.shape[0]):
         if blade_value(blades, b, x, y) > 0.0:
@@ -37,7 +37,7 @@ def _passes_stop(blades, x, y):
     return True
 
 
-@compiled
+@inner
 def _cross(curvature, conic, row, vertex, x, y, z, dx, dy, dz, heading, eta):
     """Carry a ray to a surface, and both on through it and back from it.
 
@@ -155,7 +155,7 @@ def trace_batch(
             )  # fmt: skip
 
 
-@compiled
+@inner
 def _trace_tree(
     curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, stop_row, start_x, start_y, direction,
     unit, luminance, rgb, boost, stream, pool, stack, blades, mask, half, to_pixels, size, planes, tallies, paths,
@@ -270,7 +270,7 @@ def _trace_tree(
             steps = 0
 
 
-@compiled
+@inner
 def _land(x, y, order, first, second, bright, amount, rgb, to_pixels, size, planes, tallies, paths):
     """Put light on the sensor's plane: into a pixel if it meets one."""
     column, line = to_pixels[0] - to_pixels[2] * x, to_pixels[1] + to_pixels[3] * y

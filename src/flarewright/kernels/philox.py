@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ._jit import compiled
+from ._jit import compiled, inner
 
 _M0, _M1 = np.uint64(0xD2511F53), np.uint64(0xCD9E8D57)
 _W0, _W1 = np.uint64(0x9E3779B9), np.uint64(0xBB67AE85)
@@ -53,6 +53,6 @@ def refill(stream, pool):
     pool[0], pool[1], pool[2], pool[3] = _unit(b0), _unit(b1), _unit(b2), _unit(b3)
 
 
-@compiled
+@inner
 def _unit(bits):
     return (np.float64(bits) + 0.5) * 2.0**-32
