@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+from flarewright.kernels.resample import blend_blade_wings
 from flarewright.model import D65, Iris
 from flarewright.optics.diffraction import BladeWings, FanWings, pupil_pattern, spike_profile
 from flarewright.optics.iris import blade_edges, outline
@@ -256,6 +257,19 @@ def test_symmetry_under_half_a_turn_and_mirrors():
     E = layer(Iris(blades=7), 8.0, 0.028, (201, 201), (100.5, 100.5), weights=GREY)
     np.testing.assert_allclose(E, E[::-1, ::-1], rtol=1e-4, atol=1e-9 * E.max())
     np.testing.assert_allclose(E, E[:, ::-1], rtol=1e-2, atol=1e-7 * E.max())
+
+
+def test_a_pixel_in_the_very_middle_of_a_spike_holds_a_number():
+    # its distance to the spike is 0 to the last bit
+    out = np.zeros((1, 3, 1), np.float32)
+    table = np.linspace(0.0, 1.0, 9)[None, :, None]
+    one = np.ones(1)
+    blend_blade_wings(
+        np.array([-1.0, 1.0, 2.0]), np.zeros(1), np.full(2, 0.1), np.zeros(1), 0.0, table, np.full_like(table, 1.0),
+        one, one, 0.125, 1.0, 0.1, 0.2, out,
+    )  # fmt: skip
+    assert np.isfinite(out).all()
+    assert (out > 0.0).all()
 
 
 def test_a_mask_of_a_disc_is_the_round_opening():

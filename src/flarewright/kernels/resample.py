@@ -242,7 +242,8 @@ def blend_blade_wings(
                 # half_fan - theta is its sine, -N / r, to a few percent of a term that is itself a few per mille
                 depth = -N * scale32
                 beside, inside = v > (end32 + wide) * D, depth > end32
-                over = v * v - wide * wide * D * D if beside else depth * (depth - wide - wide)
+                # on the table `depth` may be 0, and so is what it would divide
+                over = v * v - wide * wide * D * D if beside else depth * (depth - wide - wide) if inside else one
                 far[j] += (D * D if beside else one if inside else zero) / over
                 flat[j] += (one if inside else zero) / wide
                 near[j] = 0 if beside or inside else 1
