@@ -28,13 +28,12 @@ import numba
 import numpy as np
 
 import flarewright
-from flarewright.kernels.raster import fill_polygon
+from flarewright.kernels.raster import blank_plane, fill_polygon
 from flarewright.model import Art, Camera, Iris, Lens, Light, Output, Project, Quality, Rule
 from flarewright.optics.bundle import find_region, front_box, trace_points
 from flarewright.optics.pack import pack_lens
 from flarewright.optics.paraxial import first_order
 from flarewright.optics.paths import direct_path, ghost_paths
-from flarewright.render.canvas import blank
 from flarewright.render.montecarlo import HEROES, ray_source, run_batch
 from flarewright.render.prepare import load_lens, settle
 from flarewright.render.reference import spectral_shots
@@ -154,7 +153,7 @@ def raster(repeat: int, bandwidth: float) -> Rows:
     """Draw triangles of some sizes; a fragment is a pixel of one triangle, three floats read and written."""
     rng = np.random.default_rng(1)
     found = []
-    plane, *scratch = blank((1280, 720)).scratch()
+    plane = blank_plane(1280, 720)
     rgb = np.array([0.3, 0.6, 0.1])
     for side, count in ((4.0, 20_000), (30.0, 4000), (300.0, 100)):
         middles = rng.uniform([side, side], [1280 - side, 720 - side], (count, 2))
@@ -163,7 +162,7 @@ def raster(repeat: int, bandwidth: float) -> Rows:
         corners = middles[:, None] + radius * np.stack([np.cos(turn), np.sin(turn)], axis=-1)
         fragments = count * 0.25 * sqrt(3.0) * side**2
 
-        rate = fragments / median_seconds(lambda c=corners: _draw(c, rgb, plane, *scratch), repeat, 0.2)  # type: ignore[misc]
+        rate = fragments / median_seconds(lambda c=corners: _draw(c, rgb, plane), repeat, 0.2)  # type: ignore[misc]
         found.append(
             row("raster", f"triangles of {side:g} px", rate / 1e6, "M fragments/s", 24.0 * rate / bandwidth, "copy")
         )
@@ -171,10 +170,10 @@ def raster(repeat: int, bandwidth: float) -> Rows:
 
 
 @numba.njit
-def _draw(corners, rgb, plane, strip):
+def _draw(corners, rgb, plane):
     """Draw triangles without a call from Python for each."""
     for k in range(corners.shape[0]):
-        fill_polygon(corners[k], 3, 1.0, 1e-4, 1e-4, 0.0, 2.0, rgb, plane, strip)
+        fill_polygon(corners[k], 3, 1.0, 1e-4, 1e-4, 0.0, 2.0, rgb, plane)
 
 
 # --- frames

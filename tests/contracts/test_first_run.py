@@ -64,10 +64,6 @@ def test_a_cold_command_writes_what_a_warm_one_writes(tmp_path):
     assert {name for name in again if again[name]["called"]} == {*mine, *helpers}
 
 
-# a draft's picture is of another type than a final one's, and small
-OTHER_TYPES = ("window", "pixels")
-
-
 @pytest.mark.parametrize(
     ("words", "unused"),
     [
@@ -82,11 +78,11 @@ def test_roots_are_called_with_the_types_that_the_table_says(words, unused, tmp_
     for name, root in roots.items():
         if name in unused:
             assert not root["called"], name
-        elif root["called"] and not (name in OTHER_TYPES and "draft" in words):
+        elif root["called"]:
             assert root["expected"] in root["called"], name
 
 
-SOME = ["window", "pixels"]
+SOME = ["double", "pixels"]
 
 TOGETHER = """
 import sys
@@ -106,8 +102,8 @@ elif sys.argv[1] == "not allowed":
     def refuse(*arguments, **options):
         raise PermissionError("no processes here")
     first_run.subprocess.Popen = refuse
-first_run.compile_together(["window", "pixels"], 2)
-print([len(first_run.kernel(name).signatures) for name in ("window", "pixels")], first_run.absent(["window", "pixels"]))
+first_run.compile_together(["double", "pixels"], 2)
+print([len(first_run.kernel(name).signatures) for name in ("double", "pixels")], first_run.absent(["pixels", "double"]))
 """
 
 
@@ -155,7 +151,7 @@ def test_nobody_helps_where_nothing_is_compiled(monkeypatch):
 
 
 def test_python_without_a_compiler_has_nothing_absent(tmp_path):
-    code = "from flarewright.kernels.first_run import absent; print(absent(['window', 'mesh']))"
+    code = "from flarewright.kernels.first_run import absent; print(absent(['pixels', 'mesh']))"
     environment = {**os.environ, "NUMBA_DISABLE_JIT": "1", "NUMBA_CACHE_DIR": str(tmp_path)}
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=environment)
     assert done.stdout.strip() == "[]"
@@ -171,11 +167,13 @@ def refuse(self):
 dispatcher.Dispatcher.enable_caching = refuse
 import numpy as np
 from flarewright.kernels.first_run import absent
-from flarewright.kernels.interleave import lit_window
-print(lit_window(np.zeros((3, 2, 2), np.float32)), absent(["window"]))
+from flarewright.kernels.collect import collect
+pixels = np.empty((1, 2, 3), np.float32)
+collect(np.ones((1, 1, 3, 8), np.float32), pixels)
+print(pixels.sum(), absent(["pixels"]))
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "(0, 0, 0, 0) []"
+    assert done.stdout.strip() == "6.0 []"
 
 
 @pytest.mark.parametrize("processes", [1, 2, 3, 4, 20])

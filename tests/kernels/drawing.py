@@ -1,23 +1,27 @@
-"""Planes and scratch for the raster kernels."""
+"""Pictures for the raster kernels."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from flarewright.kernels.raster import fill_polygon
-from flarewright.render import canvas
+from flarewright.kernels.raster import blank_plane, fill_polygon, to_pixels
 
 WHITE = np.ones(3)
 
 
-def blank(width: int, height: int):
-    """Return a plane and its scratch in the order in which kernels take them."""
-    return canvas.blank((width, height)).scratch()
+def blank(width: int, height: int) -> np.ndarray:
+    """A black picture."""
+    return blank_plane(width, height)
 
 
-def fill(polygon, plane_and_scratch, density=1.0, gx=0.0, gy=0.0, low=-np.inf, high=np.inf, rgb=WHITE) -> None:
+def channels(plane: np.ndarray, width: int) -> np.ndarray:
+    """The picture channel by channel, shape (3, H, W)."""
+    return np.moveaxis(to_pixels(plane, width), 2, 0)
+
+
+def fill(polygon, plane, density=1.0, gx=0.0, gy=0.0, low=-np.inf, high=np.inf, rgb=WHITE) -> None:
     corners = np.ascontiguousarray(polygon, dtype=np.float64)
-    fill_polygon(corners, len(corners), density, gx, gy, low, high, np.asarray(rgb, float), *plane_and_scratch)
+    fill_polygon(corners, len(corners), density, gx, gy, low, high, np.asarray(rgb, float), plane)
 
 
 def area(polygon) -> float:

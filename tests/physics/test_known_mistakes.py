@@ -12,6 +12,7 @@ from prescriptions import HELIAR, TRIPLET, lens, system
 
 from flarewright.io.dotlens import read_dotlens
 from flarewright.kernels.bundle import draw_bundle, node_densities
+from flarewright.kernels.raster import blank_plane, to_pixels
 from flarewright.kernels.trace import ALIVE, STOP_X, WEIGHT, X, Y
 from flarewright.model import (
     Bare,
@@ -37,7 +38,6 @@ from flarewright.optics.paths import direct_path, ghost_path, ghost_paths
 from flarewright.optics.repair import repair
 from flarewright.optics.spectrum import band_weights
 from flarewright.optics.trace import trace_rays
-from flarewright.render import canvas
 from flarewright.render.compose import beauty
 from flarewright.render.display import srgb_oetf, view
 from flarewright.render.prepare import load_lens
@@ -155,13 +155,14 @@ def test_folded_cells_dropped():
     a, b, c, d = k[:-1, :-1].ravel(), k[1:, :-1].ravel(), k[1:, 1:].ravel(), k[:-1, 1:].ravel()
     triangles = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
     pupil = np.stack([px, py], axis=1)
-    plane, *scratch = canvas.blank((64, 64)).scratch()
+    plane = blank_plane(64, 64)
     draw_bundle(
         data, pupil, triangles, node_densities(data, pupil, triangles), 1, np.zeros((0, 4)), np.ones((1, 1)), 1.0,
-        np.eye(2), np.array([32.0, 32.0, 2.0, 2.0]), 1.0, np.ones(3), plane, *scratch, 2,
+        np.eye(2), np.array([32.0, 32.0, 2.0, 2.0]), 1.0, np.ones(3), plane, 2,
     )  # fmt: skip
-    assert plane[0].sum(dtype=float) == pytest.approx(2.0, rel=1e-5)  # the half and its mirror image
-    inner = plane[0][34:40, 16:30]
+    drawn = to_pixels(plane, 64)[..., 0]
+    assert drawn.sum(dtype=float) == pytest.approx(2.0, rel=1e-5)  # the half and its mirror image
+    inner = drawn[34:40, 16:30]
     assert inner.max() == pytest.approx(2.0 * 0.5 / (10.0 * 5.0) * 0.25, rel=1e-3)
 
 

@@ -17,11 +17,15 @@ from .clip import (
     polygon_area,
 )
 from .mask import fill_through_mask, mask_value
-from .raster import fill_polygon, splat_line
+from .raster import add_to_pixel, fill_polygon, plane_size, splat_line
 from .trace import ALIVE, REL, STOP_X, WEIGHT, X, Y
 
 # polygons thinner than this, in square pixels, are drawn as lines
 SLIVER = 1e-4
+# the bit of all the edges that have none of their own (`_place_nodes`)
+SHARED = np.int64(1 << 61)
+# a cell whose density departs from a plane by more than this part is drawn triangle by triangle
+ROUGH = 5e-3
 
 
 @inner
@@ -69,7 +73,7 @@ def node_densities(data, pupil, triangles):
 @compiled
 def draw_bundle(
     data, pupil, triangles, densities, crossings, blades, mask, mask_half, axes, to_pixels, gain, rgb,
-    plane, strip, halves,
+    plane, halves,
 ):  # fmt: skip
     """Add a bundle, and its mirror image where it has one, to a picture, flux for flux.
 
@@ -88,10 +92,8 @@ def draw_bundle(
     gain : float
         Multiplies the flux: the cosine of the field angle, the light's intensity.
     rgb : ndarray, shape (3,)
-    plane : ndarray, shape (3, H, W), float32
-        Flux per pixel, added to.
-    strip
-        Scratch of `fill_polygon`.
+    plane : ndarray, shape (H, B, 3, BLOCK), float32
+        Flux per pixel, added to (`kernels.raster.blank_plane`).
     halves : int
         2: the bundle and its mirror image in x make the light; 1: the bundle alone does.
 
@@ -101,87 +103,195 @@ def draw_bundle(
     between its nodes; rims and blades cut it geometrically, so edges are exact and folded sheets add. Slivers are
     drawn as lines.
     """
-    height, width = plane.shape[1], plane.shape[2]
+    height, width = plane_size(plane)
     columns = PSTOP + 2 * crossings
     polygon, other = np.empty((MAX_VERTICES, columns)), np.empty((MAX_VERTICES, columns))
     values = np.empty(MAX_VERTICES)
     corner = np.empty((3, 3))
-    spots, inside = np.empty((pupil.shape[0], 2)), np.empty(pupil.shape[0], dtype=np.bool_)
+    spots, blocked = np.empty((pupil.shape[0], 2)), np.empty(pupil.shape[0], dtype=np.int64)
     pixel_area = to_pixels[2] * to_pixels[3]
     for half in range(halves):
         mirror = 1.0 - 2.0 * half
-        _place_nodes(data, mirror, crossings, blades, axes, to_pixels, spots, inside)
-        for t in range(triangles.shape[0]):
-            a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
-            if data[a, ALIVE] * data[b, ALIVE] * data[c, ALIVE] == 0.0:
-                continue
-            left, right = min(spots[a, 0], spots[b, 0], spots[c, 0]), max(spots[a, 0], spots[b, 0], spots[c, 0])
-            top, bottom = min(spots[a, 1], spots[b, 1], spots[c, 1]), max(spots[a, 1], spots[b, 1], spots[c, 1])
-            if right <= 0.0 or left >= width or bottom <= 0.0 or top >= height:
-                continue
-            flux, area = _triangle_flux(data, pupil, a, b, c)
-            flux *= gain
-            whole = inside[a] and inside[b] and inside[c]
-            if whole and mask is None:
-                if left >= 0.0 and top >= 0.0 and int(left) == int(right) and int(top) == int(bottom):
-                    for channel in range(3):
-                        plane[channel, int(top), int(left)] += flux * rgb[channel]
+        _place_nodes(data, mirror, crossings, blades, axes, to_pixels, spots, blocked)
+        start = 0
+        while start < triangles.shape[0]:
+            # a cell is a fan of triangles around its middle; most are smooth enough to be drawn as one polygon
+            end = start + 1
+            while end < triangles.shape[0] and triangles[end, 0] == triangles[start, 0]:
+                end += 1
+            if mask is None and end - start >= 4:
+                count = _gather_cell(spots, blocked, triangles, start, end, width, height, polygon)
+                if count > 0:
+                    flux, area = 0.0, 0.0
+                    for t in range(start, end):
+                        part, spread = _triangle_flux(data, pupil, triangles[t, 0], triangles[t, 1], triangles[t, 2])
+                        flux += part * gain
+                        area += spread
+                    drawn = abs(area) * pixel_area
+                    fits, base, gx, gy, dense_low, dense_high = _plane_over_cell(
+                        spots, densities, triangles, start, end, flux / drawn, gain / pixel_area, drawn
+                    )
+                    if fits:
+                        fill_polygon(polygon, count, base, gx, gy, dense_low, dense_high, rgb, plane)
+                        start = end
+                        continue
+            for t in range(start, end):
+                a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+                # a ray that ended, or one edge that blocks all three
+                if min(blocked[a], blocked[b], blocked[c]) < 0 or blocked[a] & blocked[b] & blocked[c] & ~SHARED != 0:
                     continue
-                count = 3
+                left, right = min(spots[a, 0], spots[b, 0], spots[c, 0]), max(spots[a, 0], spots[b, 0], spots[c, 0])
+                top, bottom = min(spots[a, 1], spots[b, 1], spots[c, 1]), max(spots[a, 1], spots[b, 1], spots[c, 1])
+                if right <= 0.0 or left >= width or bottom <= 0.0 or top >= height:
+                    continue
+                flux, area = _triangle_flux(data, pupil, a, b, c)
+                flux *= gain
+                whole = blocked[a] | blocked[b] | blocked[c] == 0
+                if whole and mask is None:
+                    if left >= 0.0 and top >= 0.0 and int(left) == int(right) and int(top) == int(bottom):
+                        add_to_pixel(plane, int(top), int(left), flux, rgb)
+                        continue
+                    count = 3
+                    for m in range(3):
+                        polygon[m, PX], polygon[m, PY] = spots[triangles[t, m], 0], spots[triangles[t, m], 1]
+                else:
+                    count = clip_triangle(
+                        data, pupil, triangles[t], mirror, crossings, blades, axes, polygon, other, values
+                    )
+                    for k in range(count):
+                        x, y = polygon[k, PX], polygon[k, PY]
+                        polygon[k, PX] = to_pixels[0] - to_pixels[2] * (x * axes[0, 0] + y * axes[1, 0])
+                        polygon[k, PY] = to_pixels[1] + to_pixels[3] * (x * axes[0, 1] + y * axes[1, 1])
+                if count == 0:
+                    continue
+                drawn = abs(area) * pixel_area
+                if drawn < SLIVER:
+                    part = 1.0
+                    if not whole or mask is not None:
+                        part = abs(polygon_area(polygon, count, PP, PQ)) / _pupil_area(pupil, a, b, c)
+                    if mask is not None:
+                        for m in range(crossings):
+                            part *= mask_value(
+                                mask, mask_half, polygon[0, PSTOP + 2 * m], polygon[0, PSTOP + 2 * m + 1]
+                            )
+                    _splat_polygon(polygon, count, flux * part, rgb, plane)
+                    continue
                 for m in range(3):
-                    polygon[m, PX], polygon[m, PY] = spots[triangles[t, m], 0], spots[triangles[t, m], 1]
-            else:
-                count = clip_triangle(
-                    data, pupil, triangles[t], mirror, crossings, blades, axes, polygon, other, values
-                )
-                for k in range(count):
-                    x, y = polygon[k, PX], polygon[k, PY]
-                    polygon[k, PX] = to_pixels[0] - to_pixels[2] * (x * axes[0, 0] + y * axes[1, 0])
-                    polygon[k, PY] = to_pixels[1] + to_pixels[3] * (x * axes[0, 1] + y * axes[1, 1])
-            if count == 0:
-                continue
-            drawn = abs(area) * pixel_area
-            if drawn < SLIVER:
-                part = 1.0
-                if not whole or mask is not None:
-                    part = abs(polygon_area(polygon, count, PP, PQ)) / _pupil_area(pupil, a, b, c)
+                    k = triangles[t, m]
+                    corner[m, 0], corner[m, 1], corner[m, 2] = spots[k, 0], spots[k, 1], densities[k]
+                base, gx, gy, dense_low, dense_high = _plane_through(corner, flux / drawn, gain / pixel_area, drawn)
                 if mask is not None:
-                    for m in range(crossings):
-                        part *= mask_value(mask, mask_half, polygon[0, PSTOP + 2 * m], polygon[0, PSTOP + 2 * m + 1])
-                _splat_polygon(polygon, count, flux * part, rgb, plane)
-                continue
-            for m in range(3):
-                k = triangles[t, m]
-                corner[m, 0], corner[m, 1], corner[m, 2] = spots[k, 0], spots[k, 1], densities[k]
-            base, gx, gy, dense_low, dense_high = _plane_through(corner, flux / drawn, gain / pixel_area, drawn)
-            if mask is not None:
-                fill_through_mask(
-                    polygon, count, crossings, mask, mask_half, base, gx, gy, dense_low, dense_high, rgb,
-                    plane, strip,
-                )  # fmt: skip
-                continue
-            if left < 0.0 or right > width or top < 0.0 or bottom > height:
-                count = cut_to_rectangle(polygon, count, other, values, float(width), float(height))
-                if count < 3:
+                    fill_through_mask(
+                        polygon, count, crossings, mask, mask_half, base, gx, gy, dense_low, dense_high, rgb, plane
+                    )
                     continue
-            fill_polygon(polygon, count, base, gx, gy, dense_low, dense_high, rgb, plane, strip)
+                if left < 0.0 or right > width or top < 0.0 or bottom > height:
+                    count = cut_to_rectangle(polygon, count, other, values, float(width), float(height))
+                    if count < 3:
+                        continue
+                fill_polygon(polygon, count, base, gx, gy, dense_low, dense_high, rgb, plane)
+            start = end
 
 
 @inner
-def _place_nodes(data, mirror, crossings, blades, axes, to_pixels, spots, inside):
-    """Fill the nodes' places in pixels, and whether nothing blocks them."""
+def _gather_cell(spots, blocked, triangles, start, end, width, height, polygon):
+    """Collect the border of a cell; return its vertices, 0 when it cannot be drawn as one polygon.
+
+    Nothing may cut it, its map may not fold, and `fill_polygon` must find one way down on either side.
+    """
+    count = end - start
+    centre = triangles[start, 0]
+    if blocked[centre] != 0:
+        return 0
+    cx, cy = spots[centre, 0], spots[centre, 1]
+    left, right, top, bottom = cx, cx, cy, cy
+    low, high = np.inf, -np.inf
+    turns = 0
+    for m in range(count):
+        t = start + m
+        following = t + 1 if m + 1 < count else start
+        beyond = following + 1 if following + 1 < end else start
+        a, b = triangles[t, 1], triangles[t, 2]
+        if blocked[a] != 0 or b != triangles[following, 1]:
+            return 0
+        ax, ay, bx, by = spots[a, 0], spots[a, 1], spots[b, 0], spots[b, 1]
+        polygon[m, PX], polygon[m, PY] = ax, ay
+        area = (ax - cx) * (by - cy) - (ay - cy) * (bx - cx)
+        low, high = min(low, area), max(high, area)
+        left, right, top, bottom = min(left, ax), max(right, ax), min(top, ay), max(bottom, ay)
+        if (by >= ay) != (spots[triangles[beyond, 1], 1] >= by):
+            turns += 1
+    if left < 0.0 or right > width or top < 0.0 or bottom > height or low * high <= 0.0 or turns != 2:
+        return 0
+    return count
+
+
+@inner
+def _plane_over_cell(spots, densities, triangles, start, end, mean, unit, drawn):
+    """Fit a linear density to the nodes of a cell: whether it fits, its value at the origin, gradient, bounds.
+
+    Notes
+    -----
+    Least squares over the border's nodes and the middle; as in `_plane_through`, scaled to the cell's mean.
+    """
+    if drawn < 0.5:
+        return True, mean, 0.0, 0.0, mean, mean
+    centre = triangles[start, 0]
+    cx, cy, average = spots[centre, 0], spots[centre, 1], densities[centre]
+    sx, sy, sxx, sxy, syy, sd, sdx, sdy = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    area, area_x, area_y = 0.0, 0.0, 0.0
+    for t in range(start, end):
+        k, following = triangles[t, 1], triangles[t, 2]
+        x, y, d = spots[k, 0] - cx, spots[k, 1] - cy, densities[k] - average
+        to_x, to_y = spots[following, 0] - cx, spots[following, 1] - cy
+        part = x * to_y - y * to_x
+        area, area_x, area_y = area + part, area_x + part * (x + to_x) / 3.0, area_y + part * (y + to_y) / 3.0
+        sx, sy, sd = sx + x, sy + y, sd + d
+        sxx, sxy, syy, sdx, sdy = sxx + x * x, sxy + x * y, syy + y * y, sdx + x * d, sdy + y * d
+    n = end - start + 1.0
+    mx, my, md = sx / n, sy / n, sd / n
+    sxx, sxy, syy, sdx, sdy = sxx - sx * mx, sxy - sx * my, syy - sy * my, sdx - sx * md, sdy - sy * md
+    inverse = 1.0 / (sxx * syy - sxy * sxy)
+    gx, gy = (sdx * syy - sdy * sxy) * inverse, (sdy * sxx - sdx * sxy) * inverse
+    rough = abs(md - gx * mx - gy * my)
+    low, high = np.inf, -np.inf
+    for t in range(start, end):
+        k = triangles[t, 1]
+        smooth = md + gx * (spots[k, 0] - cx - mx) + gy * (spots[k, 1] - cy - my)
+        rough = max(rough, abs(densities[k] - average - smooth))
+        low, high = min(low, smooth), max(high, smooth)
+    # over a polygon a linear density has the mean that it has at the centroid
+    x, y = area_x / area, area_y / area
+    middle = average + md + gx * (x - mx) + gy * (y - my)
+    ratio = mean / middle
+    if rough > ROUGH * middle or not 0.5 * unit < ratio < 2.0 * unit:
+        return False, 0.0, 0.0, 0.0, 0.0, 0.0
+    gx, gy = gx * ratio, gy * ratio
+    base = mean - gx * (cx + x) - gy * (cy + y)
+    return True, base, gx, gy, (average + low) * ratio, (average + high) * ratio
+
+
+@inner
+def _place_nodes(data, mirror, crossings, blades, axes, to_pixels, spots, blocked):
+    """Fill the nodes' places in pixels and a bit for every edge that blocks them: 0 is none, -1 a ray that ended."""
     for k in range(data.shape[0]):
         x, y = mirror * data[k, X], data[k, Y]
         # the upright picture is the sensor turned by 180 degrees
         spots[k, 0] = to_pixels[0] - to_pixels[2] * (x * axes[0, 0] + y * axes[1, 0])
         spots[k, 1] = to_pixels[1] + to_pixels[3] * (x * axes[0, 1] + y * axes[1, 1])
-        clear = data[k, REL] <= 1.0
+        if data[k, ALIVE] == 0.0:
+            blocked[k] = -1
+            continue
+        found, bit = np.int64(data[k, REL] > 1.0), np.int64(1)
         for c in range(crossings):
             u, v = mirror * data[k, STOP_X + 2 * c], data[k, STOP_X + 2 * c + 1]
             up_x, up_y = u * axes[0, 0] + v * axes[1, 0], u * axes[0, 1] + v * axes[1, 1]
             for b in range(blades.shape[0]):
-                clear = clear and blade_value(blades, b, up_x, up_y) <= 0.0
-        inside[k] = clear
+                # 24 blades at three crossings are more than there are bits: the last ones share one
+                bit = min(bit << 1, SHARED)
+                if blade_value(blades, b, up_x, up_y) > 0.0:
+                    found |= bit
+        blocked[k] = found
 
 
 @inner

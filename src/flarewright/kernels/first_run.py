@@ -26,7 +26,7 @@ _MARK = "FLAREWRIGHT_HELPER"
 
 _GEOMETRY = "i8[::1], i8[::1], f8[::1], f8[::1], f8[::1], f8[::1]"
 _BUNDLE = "f8[:,::1], f8[:,::1], i8[:,::1]"
-_CANVAS = "f8[:,::1], f8[::1], f8, f8[::1], f4[:,:,::1], f4[::1]"
+_CANVAS = "f8[:,::1], f8[::1], f8, f8[::1], f4[:,:,:,::1]"
 _WINGS = "f8[::1], f8[::1], f8[::1], f8[::1]"
 
 # module and kernel of each root, its types as a render calls it (tests/contracts compares them with real calls), and
@@ -45,7 +45,7 @@ ROOTS = {
     "matrices": (
         "matrix.draw_matrix_ghosts",
         "i8[::1], i8[::1], i8[::1], i8[::1], f8[::1], none, f8[::1], f8[:,::1], f8[:,:,::1], f8, f8, f8, f8, "
-        "f8[:,::1], f8, none, f8, f8[:,::1], f8[::1], f8, f8[:,::1], f8[:,:,::1], f4[::1]",
+        "f8[:,::1], f8, none, f8, f8[:,::1], f8[::1], f8, f8[:,::1], f8[:,:,::1]",
         4.0,
     ),
     "blade wings": (
@@ -54,8 +54,8 @@ ROOTS = {
         0.8,
     ),
     "fan wings": ("resample.blend_fan_wings", f"{_WINGS}, f8[::1], f8, f8, f4[:,:,::1]", 0.5),
-    "window": ("interleave.lit_window", "f4[:,:,::1]", 0.3),
-    "pixels": ("interleave.interleave", "f4[:,:,::1], i8, i8, f8, f4[:,:,::1]", 0.1),
+    "pixels": ("collect.collect", "f4[:,:,:,::1], f4[:,:,::1]", 0.1),
+    "double": ("collect.add_doubled", "f4[:,:,::1], f4[:,:,::1]", 0.2),
 }
 # what a helper loses to its own start
 _START = 0.7

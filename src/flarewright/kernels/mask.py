@@ -6,7 +6,7 @@ import numpy as np
 
 from ._jit import inner
 from .clip import MAX_VERTICES, PSTOP, PX, PY, cut_to_rectangle
-from .raster import fill_polygon
+from .raster import fill_polygon, plane_size
 
 
 @inner
@@ -64,9 +64,7 @@ def _pieces(polygon, k, crossings, mask, half):
 
 
 @inner
-def fill_through_mask(
-    polygon, count, crossings, mask, half, density, gx, gy, density_low, density_high, rgb, plane, strip
-):
+def fill_through_mask(polygon, count, crossings, mask, half, density, gx, gy, density_low, density_high, rgb, plane):
     """Draw a polygon as `fill_polygon` does, its light multiplied by the mask at every crossing of the stop.
 
     Parameters
@@ -78,14 +76,14 @@ def fill_through_mask(
         Transmittance, row 0 up.
     half : float
         The mask spans [-half, half] in the stop, mm.
-    density ... strip
+    density ... plane
         As in `fill_polygon`.
 
     Notes
     -----
     Where the mask varies, the polygon is divided linearly until a piece is a texel or a pixel.
     """
-    height, width = plane.shape[1], plane.shape[2]
+    height, width = plane_size(plane)
     value = 1.0
     for c in range(crossings):
         here = _uniform(polygon, count, c, mask, half)
@@ -99,7 +97,7 @@ def fill_through_mask(
             piece[k, 0], piece[k, 1] = polygon[k, PX], polygon[k, PY]
         kept = cut_to_rectangle(piece, count, other, values, float(width), float(height))
         if kept >= 3:
-            fill_polygon(piece, kept, density, gx, gy, density_low, density_high, rgb * value, plane, strip)
+            fill_polygon(piece, kept, density, gx, gy, density_low, density_high, rgb * value, plane)
         return
     for k in range(1, count - 1):
         n = _pieces(polygon, k, crossings, mask, half)
@@ -129,4 +127,4 @@ def fill_through_mask(
                         )
                 kept = cut_to_rectangle(piece, 3, other, values, float(width), float(height))
                 if kept >= 3:
-                    fill_polygon(piece, kept, density, gx, gy, density_low, density_high, rgb * value, plane, strip)
+                    fill_polygon(piece, kept, density, gx, gy, density_low, density_high, rgb * value, plane)

@@ -122,7 +122,7 @@ def paraxial_weight(rows, actions, curvature, curvature_x, z_vertex, n_gap, refl
 @compiled
 def draw_matrix_ghosts(
     rows, actions, starts, crossings, curvature, curvature_x, z_vertex, n_gap, reflectance, sensor_z,
-    entrance, slope, slope_x, edges, iris_radius, mask, mask_half, axes, to_pixels, gain, rgb, plane, strip,
+    entrance, slope, slope_x, edges, iris_radius, mask, mask_half, axes, to_pixels, gain, rgb, plane,
 ):  # fmt: skip
     """Draw many paths at many wavelengths with matrices (Lee and Eisemann 2013; Van Acoleyen 2025, chapter 4).
 
@@ -148,16 +148,18 @@ def draw_matrix_ghosts(
     edges : ndarray, shape (B, 4)
         The iris as straight blades.
     iris_radius : float
-    mask, mask_half, axes, to_pixels, gain, plane, strip
+    mask, mask_half, axes, to_pixels, gain
         As in `draw_bundle`.
     rgb : ndarray, shape (W, 3)
+    plane : ndarray, shape (H, W, 3), float64
+        Differences of flux along the rows, added to (`kernels.raster.sum_rows`).
 
     Notes
     -----
     A ghost is the image of the entrance cut by the iris: a polygon of even irradiance. Its colour comes from one ray,
     through the middle of the iris or, where the entrance bounds the ghost, of the entrance.
     """
-    height, width = plane.shape[1], plane.shape[2]
+    height, width = plane.shape[0], plane.shape[1]
     polygon, other = np.empty((MAX_VERTICES, PSTOP + 6)), np.empty((MAX_VERTICES, PSTOP + 6))
     values = np.empty(MAX_VERTICES)
     to_stop = np.empty((3, 2, 2))
@@ -194,13 +196,12 @@ def draw_matrix_ghosts(
             even = flux / area
             if mask is not None:
                 fill_through_mask(
-                    polygon, count, crossings[p], mask, mask_half, even, 0.0, 0.0, even, even, rgb[w],
-                    plane, strip,
+                    polygon, count, crossings[p], mask, mask_half, even, 0.0, 0.0, even, even, rgb[w], plane,
                 )  # fmt: skip
                 continue
             count = cut_to_rectangle(polygon, count, other, values, float(width), float(height))
             if count >= 3:
-                fill_polygon(polygon, count, even, 0.0, 0.0, even, even, rgb[w], plane, strip)
+                fill_polygon(polygon, count, even, 0.0, 0.0, even, even, rgb[w], plane)
 
 
 @inner

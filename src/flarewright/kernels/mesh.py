@@ -149,14 +149,14 @@ def build_mesh(
     triangles : ndarray, shape (T, 3), int64
         Counter-clockwise in the pupil. Neighbouring cells differ by one halving at most and share all their nodes.
     """
-    size_a, size_b = nx << (max_level + 1), ny << (max_level + 1)
-    da, db = (box[1] - box[0]) / size_a, (box[3] - box[2]) / size_b
+    # the lattice of all places for nodes has room for `depth` halvings, and grows when a cell asks for more
+    depth = min(max_level, 2)
     # node number + 1, 0 for none
-    lattice = np.zeros((size_a + 1, size_b + 1), dtype=np.int32)
+    lattice = np.zeros(((nx << (depth + 1)) + 1, (ny << (depth + 1)) + 1), dtype=np.int32)
     offsets = np.zeros(max_level + 2, dtype=np.int64)
     for level in range(max_level + 1):
         offsets[level + 1] = offsets[level] + (nx << level) * (ny << level)
-    state = np.zeros(offsets[max_level + 1], dtype=np.int8)
+    state = np.zeros(offsets[depth + 1], dtype=np.int8)
     columns = STOP_X + 2 * crossings
     pupil = np.empty((2048, 2))
     data = np.empty((n_gap.shape[0], 2048, columns))
@@ -167,8 +167,11 @@ def build_mesh(
     for k in range(nx * ny):
         cells[k] = k
     for level in range(max_level + 1):
+        if level > depth:
+            depth = level
+            lattice, state = _deeper(lattice, state, offsets[depth + 1])
         first = n_nodes
-        pupil, data, n_nodes = _add_nodes(lattice, pupil, data, n_nodes, cells, level, max_level, ny, da, db, box)
+        pupil, data, n_nodes = _add_nodes(lattice, pupil, data, n_nodes, cells, level, depth, ny, box)
         _trace(
             rows, actions, curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, tilt,
             pupil, data, first, n_nodes,
@@ -179,7 +182,7 @@ def build_mesh(
         h = 1.0 / height
         for cell in cells:
             a, b = cell // height, cell % height
-            _cell_nodes(lattice, a, b, level, max_level, nodes)
+            _cell_nodes(lattice, a, b, level, depth, nodes)
             verdict = EMPTY
             for v in range(n_gap.shape[0]):
                 found = _judge(
@@ -199,23 +202,36 @@ def build_mesh(
         cells = children[:n_children]
         if n_children == 0:
             break
-    _balance(state, offsets, nx, ny, max_level)
+    _balance(state, offsets, nx, ny, depth)
     first = n_nodes
-    for level in range(1, max_level + 1):
+    for level in range(1, depth + 1):
         forced = _leaves(state, offsets, level)
-        pupil, data, n_nodes = _add_nodes(lattice, pupil, data, n_nodes, forced, level, max_level, ny, da, db, box)
+        pupil, data, n_nodes = _add_nodes(lattice, pupil, data, n_nodes, forced, level, depth, ny, box)
     _trace(
         rows, actions, curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, tilt,
         pupil, data, first, n_nodes,
     )  # fmt: skip
     pupil, data = _resized(pupil, data, n_nodes, n_nodes)
-    return pupil, data, _triangulate(state, offsets, lattice, nx, ny, max_level)
+    return pupil, data, _triangulate(state, offsets, lattice, nx, ny, depth)
 
 
 @inner
-def _cell_nodes(lattice, a, b, level, max_level, nodes):
+def _deeper(lattice, state, cells):
+    """Make room for one more halving: in the lattice, and for the states of its cells."""
+    finer = np.zeros((2 * lattice.shape[0] - 1, 2 * lattice.shape[1] - 1), dtype=np.int32)
+    for i in range(lattice.shape[0]):
+        for j in range(lattice.shape[1]):
+            finer[2 * i, 2 * j] = lattice[i, j]
+    longer = np.zeros(cells, dtype=np.int8)
+    for k in range(state.size):
+        longer[k] = state[k]
+    return finer, longer
+
+
+@inner
+def _cell_nodes(lattice, a, b, level, depth, nodes):
     """Look up the 3 x 3 nodes of a cell, row by row in x."""
-    half = 1 << (max_level - level)
+    half = 1 << (depth - level)
     for m in range(9):
         nodes[m] = lattice[(2 * a + m // 3) * half, (2 * b + m % 3) * half] - 1
 
@@ -248,9 +264,10 @@ def _trace(
 
 
 @inner
-def _add_nodes(lattice, pupil, data, n_nodes, cells, level, max_level, ny, da, db, box):
+def _add_nodes(lattice, pupil, data, n_nodes, cells, level, depth, ny, box):
     """Give a number to the nodes of cells that have none yet; the arrays grow as needed."""
-    half = 1 << (max_level - level)
+    half = 1 << (depth - level)
+    da, db = (box[1] - box[0]) / (lattice.shape[0] - 1), (box[3] - box[2]) / (lattice.shape[1] - 1)
     height = ny << level
     for cell in cells:
         a, b = cell // height, cell % height
@@ -284,9 +301,9 @@ def _leaves(state, offsets, level):
 
 
 @inner
-def _balance(state, offsets, nx, ny, max_level):
+def _balance(state, offsets, nx, ny, depth):
     """Split leaves until neighbours differ by one level at most, from the finest cells up."""
-    for level in range(max_level - 1, 0, -1):
+    for level in range(depth - 1, 0, -1):
         width, height = nx << level, ny << level
         for cell in range(width * height):
             if state[offsets[level] + cell] != SPLIT:
@@ -320,10 +337,10 @@ def _ensure(state, offsets, ny, level, a, b):
 
 
 @inner
-def _triangulate(state, offsets, lattice, nx, ny, max_level):
+def _triangulate(state, offsets, lattice, nx, ny, depth):
     """Fan every leaf around its centre; an edge is halved where one side asks for it and none is coarser."""
     total = 0
-    for level in range(max_level + 1):
+    for level in range(depth + 1):
         for k in range(offsets[level], offsets[level + 1]):
             if state[k] == LEAF or state[k] == FLAT:
                 total += 8
@@ -332,14 +349,14 @@ def _triangulate(state, offsets, lattice, nx, ny, max_level):
     nodes = np.empty(9, dtype=np.int64)
     # corner, middle, corner of each edge, counter-clockwise, and where its neighbour lies
     edges = ((0, 3, 6, 0, -1), (6, 7, 8, 1, 0), (8, 5, 2, 0, 1), (2, 1, 0, -1, 0))
-    for level in range(max_level + 1):
+    for level in range(depth + 1):
         width, height = nx << level, ny << level
         for cell in range(width * height):
             kind = state[offsets[level] + cell]
             if kind != LEAF and kind != FLAT:
                 continue
             a, b = cell // height, cell % height
-            _cell_nodes(lattice, a, b, level, max_level, nodes)
+            _cell_nodes(lattice, a, b, level, depth, nodes)
             for edge in edges:
                 i, j = a + edge[3], b + edge[4]
                 halved = kind == LEAF

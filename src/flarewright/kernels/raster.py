@@ -12,6 +12,33 @@ import numpy as np
 from ._jit import compiled, inlined, inner
 from .clip import PX, PY
 
+# a row of the picture is kept in blocks of this many pixels, each channel by itself: one vector to the compiler
+BLOCK = 8
+# floats of a block: three channels
+_FLOATS = 3 * BLOCK
+
+
+def blank_plane(width, height):
+    """Return a black picture as `fill_polygon` fills it.
+
+    Parameters
+    ----------
+    width, height : int
+        Pixels.
+
+    Returns
+    -------
+    ndarray, shape (H, ceil(W / BLOCK), 3, BLOCK), float32
+        Pixels beyond the width, in a row's last block, are drawn on and not kept (`to_pixels`).
+    """
+    return np.zeros((height, -(-width // BLOCK), 3, BLOCK), dtype=np.float32)
+
+
+def to_pixels(plane, width):
+    """Return a picture's pixels, shape (H, W, 3), float32."""
+    height, blocks = plane.shape[:2]
+    return np.ascontiguousarray(np.moveaxis(plane, 2, 3)).reshape(height, blocks * BLOCK, 3)[:, :width]
+
 
 @inlined
 def _right_of(t, near, far, half_inverse):
@@ -27,6 +54,22 @@ def _share(c, la, lb, l_inverse, ra, rb, r_inverse):
     return left - _right_of(c + 1.0, ra, rb, r_inverse) + _right_of(c, ra, rb, r_inverse)
 
 
+@inlined
+def _covered(c, near, far, inverse):
+    """Return how much of pixel [c, c + 1] lies to the right of an edge, without the difference of large numbers."""
+    one = np.float32(1.0)
+    start, end = min(max(c, near), far), min(max(c + one, near), far)
+    return inverse * (end - start) * (np.float32(0.5) * (start + end) - near) + max(
+        c + one - max(far, c), np.float32(0.0)
+    )
+
+
+@inlined
+def plane_size(plane):
+    """Return height and width of a picture in either form of `fill_polygon`."""
+    return plane.shape[0], plane.shape[1] if plane.ndim == 3 else BLOCK * plane.shape[1]
+
+
 @inner
 def _step(k, way, count):
     """Walk around a polygon."""
@@ -35,47 +78,35 @@ def _step(k, way, count):
 
 
 @inner
-def _fill_strip(flat, width, size, row, depth, xl0, xl1, xr0, xr1, start, gx, density_low, density_high, rgb, strip):
+def _fill_strip(flat, blocks, row, depth, xl0, xl1, xr0, xr1, start, gx, density_low, density_high, rgb):
     """Add a strip of a polygon between two edges: exact coverage times the density at each pixel's centre.
 
-    `flat` is the picture as one line of three planes of `size` pixels: an unsigned place in it needs no check for
-    counting from the end, which would keep the loops from vectorising.
+    `flat` is the picture as one line: an unsigned place in it needs no check for counting from the end, which would
+    keep the loop over a block from becoming one vector.
     """
     la, lb = min(xl0, xl1), max(xl0, xl1)
     ra, rb = min(xr0, xr1), max(xr0, xr1)
-    first = int(la)
-    count = min(int(rb) + 1, width) - first
-    # edges relative to the first pixel
-    la, lb, ra, rb = la - first, lb - first, ra - first, rb - first
-    l_inverse, r_inverse = 0.5 / max(lb - la, 1e-9), 0.5 / max(rb - ra, 1e-9)
-    start += gx * (first + 0.5)
-    # between the pixels that edges touch, coverage is whole
-    whole, rest = int(lb) + 1, int(ra)
-    if rest - whole < 8:
-        whole, rest = count, count
-    for c in range(whole):
-        strip[c] = (
-            _share(float(c), la, lb, l_inverse, ra, rb, r_inverse)
-            * depth
-            * min(max(start + gx * c, density_low), density_high)
-        )
-    for c in range(whole, rest):
-        strip[c] = depth * (start + gx * c)
-    for c in range(rest, count):
-        strip[c] = (
-            _share(float(c), la, lb, l_inverse, ra, rb, r_inverse)
-            * depth
-            * min(max(start + gx * c, density_low), density_high)
-        )
-    for channel in range(3):
-        colour = np.float32(rgb[channel])
-        place = np.uint64(channel * size + row * width + first)
-        for c in range(count):
-            flat[place + np.uint64(c)] += colour * strip[c]
+    l_inverse, r_inverse = np.float32(1.0 / max(lb - la, 1e-6)), np.float32(1.0 / max(rb - ra, 1e-6))
+    red, green, blue = np.float32(rgb[0] * depth), np.float32(rgb[1] * depth), np.float32(rgb[2] * depth)
+    slope, low, high = np.float32(gx), np.float32(density_low), np.float32(density_high)
+    for block in range(int(la) // BLOCK, min(int(rb) // BLOCK, blocks - 1) + 1):
+        x0 = float(BLOCK * block)
+        first = np.float32(start + gx * (x0 + 0.5))
+        l0, l1, r0, r1 = np.float32(la - x0), np.float32(lb - x0), np.float32(ra - x0), np.float32(rb - x0)
+        place = np.uint64((row * blocks + block) * _FLOATS)
+        for m in range(BLOCK):
+            c = np.float32(m)
+            value = min(max(first + slope * c, low), high) * (
+                _covered(c, l0, l1, l_inverse) - _covered(c, r0, r1, r_inverse)
+            )
+            at = place + np.uint64(m)
+            flat[at] += red * value
+            flat[at + np.uint64(BLOCK)] += green * value
+            flat[at + np.uint64(2 * BLOCK)] += blue * value
 
 
 @inner
-def _mark_strip(flat, width, size, row, depth, xl0, xl1, xr0, xr1, density, rgb):
+def _mark_strip(flat, width, row, depth, xl0, xl1, xr0, xr1, density, rgb):
     """Add a strip of even density to a picture of differences along its rows: only the pixels at its edges change."""
     la, lb = min(xl0, xl1), max(xl0, xl1)
     ra, rb = min(xr0, xr1), max(xr0, xr1)
@@ -97,11 +128,11 @@ def _mark_strip(flat, width, size, row, depth, xl0, xl1, xr0, xr1, density, rgb)
             elif part == 0 and whole < rest:
                 here = 1.0
             if first + c < width:
-                place = np.uint64(row * width + first + c)
+                place = np.uint64(3 * (row * width + first + c))
                 change = (here - before) * depth * density
                 flat[place] += rgb[0] * change
-                flat[place + np.uint64(size)] += rgb[1] * change
-                flat[place + np.uint64(2 * size)] += rgb[2] * change
+                flat[place + np.uint64(1)] += rgb[1] * change
+                flat[place + np.uint64(2)] += rgb[2] * change
             before = here
 
 
@@ -111,19 +142,20 @@ def sum_rows(differences):
 
     Parameters
     ----------
-    differences : ndarray, shape (3, H, W), float64
+    differences : ndarray, shape (H, W, 3), float64
         As `fill_polygon` leaves it when it marks.
     """
-    for channel in range(differences.shape[0]):
-        for row in range(differences.shape[1]):
-            total = 0.0
-            for c in range(differences.shape[2]):
-                total += differences[channel, row, c]
-                differences[channel, row, c] = total
+    for row in range(differences.shape[0]):
+        red, green, blue = 0.0, 0.0, 0.0
+        for c in range(differences.shape[1]):
+            red += differences[row, c, 0]
+            green += differences[row, c, 1]
+            blue += differences[row, c, 2]
+            differences[row, c, 0], differences[row, c, 1], differences[row, c, 2] = red, green, blue
 
 
 @compiled
-def fill_polygon(polygon, count, density, gx, gy, density_low, density_high, rgb, plane, strip):
+def fill_polygon(polygon, count, density, gx, gy, density_low, density_high, rgb, plane):
     """Add a convex polygon with linearly varying density to a picture.
 
     Parameters
@@ -136,11 +168,9 @@ def fill_polygon(polygon, count, density, gx, gy, density_low, density_high, rgb
     density_low, density_high : float
         Bounds kept at pixels whose centre lies outside the polygon.
     rgb : ndarray, shape (3,)
-    plane : ndarray, shape (3, H, W)
-        Added to.
-    strip : ndarray, shape (>= W + 1,), float32
-        Scratch. Empty: the density is even, and only the differences along the rows are marked, which costs no more for
-        large polygons than for small ones; `sum_rows` turns them into the picture.
+    plane : ndarray, shape (H, B, 3, BLOCK), float32, or (H, W, 3), float64
+        Added to. In the second form the density is even, and only the differences along the rows are marked, which
+        costs no more for large polygons than for small ones; `sum_rows` turns them into the picture.
 
     Notes
     -----
@@ -161,9 +191,8 @@ def fill_polygon(polygon, count, density, gx, gy, density_low, density_high, rgb
     left, right = top, top
     y, end = polygon[top, PY], polygon[bottom, PY]
     row = int(y)
-    width, size = plane.shape[2], plane.shape[1] * plane.shape[2]
-    flat = plane.reshape(3 * size)
-    last_row = plane.shape[1] - 1
+    flat = plane.reshape(plane.size)
+    last_row = plane.shape[0] - 1
     left_slope, right_slope = 0.0, 0.0
     left_end, right_end = y, y
     while y < end:
@@ -187,26 +216,12 @@ def fill_polygon(polygon, count, density, gx, gy, density_low, density_high, rgb
             yl, yr = polygon[left, PY], polygon[right, PY]
             xl0, xl1 = xl + (y - yl) * left_slope, xl + (y_next - yl) * left_slope
             xr0, xr1 = xr + (y - yr) * right_slope, xr + (y_next - yr) * right_slope
-            if strip.size == 0:
-                _mark_strip(flat, width, size, row, y_next - y, xl0, xl1, xr0, xr1, density, rgb)
+            if plane.ndim == 3:
+                _mark_strip(flat, plane.shape[1], row, y_next - y, xl0, xl1, xr0, xr1, density, rgb)
             else:
                 base = density + gy * (row + 0.5)
                 _fill_strip(
-                    flat,
-                    width,
-                    size,
-                    row,
-                    y_next - y,
-                    xl0,
-                    xl1,
-                    xr0,
-                    xr1,
-                    base,
-                    gx,
-                    density_low,
-                    density_high,
-                    rgb,
-                    strip,
+                    flat, plane.shape[1], row, y_next - y, xl0, xl1, xr0, xr1, base, gx, density_low, density_high, rgb
                 )
         if left_end <= y_next:
             left = _step(left, count - way, count)
@@ -215,6 +230,15 @@ def fill_polygon(polygon, count, density, gx, gy, density_low, density_high, rgb
         if y_next >= row + 1.0:
             row += 1
         y = y_next
+
+
+@inner
+def add_to_pixel(plane, row, column, light, rgb):
+    """Add light to one pixel of a picture in blocks."""
+    block, m = column // BLOCK, column % BLOCK
+    plane[row, block, 0, m] += rgb[0] * light
+    plane[row, block, 1, m] += rgb[1] * light
+    plane[row, block, 2, m] += rgb[2] * light
 
 
 @compiled
@@ -227,10 +251,10 @@ def splat_line(x0, y0, x1, y1, flux, rgb, plane):
         Segment in pixels.
     flux : float
     rgb : ndarray, shape (3,)
-    plane : ndarray, shape (3, H, W), float32
+    plane : ndarray, shape (H, B, 3, BLOCK), float32
         Added to; what falls outside is lost to the sensor.
     """
-    height, width = plane.shape[1], plane.shape[2]
+    height, width = plane.shape[0], BLOCK * plane.shape[1]
     length = sqrt((x1 - x0) ** 2 + (y1 - y0) ** 2)
     samples = int(min(2.0 * length, 8192.0)) + 1
     share = flux / samples
@@ -245,6 +269,4 @@ def splat_line(x0, y0, x1, y1, flux, rgb, plane):
             cc, rr = c + m % 2, r + m // 2
             part = (fx if m % 2 else 1.0 - fx) * (fy if m // 2 else 1.0 - fy) * share
             if 0 <= cc < width and 0 <= rr < height:
-                plane[0, rr, cc] += rgb[0] * part
-                plane[1, rr, cc] += rgb[1] * part
-                plane[2, rr, cc] += rgb[2] * part
+                add_to_pixel(plane, rr, cc, part, rgb)

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..kernels.bundle import draw_bundle, measure_bundle, node_densities
+from ..kernels.raster import blank_plane, to_pixels
 from ..kernels.trace import ALIVE, REL, STOP_X, WEIGHT, X, Y
 from ..model import AsLens, CoatingChoice, Iris, Lens
 from .bundle import Bundle, Incidence, find_region, incidence, trace_bundle, trace_grid, trace_points
@@ -245,15 +246,14 @@ def _peak(
     """Draw the bundle around a place; return the brightest pixel's irradiance per unit light, and its side."""
     patch = max(2.0 * reach / PEAK_GRID, 0.01)
     side = min(PEAK_GRID, max(4, ceil(2.0 * reach / patch) + 2))
-    plane = np.zeros((3, side, side), dtype=np.float32)
-    to_pixels = np.array([side / 2 - centre[0] / patch, side / 2 + centre[1] / patch, 1.0 / patch, 1.0 / patch])
+    plane = blank_plane(side, side)
+    view = np.array([side / 2 - centre[0] / patch, side / 2 + centre[1] / patch, 1.0 / patch, 1.0 / patch])
     densities = node_densities(data, bundle.pupil, bundle.triangles)
     draw_bundle(
         data, bundle.pupil, bundle.triangles, densities, bundle.path.stop_crossings, blades, None, 1.0, light.axes,
-        to_pixels, light.cosine, np.array([1.0, 0.0, 0.0]), plane, np.empty(side + 1, dtype=np.float32),
-        bundle.halves,
+        view, light.cosine, np.array([1.0, 0.0, 0.0]), plane, bundle.halves,
     )  # fmt: skip
-    return float(plane[0].max()) / patch**2, patch
+    return float(to_pixels(plane, side)[:, :, 0].max()) / patch**2, patch
 
 
 def bounding_edges(lens: Lens, order: FirstOrder, paths: Sequence[LightPath]) -> list[str]:

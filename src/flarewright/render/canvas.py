@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernels.interleave import interleave, lit_window
+from ..kernels.collect import add_doubled, collect
+from ..kernels.raster import BLOCK, blank_plane
 from ..model import Layer
 
 Plane = NDArray[np.float32] | NDArray[np.float64]
@@ -25,22 +26,27 @@ class Canvas:
     ----------
     size_px : tuple of int
     planes : list of ndarray or None
-        Flux per pixel, shape (3, H, W), float32: at full resolution, at half and at a quarter; made when first used.
-    strip : ndarray
-        Scratch of `kernels.raster.fill_polygon`.
+        Flux per pixel in blocks (`kernels.raster.blank_plane`): at full resolution, at half and at a quarter; made when
+        first used.
     """
 
     size_px: tuple[int, int]
     planes: list[Plane | None]
-    strip: NDArray[np.float32]
 
-    def scratch(self, detail: int = 0) -> tuple[Plane, NDArray[np.float32]]:
-        """Return plane and scratch in the order in which kernels take them; `detail` halves the resolution."""
+    def plane(self, detail: int = 0) -> Plane:
+        """Return the plane to draw on; `detail` halves the resolution."""
         plane = self.planes[detail]
         if plane is None:
-            width, height = (-(-side // 2**detail) for side in self.size_px)
-            plane = self.planes[detail] = np.zeros((3, height, width), dtype=np.float32)
-        return plane, self.strip
+            plane = self.planes[detail] = blank_plane(*(-(-side // 2**detail) for side in self.size_px))
+        return plane
+
+    def add(self, pixels: Plane, detail: int = 0) -> None:
+        """Add a picture of shape (H, W, 3), flux per pixel, whose resolution is halved `detail` times."""
+        plane = self.plane(detail)
+        height, blocks = plane.shape[:2]
+        padded = np.zeros((height, blocks * BLOCK, 3))
+        padded[:, : pixels.shape[1]] = pixels
+        plane += np.moveaxis(padded.reshape(height, blocks, BLOCK, 3), 3, 2)
 
 
 def merge(planes: Sequence[Plane | None], size_px: tuple[int, int]) -> Plane:
@@ -49,51 +55,45 @@ def merge(planes: Sequence[Plane | None], size_px: tuple[int, int]) -> Plane:
     Parameters
     ----------
     planes : sequence of ndarray or None
-        As `Canvas.planes`.
+        As `Canvas.planes`, or pictures of shape (H, W, 3).
     size_px : tuple of int
         Width and height.
 
     Returns
     -------
-    ndarray, shape (3, H, W)
+    ndarray, shape (H, W, 3)
         Flux per pixel; black when nothing was drawn.
     """
-    width, height = size_px
-    total = planes[0]
-    if total is None:
-        total = np.zeros((3, height, width), dtype=np.float32)
-    for detail, plane in enumerate(planes):
-        if detail > 0 and plane is not None:
-            fine = plane
-            for _ in range(detail):
-                fine = _double(_double(fine, 1), 2)
-            total = total + fine[:, :height, :width]
-    return total
-
-
-def _double(plane: Plane, axis: int) -> NDArray[np.float32]:
-    """Double the resolution along an axis by linear interpolation of irradiance; the flux stays."""
-    plane = np.moveaxis(plane, axis, -1)
-    padded = np.concatenate([plane[..., :1], plane, plane[..., -1:]], axis=-1)
-    fine = np.empty((*plane.shape[:-1], 2 * plane.shape[-1]), dtype=np.float32)
-    # a pixel's halves lie a quarter pixel from its centre, and each holds half its flux
-    fine[..., 0::2] = np.float32(0.375) * plane + np.float32(0.125) * padded[..., :-2]
-    fine[..., 1::2] = np.float32(0.375) * plane + np.float32(0.125) * padded[..., 2:]
-    return np.moveaxis(fine, -1, axis)
+    if planes[0] is not None and planes[0].ndim == 3 and all(plane is None for plane in planes[1:]):
+        return planes[0]
+    total: NDArray[np.float32] | None = None
+    for detail in reversed(range(len(planes))):
+        width, height = (-(-side // 2**detail) for side in size_px)
+        plane, coarse = planes[detail], total
+        if plane is None and coarse is None:
+            continue
+        total = np.zeros((height, width, 3), dtype=np.float32)
+        if plane is not None and plane.ndim == 3:
+            total += plane
+        elif plane is not None:
+            collect(plane, total)
+        if coarse is not None:
+            add_doubled(coarse, total)
+    return np.zeros((size_px[1], size_px[0], 3), dtype=np.float32) if total is None else total
 
 
 def blank(size_px: tuple[int, int]) -> Canvas:
     """Return an empty canvas of (width, height) pixels."""
-    return Canvas(size_px, [None] * DETAILS, np.empty(size_px[0] + 1, dtype=np.float32))
+    return Canvas(size_px, [None] * DETAILS)
 
 
-def to_layer(name: str, plane: Plane, pixel_area: float, about: dict[str, str | float]) -> Layer:
-    """Crop a plane of flux to what is not black and turn it into irradiance.
+def to_layer(name: str, pixels: Plane, pixel_area: float, about: dict[str, str | float]) -> Layer:
+    """Crop a picture of flux to what is not black and turn it into irradiance.
 
     Parameters
     ----------
     name : str
-    plane : ndarray, shape (3, H, W)
+    pixels : ndarray, shape (H, W, 3)
         Flux per pixel.
     pixel_area : float
         mm^2.
@@ -104,9 +104,20 @@ def to_layer(name: str, plane: Plane, pixel_area: float, about: dict[str, str | 
     Layer
         Its window is the smallest that holds all light; one black pixel when there is none.
     """
-    x0, y0, x1, y1 = lit_window(plane)
+    x0, y0, x1, y1 = lit_window(pixels)
     if x1 <= x0:
         return Layer(name, np.zeros((1, 1, 3), dtype=np.float32), (0, 0, 1, 1), about)
-    pixels = np.empty((y1 - y0, x1 - x0, 3), dtype=np.float32)
-    interleave(plane, x0, y0, 1.0 / pixel_area, pixels)
-    return Layer(name, pixels, (x0, y0, x1 - x0, y1 - y0), about)
+    irradiance = np.empty((y1 - y0, x1 - x0, 3), dtype=np.float32)
+    np.multiply(pixels[y0:y1, x0:x1], 1.0 / pixel_area, out=irradiance, casting="same_kind")
+    return Layer(name, irradiance, (x0, y0, x1 - x0, y1 - y0), about)
+
+
+def lit_window(pixels: Plane) -> tuple[int, int, int, int]:
+    """Bound the pixels of a picture of shape (H, W, 3) that hold light: x0, y0, x1, y1; all 0 when all is black."""
+    height, width = pixels.shape[:2]
+    lines = pixels.reshape(height, 3 * width)
+    rows = np.flatnonzero(lines.any(axis=1))
+    if rows.size == 0:
+        return 0, 0, 0, 0
+    columns = np.flatnonzero(lines.any(axis=0).reshape(width, 3).any(axis=1))
+    return int(columns[0]), int(rows[0]), int(columns[-1]) + 1, int(rows[-1]) + 1

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..kernels.bundle import draw_bundle, measure_bundle, node_densities
+from ..kernels.raster import blank_plane, to_pixels
 from ..model import Layer, Lens, Lines
 from ..optics.bundle import Bundle, find_region, trace_bundle, trace_grid
 from ..optics.paths import direct_path
@@ -83,15 +84,15 @@ def _through_mask(shot: Shot, bundle: Bundle, data: Floats, sums: Floats) -> flo
     side = 128
     zoom = 0.4 * side / max(sums[5], 0.5 * (sums[7] - sums[6]), 1e-9)
     centre = -0.5 * (sums[6] + sums[7]) * shot.incidence.axes[1]
-    plane = np.zeros((3, side, side), dtype=np.float32)
-    to_pixels = np.array([side / 2 - centre[0] * zoom, side / 2 + centre[1] * zoom, zoom, zoom])
+    plane = blank_plane(side, side)
+    view = np.array([side / 2 - centre[0] * zoom, side / 2 + centre[1] * zoom, zoom, zoom])
     opening, densities = shot.opening, node_densities(data, bundle.pupil, bundle.triangles)
     draw_bundle(
         data, bundle.pupil, bundle.triangles, densities, bundle.path.stop_crossings, opening.blades, opening.mask,
-        opening.half, shot.incidence.axes, to_pixels, shot.incidence.cosine, np.array([1.0, 0.0, 0.0]), plane,
-        np.empty(side + 1, dtype=np.float32), bundle.halves,
+        opening.half, shot.incidence.axes, view, shot.incidence.cosine, np.array([1.0, 0.0, 0.0]), plane,
+        bundle.halves,
     )  # fmt: skip
-    return float(plane[0].sum(dtype=np.float64))
+    return float(to_pixels(plane, side)[:, :, 0].sum(dtype=np.float64))
 
 
 def starburst_of(settled: Settled, shots: Sequence[Shot], images: Sequence[DirectImage], mask: Floats | None) -> Layer:

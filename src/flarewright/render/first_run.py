@@ -29,7 +29,7 @@ def compile_for_render(project: Project, threads: int | None = None) -> None:
     iris = settle(project).iris
     names = [*_TRACING]
     if project.quality.mode == "final":
-        names += ["draw" if iris.mask is None else "draw masked", "densities", "window", "pixels"]
+        names += ["draw" if iris.mask is None else "draw masked", "densities", "pixels", "double"]
     elif project.quality.mode == "draft" and iris.mask is None:
         # a draft through a mask is rare: its kernel is compiled when it is called
         names += ["matrices"]

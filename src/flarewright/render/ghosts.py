@@ -186,7 +186,7 @@ def _draft(
 ) -> GhostPass:
     def draw(group: list[int]) -> list[Plane | None]:
         width, height = shots[0].size_px
-        picture = np.zeros((3, height, width))
+        picture = np.zeros((height, width, 3))
         by_hand = [(paths[k], art[paths[k].name]) for k in group if paths[k].name in art]
         for shot in shots:
             draw_draft(shot, [paths[k] for k in group if paths[k].name not in art], picture)
@@ -221,11 +221,11 @@ def _rank_draft(shots: Sequence[Shot], paths: Sequence[LightPath], art: Mapping[
     flux = np.zeros(len(paths))
     for k, path in enumerate(paths):
         for shot in small:
-            picture = np.zeros((3, shot.size_px[1], shot.size_px[0]))
+            picture = np.zeros((shot.size_px[1], shot.size_px[0], 3))
             # a ramp and a blur hardly change the order
             draw_draft_by_hand(shot, path, art.get(path.name, PLAIN), picture)
             sum_rows(picture)
-            flux[k] += luminance_weights(shot.colorspace) @ picture.sum(axis=(1, 2))
+            flux[k] += luminance_weights(shot.colorspace) @ picture.sum(axis=(0, 1))
     return [int(k) for k in np.argsort(-flux, kind="stable")]
 
 
@@ -268,14 +268,14 @@ def _collect(
     totals: list[Plane | None] = [None] * DETAILS
     layers = []
     for k, planes in enumerate(pool.map(draw, [[k] for k in items[:alone]])):
-        path, plane = named[k], merge(planes, shot.size_px)
+        path, pixels = named[k], merge(planes, shot.size_px)
         about: dict[str, str | float] = {
             "path": path.name,
-            "flux_mm2": float(luminance @ plane.sum(axis=(1, 2), dtype=np.float64)),
+            "flux_mm2": float(luminance @ pixels.sum(axis=(0, 1), dtype=np.float64)),
         }
         if path.name in art:
             about["art"] = art[path.name].text()
-        layers.append(to_layer(f"ghost.{path.name}", plane, pixel_area, about))
+        layers.append(to_layer(f"ghost.{path.name}", pixels, pixel_area, about))
         # the layer has its own copy by now
         totals = _added(totals, planes)
     for planes in pool.map(draw, [group for group in rest if group]):

@@ -36,7 +36,7 @@ def draw_draft(
     ----------
     shot : Shot
     paths : sequence of LightPath
-    differences : ndarray, shape (3, H, W), float64
+    differences : ndarray, shape (H, W, 3), float64
         Added to; `kernels.raster.sum_rows` turns it into flux per pixel.
     rgb : tuple of float
         Multiplies their colour.
@@ -58,7 +58,7 @@ def draw_draft(
         packed.z_vertex, packed.n_gap,
         packed.reflectance, packed.sensor_z, float(packed.semi[first]), slope, slope_x,
         opening.edges, opening.radius, opening.mask, opening.half, axes, shot.to_pixels, shot.gain,
-        shot.weights(packed.wavelengths_nm) * rgb, differences, np.empty(0, dtype=np.float32),
+        shot.weights(packed.wavelengths_nm) * rgb, differences,
     )  # fmt: skip
 
 
@@ -70,7 +70,7 @@ def draw_draft_by_hand(shot: Shot, path: LightPath, art: PathArt, differences: F
     shot : Shot
     path : LightPath
     art : PathArt
-    differences : ndarray, shape (3, H, W), float64
+    differences : ndarray, shape (H, W, 3), float64
         As in `draw_draft`.
     """
     placed = art.place(shot.to_pixels, _frame(shot, path) if art.framed else None)
@@ -89,7 +89,7 @@ def draft_alone(ghosts: Sequence[tuple[Shot, LightPath]], art: Sequence[PathArt]
 
     Returns
     -------
-    ndarray, shape (3, H, W)
+    ndarray, shape (H, W, 3)
         Flux per pixel.
     """
     shot, first = ghosts[0][0], art[0]
@@ -97,7 +97,7 @@ def draft_alone(ghosts: Sequence[tuple[Shot, LightPath]], art: Sequence[PathArt]
     own = shot.to_pixels / 2.0**detail
     width, height = (-(-side // 2**detail) for side in shot.size_px)
     mx, my = first.margin(own)
-    sheet = np.zeros((3, height + 2 * my, width + 2 * mx))
+    sheet = np.zeros((height + 2 * my, width + 2 * mx, 3))
     frames = [_frame(shot, path) if each.framed else None for (shot, path), each in zip(ghosts, art, strict=True)]
     places = [each.place(shot.to_pixels, frame) / 2.0**detail for each, frame in zip(art, frames, strict=True)]
     for (lit, path), each, placed in zip(ghosts, art, places, strict=True):

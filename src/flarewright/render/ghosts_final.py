@@ -169,7 +169,7 @@ def draw_final(
             draw_bundle(
                 data, bundle.pupil, bundle.triangles, node_densities(data, bundle.pupil, bundle.triangles),
                 path.stop_crossings, opening.blades, opening.mask, opening.half, shot.incidence.axes,
-                to_pixels, shot.gain, rgb, *canvas.scratch(detail), bundle.halves,
+                to_pixels, shot.gain, rgb, canvas.plane(detail), bundle.halves,
             )  # fmt: skip
 
 
@@ -189,13 +189,14 @@ def draw_alone(items: Sequence[FinalPass], quality: Quality, canvas: Canvas, sto
     art, shot, frame = items[0].art, items[0].shot, items[0].frame
     detail = coarseness(art, shot.to_pixels)
     own = shot.to_pixels / 2.0**detail
-    plane, _ = canvas.scratch(detail)
     mx, my = art.margin(own)
-    sheet = blank((plane.shape[2] + 2 * mx, plane.shape[1] + 2 * my))
+    width, height = (-(-side // 2**detail) for side in canvas.size_px)
+    sheet = blank((width + 2 * mx, height + 2 * my))
     for item in items:
         shifted = item.to_pixels / 2.0**detail + np.array([mx, my, 0.0, 0.0])
         draw_final(replace(item, to_pixels=shifted), quality, sheet, stop=stop)
-    plane += finish(merge(sheet.planes, sheet.size_px), art, frame, items[0].to_pixels / 2.0**detail, own)
+    pixels = merge(sheet.planes, sheet.size_px)
+    canvas.add(finish(pixels, art, frame, items[0].to_pixels / 2.0**detail, own), detail)
 
 
 def _bridges(traced: list[Floats], view_radius: float, scale: float, visibility: float) -> list[int]:

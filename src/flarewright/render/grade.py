@@ -7,21 +7,20 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernels.interleave import lit_window
 from .art import REACH, Frame, PathArt, Ramp
-from .canvas import DETAILS, Plane
+from .canvas import DETAILS, Plane, lit_window
 
 Floats = NDArray[np.float64]
 
 SMOOTH_PX = 8.0
 
 
-def finish(plane: Plane, art: PathArt, frame: Frame | None, placed: Floats, to_pixels: Floats) -> Plane:
+def finish(pixels: Plane, art: PathArt, frame: Frame | None, placed: Floats, to_pixels: Floats) -> Plane:
     """Ramp and blur a ghost that was drawn alone, and cut the margin off.
 
     Parameters
     ----------
-    plane : ndarray, shape (3, H + 2 my, W + 2 mx)
+    pixels : ndarray, shape (H + 2 my, W + 2 mx, 3)
         The ghost with the margin of `PathArt.margin` around the picture.
     art : PathArt
     frame : Frame or None
@@ -33,23 +32,23 @@ def finish(plane: Plane, art: PathArt, frame: Frame | None, placed: Floats, to_p
 
     Returns
     -------
-    ndarray, shape (3, H, W)
+    ndarray, shape (H, W, 3)
         Flux per pixel.
     """
     mx, my = art.margin(to_pixels)
-    x0, y0, x1, y1 = lit_window(plane)
+    x0, y0, x1, y1 = lit_window(pixels)
     if x1 > x0:
-        light = plane[:, y0:y1, x0:x1].astype(np.float64)
+        light = np.moveaxis(pixels[y0:y1, x0:x1], 2, 0).astype(np.float64)
         if frame is not None and art.ramps:
             column, row = placed[0] + placed[2] * frame.centre[0] + mx, placed[1] - placed[3] * frame.centre[1] + my
             across, down = (max(frame.radius * float(scale), 1e-6) for scale in placed[2:])
             columns, rows = (np.arange(x0, x1) + 0.5 - column) / across, (np.arange(y0, y1) + 0.5 - row) / down
             light *= ramp_factors(art.ramps, np.hypot(rows[:, None], columns[None, :]))
         if art.blur > 0.0:
-            light, (x0, y0) = _blurred(light, (x0, y0), art.blur * to_pixels[2:4], (plane.shape[2], plane.shape[1]))
-        plane = np.zeros_like(plane)
-        plane[:, y0 : y0 + light.shape[1], x0 : x0 + light.shape[2]] = light
-    return plane[:, my : plane.shape[1] - my, mx : plane.shape[2] - mx]
+            light, (x0, y0) = _blurred(light, (x0, y0), art.blur * to_pixels[2:4], (pixels.shape[1], pixels.shape[0]))
+        pixels = np.zeros_like(pixels)
+        pixels[y0 : y0 + light.shape[1], x0 : x0 + light.shape[2]] = np.moveaxis(light, 0, 2)
+    return pixels[my : pixels.shape[0] - my, mx : pixels.shape[1] - mx]
 
 
 def coarseness(art: PathArt, to_pixels: Floats) -> int:
