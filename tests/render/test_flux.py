@@ -193,7 +193,8 @@ def test_tiles_of_the_sensor_add_up_to_the_whole():
             tile = Tile(**{**fields, "to_pixels": shifted, "size_px": (64, 48)})
             part = picture(render_ghosts([tile], paths, project.quality, singles=None).total, (64, 48))
             crop = whole[top : top + 48, left : left + 64]
-            assert np.abs(part - crop).sum() < 1e-5 * whole.sum()
+            # a cell on a tile's border is drawn by triangles, inside a picture as one polygon
+            assert np.abs(part - crop).sum() < 5e-5 * whole.sum()
 
 
 # --- resolution
