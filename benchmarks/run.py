@@ -294,6 +294,9 @@ def startup(repeat: int) -> Rows:
                 cache = str(Path(folder) / f"{quality}{k}")
                 cold.append(_run(work, cache))
             found.append(row("startup", f"cold command, {quality}", statistics.median(cold), "s"))
+            if quality == "final":
+                alone = _run([*work, "--threads", "1"], str(Path(folder) / "alone"))
+                found.append(row("startup", "cold command, final, in one process", alone, "s"))
             cache = str(Path(folder) / f"{quality}0")
             warm = statistics.median(_run(work, cache) for _ in range(repeat))
             found.append(row("startup", f"warm command, {quality}", warm, "s"))

@@ -73,6 +73,17 @@ def test_auto_exposure_keeps_a_veil_over_the_whole_picture_dark():
     assert auto_exposure(veil) == 1.0
 
 
+def test_every_code_begins_where_the_curve_rounds_to_it():
+    light = np.linspace(-0.01, 1.02, 1_000_003, dtype=np.float32)
+    exact = 255.0 * srgb_oetf(np.clip(light.astype(np.float64), 0.0, 1.0))
+    codes = view(np.broadcast_to(light[:, None, None], (len(light), 1, 3)), 0.0)[:, 0]
+    assert (codes == codes[:, :1]).all()
+    # single precision may fall to either side of a half
+    assert np.abs(codes[:, 0] - exact).max() < 0.5 + 2e-4
+    assert (np.diff(codes[:, 0].astype(int)) >= 0).all()
+    assert set(codes[:, 0]) == set(range(256))
+
+
 def test_unknown_view_is_refused_and_the_view_is_stated():
     with pytest.raises(FlarewrightError, match="srgb and filmic"):
         view(np.zeros((1, 1, 3), np.float32), 0.0, "aces")  # type: ignore[arg-type]

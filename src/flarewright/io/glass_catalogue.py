@@ -73,7 +73,7 @@ class _Catalogue:
     by_key: dict[str, tuple[int, ...]]
 
 
-def by_name(name: str, n_d: float | None = None) -> CatalogueGlass:
+def by_name(name: str, n_d: float | None = None, *, suggest: bool = True) -> CatalogueGlass:
     """Find a glass by its catalogue name.
 
     Case, spaces, hyphens and underscores do not matter; a maker's name may stand in front. An old Schott name that the
@@ -85,6 +85,8 @@ def by_name(name: str, n_d: float | None = None) -> CatalogueGlass:
         "N-BK7", "n bk7" or "SCHOTT N-BK7".
     n_d : float, optional
         Where several makers use the name, the glass whose index is nearest to this one; without it Schott comes first.
+    suggest : bool
+        Look for near names to suggest, which takes longer than all else.
 
     Returns
     -------
@@ -103,7 +105,7 @@ def by_name(name: str, n_d: float | None = None) -> CatalogueGlass:
             if n_d is not None:
                 found.sort(key=lambda k: abs(float(catalogue.n_d[k]) - n_d))
             return _glass(found[0])
-    raise GlassError(_unknown(name, key, maker))
+    raise GlassError(_unknown(name, key, maker, suggest))
 
 
 def nearest(n_d: float, v_d: float | None = None) -> tuple[CatalogueGlass, float]:
@@ -224,10 +226,10 @@ def _spellings(key: str) -> list[str]:
     return tried
 
 
-def _unknown(name: str, key: str, maker: str | None) -> str:
+def _unknown(name: str, key: str, maker: str | None, suggest: bool) -> str:
     catalogue = _catalogue()
     spelled = {k: catalogue.rows[rows[0]] for k, rows in catalogue.by_key.items()}
-    near = difflib.get_close_matches(key, spelled, n=3, cutoff=0.6)
+    near = difflib.get_close_matches(key, spelled, n=3, cutoff=0.6) if suggest else []
     hint = "; near names: " + ", ".join(f"{spelled[k][0]} {spelled[k][1]}" for k in near) if near else ""
     whose = f"{maker}'s catalogue" if maker else "the catalogue"
     return f"glass {name!r} is not in {whose}: give n_d and v_d instead{hint}"

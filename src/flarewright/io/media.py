@@ -55,7 +55,7 @@ def attach(glass: str | None, n_d: float | None, v_d: float | None) -> tuple[Med
             raise GlassError("v_d alone is no glass: add n_d or the glass's name")
         return _by_numbers(None, n_d, v_d)
     try:
-        known = glass_catalogue.by_name(glass, n_d)
+        known = glass_catalogue.by_name(glass, n_d, suggest=n_d is None)
     except GlassError as error:
         if n_d is None:
             raise

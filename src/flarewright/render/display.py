@@ -6,6 +6,7 @@ Rec.709's triangle) are clamped to 0 and what is brighter than white is clipped 
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Literal
 
 import numpy as np
@@ -34,6 +35,9 @@ _TARGET = 0.7
 # unless a veil over the whole picture, its median, would come out brighter than this.
 _BRIGHTEST_VEIL = 0.04
 _DARKEST = 1e-30
+
+# The sRGB curve is steepest at black, 12.92 * 255 codes per unit: no cell of [0, 1] holds more than two codes.
+_CELLS = 4096
 
 _GREY = 0.18
 _CONTRAST = 1.2
@@ -65,16 +69,37 @@ def view(
     """
     if exposure_stops is None:
         exposure_stops = auto_exposure(rgb_linear, colorspace)
-    light = np.asarray(rgb_linear, np.float64)
+    light: NDArray[np.floating] = np.asarray(rgb_linear, np.float32)
     if colorspace == "acescg":
         light = light @ ACESCG_TO_REC709.T
-    light = np.maximum(light * 2.0**exposure_stops, 0.0)
+    with np.errstate(over="ignore"):
+        light = np.maximum(light * np.float32(2.0**exposure_stops), 0.0)
     if transform == "filmic":
-        light = filmic(light)
+        light = filmic(light.astype(np.float64))
     elif transform != "srgb":
         raise FlarewrightError(f"the view {transform!r} is unknown; known are srgb and filmic")
-    encoded = srgb_oetf(np.minimum(light, 1.0))
-    return np.rint(255.0 * encoded).astype(np.uint8)
+    return _encoded(np.minimum(light, 1.0))
+
+
+def _encoded(light: NDArray[np.floating]) -> NDArray[np.uint8]:
+    """Round `srgb_oetf` of values in [0, 1] to 8 bits, by tables: a power per value would take longer than a draft."""
+    codes, following = _tables()
+    found = codes[(light * _CELLS).astype(np.uint16)]
+    return found + (light >= following[found])
+
+
+@lru_cache(maxsize=1)
+def _tables() -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
+    """Return the code at the lower end of each cell of [0, 1], and the least value of the code after each."""
+    wanted = (np.arange(255) + 0.5) / 255.0
+    low, high = np.zeros(255), np.ones(255)
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        below = srgb_oetf(middle) < wanted
+        low, high = np.where(below, middle, low), np.where(below, high, middle)
+    following = np.append(high, np.inf).astype(np.float32)
+    codes = np.searchsorted(following, np.arange(_CELLS + 1, dtype=np.float32) / _CELLS, side="right")
+    return codes.astype(np.uint8), following
 
 
 def view_text(exposure_stops: float, transform: Transform, colorspace: Colorspace, *, automatic: bool) -> str:
