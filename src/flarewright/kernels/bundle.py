@@ -135,6 +135,7 @@ def draw_bundle(
                         fill_polygon(polygon, count, base, gx, gy, dense_low, dense_high, rgb, plane)
                         start = end
                         continue
+            # not a function of its own: handing it a dozen arrays would cost as much as the triangle
             for t in range(start, end):
                 a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
                 # a ray that ended, or one edge that blocks all three
