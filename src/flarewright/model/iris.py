@@ -24,12 +24,20 @@ class Iris(Frozen):
     mask : str or None
         Path of an image (PNG or EXR, grey; white transmits) that replaces the blades. Its inscribed circle
         is the round opening of the f-number.
+    roughness_um : float
+        Root mean square of the blades' edge, micrometres off its line; it shows in the starburst. 0 is smooth.
+    roughness_length_um : float
+        How far along the edge its heights hang together, micrometres.
+    roughness_seed : int
     """
 
     blades: int = Field(0, ge=0, le=24)
     rotation_deg: float = Field(0.0, ge=-360.0, le=360.0)
     rounding: float = Field(0.0, ge=0.0, le=1.0)
     mask: str | None = None
+    roughness_um: float = Field(0.0, ge=0.0, le=1000.0)
+    roughness_length_um: float = Field(200.0, gt=0.0, le=100000.0)
+    roughness_seed: int = Field(0, ge=0, lt=2**32)
 
     @model_validator(mode="after")
     def _blades_make_an_opening(self) -> Iris:

@@ -10,31 +10,36 @@ from __future__ import annotations
 
 import hashlib
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flarewright.model.iris import Iris
+from flarewright.model.starburst import Dirt
 
-from .iris import blade_edges, transmission
+from .dirt import Veil, VeilTerm, lay_elements, scattered
+from .iris import blade_edges
+from .pupil import FFT_SIZE, WINDOW, Picture, pupil_amplitude
 
 Floats = NDArray[np.float64]
-
-FFT_SIZE = 4096
-WINDOW = 12.0
-"""Width of the zero-padded pupil plane in pupil radii; the step in s is 1 / WINDOW, the Nyquist frequency 171."""
 
 CORE_REACH = 60.0
 """The core is used up to this s, a third of Nyquist: aliasing errs by 0.2 % there."""
 
-PUPIL_REACH = 1.65
-"""No opening reaches farther than this: the corner of a straight triangle lies at 1.56."""
-
 FAN_BINS = 720
 
-__all__ = ["CORE_REACH", "BladeWings", "FanWings", "Pattern", "SpikeProfile", "pupil_pattern", "spike_profile"]
+__all__ = [
+    "CORE_REACH",
+    "BladeWings",
+    "FanWings",
+    "Pattern",
+    "Soil",
+    "SpikeProfile",
+    "pupil_pattern",
+    "spike_profile",
+]
 
 
 @dataclass(frozen=True)
@@ -86,12 +91,24 @@ class Pattern:
         The table is trusted up to this s.
     wings : FanWings or BladeWings
         Continues P beyond the reach.
+    roughness : float
+        Rms of the blades' edge; straight spikes give way to their fans by exp(-(2 pi roughness s)^2).
+    rough_half_fan : float
+        Half the angle of a rough blade's fan.
+    veil : Veil
+        What dirt adds to the wings.
+    transmittance : float
+        Part of the light that dirt lets through.
     """
 
     table: Floats
     knots_per_s: float
     reach: float
     wings: FanWings | BladeWings
+    roughness: float = 0.0
+    rough_half_fan: float = 0.0
+    veil: Veil = ()
+    transmittance: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -115,14 +132,29 @@ class SpikeProfile:
 
 
 @dataclass(frozen=True)
-class _Mask:
-    """A mask image that a cache can compare: by its contents' digest."""
+class Soil:
+    """Dirt on a pupil.
 
-    digest: bytes
-    pixels: NDArray[np.floating] = field(compare=False, repr=False)
+    Attributes
+    ----------
+    dirt : Dirt
+    image : ndarray, shape (rows, columns), or None
+        Its drawn image, row 0 up, over the square around the round opening.
+    """
+
+    dirt: Dirt
+    image: NDArray[np.floating] | None = None
 
 
-def pupil_pattern(iris: Iris, mask: NDArray[np.floating] | None = None) -> Pattern:
+def pupil_pattern(
+    iris: Iris,
+    mask: NDArray[np.floating] | None = None,
+    *,
+    span: float = 1.0,
+    radius_mm: float = 1.0,
+    soil: Soil | None = None,
+    turn: float = 0.0,
+) -> Pattern:
     """Fraunhofer pattern of an iris or of a mask image; the last few are kept.
 
     Parameters
@@ -130,6 +162,13 @@ def pupil_pattern(iris: Iris, mask: NDArray[np.floating] | None = None) -> Patte
     iris : Iris
     mask : ndarray, shape (rows, columns), or None
         As in `iris.transmission`; the square root of its transmittance is the wave's amplitude.
+    span : float
+        The mask spans [-span, span] squared, in radii.
+    radius_mm : float
+        The pupil's radius at the stop, for roughness and dirt, whose sizes are in mm.
+    soil : Soil, optional
+    turn : float
+        Turns all of it counter-clockwise, rad.
 
     Returns
     -------
@@ -138,7 +177,7 @@ def pupil_pattern(iris: Iris, mask: NDArray[np.floating] | None = None) -> Patte
     Raises
     ------
     ValueError
-        When the mask is dark everywhere.
+        When the mask, or what dirt leaves of the opening, is dark everywhere.
 
     Notes
     -----
@@ -151,31 +190,56 @@ def pupil_pattern(iris: Iris, mask: NDArray[np.floating] | None = None) -> Patte
     the light falls outside s. A mask's wings are g(phi) / s^3 with the g that its own pattern has between a quarter of
     its reach and the whole of it: the law of any sharp border, measured direction by direction. The reach of a mask is
     an eighth of its pixels a side at most.
+
+    A rough edge of rms sigma keeps exp(-(2 pi sigma s)^2) of a spike; the rest is a fan as wide as the edge's slopes.
+    Dirt's wings add to those of the border (`dirt.scattered`).
     """
-    if mask is None:
-        return _pattern(iris, None)
-    pixels = np.ascontiguousarray(mask, dtype=np.float64)
-    digest = hashlib.blake2b(pixels.tobytes() + repr(pixels.shape).encode(), digest_size=16).digest()
-    return _pattern(iris, _Mask(digest, pixels))
+    if iris.roughness_um == 0.0 and soil is None:
+        radius_mm = 1.0  # sizes in mm play no part: let the cache know
+    dirt = soil.dirt if soil is not None else None
+    drawn = soil.image if soil is not None else None
+    return _pattern(iris, _picture(mask), span, radius_mm, dirt, _picture(drawn), turn)
+
+
+def _picture(pixels: NDArray[np.floating] | None) -> Picture | None:
+    if pixels is None:
+        return None
+    held = np.ascontiguousarray(pixels, dtype=np.float64)
+    digest = hashlib.blake2b(held.tobytes() + repr(held.shape).encode(), digest_size=16).digest()
+    return Picture(digest, held)
 
 
 @lru_cache(maxsize=4)
-def _pattern(iris: Iris, mask: _Mask | None) -> Pattern:
+def _pattern(
+    iris: Iris,
+    mask: Picture | None,
+    span: float,
+    radius_mm: float,
+    dirt: Dirt | None,
+    dirt_image: Picture | None,
+    turn: float,
+) -> Pattern:
     spacing = WINDOW / FFT_SIZE
     reach = math.ceil(CORE_REACH * WINDOW)
     s = np.arange(-reach, reach + 1) / WINDOW
     trusted = CORE_REACH
-    P = _power(_amplitude(iris, mask, spacing), reach)
+    elements = None if dirt is None else lay_elements(dirt, radius_mm, turn)
+    pupil = pupil_amplitude(iris, mask, span, radius_mm, elements, dirt_image, turn)
+    P = _power(pupil.amplitude, reach)
     if mask is None:
         _undo_softening(P[:, reach:], s, s[reach:], spacing)
-        P[:, reach:] *= math.pi / P[reach, reach]
+        # clean and binary, the pattern's integral is its centre's square root; dirt's borders below a sample need more
+        power = math.sqrt(P[reach, reach]) if dirt is None else pupil.light / spacing**2
+        P[:, reach:] /= power * spacing**-2
     P[:, :reach] = P[::-1, :reach:-1]
     if mask is None:
-        wings = _wings(iris)
+        wings = _wings(iris, turn)
+        if dirt is not None:
+            wings = _dimmed(wings, pupil.amplitude_left**2 / pupil.transmittance)
     else:
         # An image's border is soft: its pixels are means over their area, then interpolated linearly. Up to an eighth
         # of a cycle per pixel the softness is safely divided out (isotropic to second order), beyond it is not known.
-        finest = min(mask.pixels.shape)
+        finest = min(mask.pixels.shape) / span
         trusted = min(CORE_REACH, max(8.0, finest / 8.0))
         radius = np.minimum(np.hypot(s, s[:, None]), 2.0 * trusted)
         P /= np.sinc(spacing * radius) ** 2 * np.sinc(2.0 * radius / max(finest, 64.0)) ** 6
@@ -184,34 +248,44 @@ def _pattern(iris: Iris, mask: _Mask | None) -> Pattern:
         total = P[np.hypot(s, s[:, None]) <= trusted].sum() / WINDOW**2 + flux_outside
         P /= total
         wings = FanWings(wings.angular / total)
+    veil: Veil = ()
+    if elements is not None:
+        open_area = math.pi * pupil.transmittance if mask is None else pupil.light
+        veil = scattered(elements, pupil.holds(elements.discs), pupil.holds(elements.arcs), open_area)
+        if mask is not None:
+            veil = ()  # the measured wings hold it already
+        elif pupil.drawn is not None:
+            veil = (*veil, _drawn_veil(pupil.drawn, s, reach, spacing, open_area))
     P /= WINDOW**2
     table = np.zeros((len(s) + 1, len(s) + 1))
     np.cumsum(P, axis=1, out=table[1:, 1:])
     for row in range(1, len(table)):  # along the columns this is faster than a cumulative sum
         table[row] += table[row - 1]
     table.flags.writeable = False
-    return Pattern(table, WINDOW, trusted, wings)
+    rough = 1e-3 * iris.roughness_um / radius_mm
+    half_fan = 0.0
+    if rough > 0.0 and isinstance(wings, BladeWings):
+        slope = math.sqrt(2.0) * iris.roughness_um / iris.roughness_length_um
+        # a flat fan of the same variance as the slopes
+        half_fan = min(math.hypot(wings.half_fan, math.sqrt(3.0) * math.atan(slope)), 0.4 * math.pi)
+    return Pattern(table, WINDOW, trusted, wings, rough, half_fan, veil, pupil.transmittance)
 
 
-def _amplitude(iris: Iris, mask: _Mask | None, spacing: float) -> Floats:
-    """Wave amplitude behind the pupil, sampled at the given spacing; rows rise with y."""
-    half = math.ceil(PUPIL_REACH / spacing)
-    at = (np.arange(-half, half) + 0.5) * spacing
-    if mask is None:
-        ramp = transmission(iris, 1.0, at, at[:, None], footprint=2.0 * spacing)
-        # The linear ramp is a box's integral; this is the triangle's.
-        border = (ramp > 0.0) & (ramp < 1.0)
-        t = ramp[border]
-        ramp[border] = np.where(t < 0.5, 2.0 * t**2, 1.0 - 2.0 * (1.0 - t) ** 2)
-        return ramp
-    # Mean of 3 x 3 bilinear samples: the image may be finer than the grid.
-    fine = (at[:, None] + np.array([-1.0, 0.0, 1.0]) * spacing / 3.0).ravel()
-    light = transmission(iris, 1.0, fine, fine[:, None], mask=mask.pixels)
-    light = light.reshape(len(at), 3, len(at), 3).mean(axis=(1, 3))
-    if not light.max() > 0.0:
-        raise ValueError("the iris mask is dark everywhere; white must mark the opening")
-    amplitude: Floats = np.sqrt(light)
-    return amplitude
+def _dimmed(wings: FanWings | BladeWings, factor: float) -> FanWings | BladeWings:
+    if isinstance(wings, FanWings):
+        return FanWings(wings.angular * factor)
+    return replace(wings, multiplicity=wings.multiplicity * factor)
+
+
+def _drawn_veil(taken: Floats, s: Floats, reach: int, spacing: float, open_area: float) -> VeilTerm:
+    """Measure what a drawn image of dirt scatters: the pattern of what it takes from the wave."""
+    P = _power(taken, reach)
+    P[:, :reach] = P[::-1, :reach:-1]
+    P *= spacing**4 / open_area
+    angular = _measured_fans(P, s, CORE_REACH).angular
+    mean = float(angular.mean())
+    far = np.geomspace(1.0, 1e6, 61)
+    return VeilTerm(far, mean / far**3, angular / mean if mean > 0.0 else np.ones(1))
 
 
 def _power(amplitude: Floats, reach: int) -> Floats:
@@ -245,7 +319,7 @@ def _undo_softening(P: Floats, y: Floats, x: Floats, spacing: float) -> None:
         P[row] *= (grow * grow_x) * (1.0 + rest * (1.0 + rest * (0.5 + rest / 6.0)))
 
 
-def _wings(iris: Iris) -> FanWings | BladeWings:
+def _wings(iris: Iris, turn: float) -> FanWings | BladeWings:
     edges = blade_edges(iris, 1.0)
     if len(edges) == 1:
         return FanWings(np.array([0.5 / math.pi**3]))
@@ -255,7 +329,7 @@ def _wings(iris: Iris) -> FanWings | BladeWings:
     chord = 2.0 * from_centre * math.sin(math.pi / B)
     half_fan = math.asin(0.5 * curvature * chord)
     length = chord / float(np.sinc(half_fan / math.pi))
-    angle = np.arctan2(edges[:, 1], edges[:, 0])
+    angle = np.arctan2(edges[:, 1], edges[:, 0]) + turn
     directions = B // 2 if B % 2 == 0 else B
     return BladeWings(angle[:directions], B / directions, float(length), half_fan)
 

@@ -8,13 +8,15 @@ waves of the blades' edges continue it in closed form, over the whole picture.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from flarewright.kernels.resample import blend_blade_wings, blend_fan_wings, deposit_core
 from flarewright.model.iris import Iris
-from flarewright.optics.diffraction import FanWings, Pattern, pupil_pattern, spike_profile
+from flarewright.optics.diffraction import BladeWings, FanWings, Pattern, pupil_pattern, spike_profile
+from flarewright.optics.dirt import VeilTerm
 
 Floats = NDArray[np.float64]
 
@@ -36,6 +38,7 @@ def starburst_layer(
     weights_rgb: ArrayLike,
     *,
     mask: NDArray[np.floating] | None = None,
+    pattern: Pattern | None = None,
     split: int = NEAR_SPLIT,
 ) -> NDArray[np.float32]:
     """Irradiance of the diffracted direct image of a light.
@@ -59,6 +62,8 @@ def starburst_layer(
         intensity); negatives are kept.
     mask : ndarray, shape (rows, columns), or None
         Image of the iris, as in `optics.iris.transmission`.
+    pattern : Pattern, optional
+        Made by `optics.diffraction.pupil_pattern` of a pupil with more to it; iris and mask are not looked at then.
     split : int
         Parts a side into which pixels near the centre are divided where the wings begin there. 1 is for drafts: it
         costs half the time, keeps the flux to 2e-5, and errs by 4e-6 of the peak, which is up to 0.4 of the value of
@@ -91,7 +96,7 @@ def starburst_layer(
     if not strength.any():
         return picture
     wave, weights = _finer(wave, weights, 2.0 * f_number, min(pixel_mm))
-    pattern = pupil_pattern(iris, mask)
+    pattern = pupil_pattern(iris, mask) if pattern is None else pattern
     # The shortest wavelength that matters reaches the table's end at the outer radius, all others stay inside.
     lit = np.cumsum(strength) > 1e-3 * strength.sum()
     outer = pattern.reach * 2.0 * f_number * float(np.asarray(wavelengths_nm, dtype=np.float64)[lit][0]) * 1e-6
@@ -137,14 +142,32 @@ class _Painter:
             colour = 2.0 * self.f_number * (self.wave * 1e-6) @ self.weights
             cumulative = np.concatenate([[0.0], np.cumsum(wings.angular) / len(wings.angular)])
             blend_fan_wings(x, y, np.array(pixel_mm), cumulative, colour, self.inner, self.outer, out)
-            return
+        elif self.pattern.rough_half_fan > 0.0:
+            spread = out.copy()
+            self._blades(wings, wings.half_fan, x, y, pixel_mm, out)
+            self._blades(wings, self.pattern.rough_half_fan, x, y, pixel_mm, spread)
+            out += (1.0 - self._coherence(np.hypot(x, y[:, None]))) * (spread - out)
+        else:
+            self._blades(wings, wings.half_fan, x, y, pixel_mm, out)
+        for term in self.pattern.veil:
+            self._add_veil(term, x, y, out)
+
+    def _blades(
+        self,
+        wings: BladeWings,
+        half_fan: float,
+        x: Floats,
+        y: Floats,
+        pixel_mm: tuple[float, float],
+        out: NDArray[np.float32] | Floats,
+    ) -> None:
         profile = spike_profile(wings, self.wave, self.weights, self.f_number, pixel_mm)
         blend_blade_wings(
             x,
             y,
             np.array(pixel_mm),
             wings.angle,
-            wings.half_fan,
+            half_fan,
             profile.cumulative,
             profile.density,
             profile.half_total,
@@ -155,6 +178,48 @@ class _Painter:
             self.outer,
             out,
         )
+
+    def _radial(self, r: Floats, value: Callable[[Floats], Floats], least: float) -> Floats:
+        """Sum over wavelengths of a function of s = r / (2 N lambda), by a table in ln r; shape of r and 3 channels."""
+        knots = np.geomspace(max(least, 1e-9), max(float(r.max()), 2.0 * least), 400)
+        table = np.einsum("km,mc->kc", value(knots[:, None] / self._scale), self.weights)
+        at = np.log(np.maximum(r, least))
+        # times r^2 the table is nearly flat
+        found = [np.interp(at, np.log(knots), column * knots**2) for column in table.T]
+        return np.stack(found, axis=-1) / np.maximum(r, least)[..., None] ** 2
+
+    @property
+    def _scale(self) -> Floats:
+        """Millimetres on the sensor per unit of s, of every wavelength."""
+        return 2.0 * self.f_number * self.wave * 1e-6
+
+    def _coherence(self, r: Floats) -> Floats:
+        """What roughness leaves of a spike at a radius, channel by channel."""
+        sigma = self.pattern.roughness
+
+        def spike(s: Floats) -> Floats:
+            return self._scale * np.exp(-((2.0 * math.pi * sigma * s) ** 2))
+
+        # a channel's weights may cancel: measure each against the same sum without roughness
+        left = self._radial(r, spike, self.inner)
+        whole = self._scale @ self.weights
+        return np.clip(left / np.where(whole == 0.0, 1.0, whole), 0.0, 1.0)
+
+    def _add_veil(self, term: VeilTerm, x: Floats, y: Floats, out: NDArray[np.float32] | Floats) -> None:
+        r = np.hypot(x, y[:, None])
+        t = np.clip((r - self.inner) / (self.outer - self.inner), 0.0, 1.0)
+        window = t**3 * (t * (6.0 * t - 15.0) + 10.0)
+
+        def value(s: Floats) -> Floats:
+            slope = np.log(term.radial[-1] / term.radial[-2]) / np.log(term.s[-1] / term.s[-2])
+            inside = np.interp(s, term.s, term.radial)
+            beyond = term.radial[-1] * (s / term.s[-1]) ** slope
+            return np.where(s <= term.s[-1], inside, beyond) / self._scale**2
+
+        count = len(term.angular)
+        turns = np.arctan2(y[:, None], x) / math.pi * count
+        share = np.interp(turns, np.arange(count), term.angular, period=count) if count > 1 else term.angular[0]
+        out += (window * share)[..., None] * self._radial(r, value, self.inner)
 
     def _core(
         self,

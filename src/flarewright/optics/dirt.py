@@ -1,0 +1,287 @@
+"""Dust, scratches and fingerprints in the plane of the stop: where they lie, what they let through, what they scatter.
+
+Lengths are in radii of the round opening, as everywhere in `optics.diffraction`; only the statistics are in mm. Specks
+are opaque discs, scratches opaque bands along arcs, a fingerprint rows of half-transparent droplets.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..model.starburst import Dirt
+
+Floats = NDArray[np.float64]
+
+FIELD = 1.65
+"""Dirt is laid to this distance from the axis, in radii: beyond the corners of any opening."""
+
+# a fingerprint: ridges half a millimetre apart, droplets along them, within an oval
+_RIDGE_MM, _DROPLET_MM, _DROPLET_STEP_MM, _PRINT_MM = 0.5, 0.06, 0.15, (7.0, 9.0)
+# half the angle over which a scratch bends
+_BEND_DEG = (0.5, 5.0)
+
+__all__ = ["Elements", "Veil", "VeilTerm", "lay_elements", "rasterise", "scattered"]
+
+
+@dataclass(frozen=True)
+class Elements:
+    """Dirt as discs and arcs.
+
+    Attributes
+    ----------
+    discs : ndarray, shape (D, 4)
+        x, y, radius, and the part of the light that the disc takes.
+    arcs : ndarray, shape (S, 6)
+        x, y of the middle, direction of the normal there (rad), length, width, half the angle of its bend.
+    """
+
+    discs: Floats
+    arcs: Floats
+
+
+@dataclass(frozen=True)
+class VeilTerm:
+    """A part of the light scattered by dirt: radial(s) times angular(phi).
+
+    Attributes
+    ----------
+    s, radial : ndarray, shape (S,)
+        Rising frequencies and the term's value there; a power law beyond the last.
+    angular : ndarray, shape (A,)
+        Histogram over half a turn, bins centred at 0, pi / A, ...; its mean is 1.
+    """
+
+    s: Floats
+    radial: Floats
+    angular: Floats
+
+
+Veil = tuple[VeilTerm, ...]
+
+
+def lay_elements(dirt: Dirt, radius_mm: float, turn: float = 0.0) -> Elements:
+    """Lay the dirt.
+
+    Parameters
+    ----------
+    dirt : Dirt
+    radius_mm : float
+        Radius of the round opening.
+    turn : float
+        Turns all of it counter-clockwise, rad.
+
+    Returns
+    -------
+    Elements
+
+    Notes
+    -----
+    Every square millimetre (every square centimetre for scratches) draws from its own seed, so what lies at a place
+    does not depend on how far the iris is opened. Diameters are even in their logarithm.
+    """
+    reach = FIELD * radius_mm
+    discs = [np.empty((0, 4))]
+    if dirt.dust_per_mm2 > 0.0:
+        low, high = math.log(dirt.dust_um[0]), math.log(dirt.dust_um[1])
+        for rng, corner in _tiles(dirt.seed, 1, 1.0, reach):
+            count = rng.poisson(dirt.dust_per_mm2)
+            place = corner + rng.random((count, 2))
+            radius = 0.5e-3 * np.exp(rng.uniform(low, high, count))
+            discs.append(np.column_stack([place, radius, np.ones(count)]))
+    if dirt.fingerprint > 0.0:
+        discs.append(_fingerprint(dirt))
+    arcs = [np.empty((0, 6))]
+    if dirt.scratches_per_cm2 > 0.0:
+        for rng, corner in _tiles(dirt.seed, 2, 10.0, reach + dirt.scratch_mm):
+            count = rng.poisson(dirt.scratches_per_cm2)
+            place = corner + 10.0 * rng.random((count, 2))
+            length = dirt.scratch_mm * rng.uniform(0.5, 1.5, count)
+            bend = np.radians(rng.uniform(*_BEND_DEG, count))
+            width = np.full(count, 1e-3 * dirt.scratch_um)
+            arcs.append(np.column_stack([place, rng.uniform(0.0, 2.0 * np.pi, count), length, width, bend]))
+    found, bands = np.concatenate(discs), np.concatenate(arcs)
+    found[:, :3] /= radius_mm
+    bands[:, [0, 1, 3, 4]] /= radius_mm
+    found = found[np.hypot(found[:, 0], found[:, 1]) - found[:, 2] < FIELD]
+    bands = bands[np.hypot(bands[:, 0], bands[:, 1]) - bands[:, 3] / 2.0 < FIELD]
+    c, s = math.cos(turn), math.sin(turn)
+    for table in (found, bands):
+        table[:, 0], table[:, 1] = c * table[:, 0] - s * table[:, 1], s * table[:, 0] + c * table[:, 1]
+    bands[:, 2] += turn
+    return Elements(found, bands)
+
+
+def _tiles(seed: int, kind: int, side: float, reach: float) -> list[tuple[np.random.Generator, Floats]]:
+    """Squares that cover a disc, each with its own source of chance and its lower left corner."""
+    last = math.ceil(reach / side)
+    return [
+        (np.random.default_rng([seed, kind, i + 100_000, j + 100_000]), side * np.array([i, j], dtype=np.float64))
+        for i in range(-last, last)
+        for j in range(-last, last)
+        if math.hypot(max(i, -i - 1, 0), max(j, -j - 1, 0)) * side < reach
+    ]
+
+
+def _fingerprint(dirt: Dirt) -> Floats:
+    """Droplets along arched ridges inside an oval, its place and turn by chance."""
+    rng = np.random.default_rng([dirt.seed, 3])
+    wide, high = _PRINT_MM
+    rows = np.arange(-2.0 * high, high, _RIDGE_MM)
+    along = np.arange(-wide, wide, _DROPLET_STEP_MM)
+    x, base = (grid.ravel() for grid in np.meshgrid(along, rows))
+    y = base + 0.06 * (wide**2 - x**2) * np.exp(-(((base + 0.5 * high) / high) ** 2))
+    x = x + rng.normal(0.0, 0.3 * _DROPLET_STEP_MM, x.size)
+    y = y + rng.normal(0.0, 0.08 * _RIDGE_MM, x.size)
+    inside = ((x / wide) ** 2 + (y / high) ** 2 < 1.0) & (rng.random(x.size) < 0.85)
+    x, y = x[inside], y[inside]
+    turn, shift = rng.uniform(0.0, 2.0 * np.pi), rng.uniform(-2.0, 2.0, 2)
+    c, s = math.cos(turn), math.sin(turn)
+    radius = _DROPLET_MM * rng.uniform(0.7, 1.3, x.size)
+    return np.column_stack([c * x - s * y + shift[0], s * x + c * y + shift[1], radius, np.full(x.size, dirt.fingerprint)])
+
+
+def rasterise(elements: Elements, at: Floats) -> tuple[Floats, Floats]:
+    """Draw dirt on an even grid.
+
+    Parameters
+    ----------
+    elements : Elements
+    at : ndarray, shape (G,)
+        Places of the samples on both axes; rows rise with y.
+
+    Returns
+    -------
+    amplitude, light : ndarray, shape (G, G)
+        What the wave's amplitude and the light are multiplied with: 1 where it is clean. Borders are softened by a
+        triangle two samples wide along their normal, and a speck below a sample holds its own area.
+    """
+    spacing = float(at[1] - at[0])
+    amplitude, light = np.ones((len(at), len(at))), np.ones((len(at), len(at)))
+    kept = 1.0 - elements.discs[:, 3]
+    small = elements.discs[:, 2] < 0.5 * spacing
+    _splat(elements.discs[small], at[0], spacing, amplitude, light)
+    for (x, y, radius, _), part in zip(elements.discs[~small], kept[~small], strict=True):
+        rows, columns, px, py = _window(at, x, y, radius + 2.0 * spacing)
+        if not px.size or not py.size:
+            continue
+        cover = _softened((np.hypot(px - x, py[:, None] - y) - radius) / spacing)
+        total = cover.sum()
+        cover *= min(math.pi * (radius / spacing) ** 2 / total, 1.0 / cover.max()) if total > 0.0 else 0.0
+        _cover(amplitude, light, rows, columns, cover, part)
+    for x, y, normal, length, width, bend in elements.arcs:
+        rows, columns, px, py = _window(at, x, y, 0.5 * length + width + 2.0 * spacing)
+        if not px.size or not py.size:
+            continue
+        # an arc of radius R = length / (2 bend) whose middle lies at (x, y)
+        R = length / (2.0 * bend)
+        qx, qy = px - (x - R * math.cos(normal)), py[:, None] - (y - R * math.sin(normal))
+        turn = np.arctan2(qy, qx) - normal
+        off = np.abs((turn + np.pi) % (2.0 * np.pi) - np.pi)
+        across = np.abs(np.hypot(qx, qy) - R)
+        ends = _softened((R * (off - bend)) / spacing)
+        # a band below a sample keeps its area
+        drawn = max(0.5 * width, 0.5 * spacing)
+        cover = _softened((across - drawn) / spacing) * ends * (0.5 * width / drawn)
+        _cover(amplitude, light, rows, columns, cover, 0.0)
+    return amplitude, light
+
+
+def _cover(amplitude: Floats, light: Floats, rows: slice, columns: slice, cover: Floats, part: float) -> None:
+    amplitude[rows, columns] *= 1.0 - (1.0 - math.sqrt(part)) * cover
+    light[rows, columns] *= 1.0 - (1.0 - part) * cover
+
+
+def _softened(distance: Floats) -> Floats:
+    """Coverage by a half plane at a distance of its border in samples, softened by a triangle two samples wide."""
+    ramp = np.clip(0.5 - 0.5 * distance, 0.0, 1.0)
+    return np.where(ramp < 0.5, 2.0 * ramp**2, 1.0 - 2.0 * (1.0 - ramp) ** 2)
+
+
+def _window(at: Floats, x: float, y: float, reach: float) -> tuple[slice, slice, Floats, Floats]:
+    """Samples within a square: slices of rows and columns, their x and their y."""
+    columns = slice(*np.searchsorted(at, [x - reach, x + reach]))
+    rows = slice(*np.searchsorted(at, [y - reach, y + reach]))
+    return rows, columns, at[columns], at[rows]
+
+
+def _splat(discs: Floats, first: float, spacing: float, amplitude: Floats, light: Floats) -> None:
+    """Spread specks smaller than a sample over their four neighbours, area for area."""
+    size = len(amplitude)
+    u, v = (discs[:, 0] - first) / spacing, (discs[:, 1] - first) / spacing
+    area = math.pi * (discs[:, 2] / spacing) ** 2
+    column, row = np.floor(u).astype(np.intp), np.floor(v).astype(np.intp)
+    for i in range(2):
+        for j in range(2):
+            share = area * np.abs(1 - i - (v - row)) * np.abs(1 - j - (u - column))
+            r, c = row + i, column + j
+            ok = (r >= 0) & (r < size) & (c >= 0) & (c < size)
+            taken = discs[ok, 3]
+            np.multiply.at(amplitude, (r[ok], c[ok]), 1.0 - (1.0 - np.sqrt(1.0 - taken)) * share[ok])
+            np.multiply.at(light, (r[ok], c[ok]), 1.0 - taken * share[ok])
+
+
+def scattered(elements: Elements, inside: NDArray[np.bool_], inside_arcs: NDArray[np.bool_], power: float) -> Veil:
+    """Light that dirt scatters far from the image, every piece for itself.
+
+    Parameters
+    ----------
+    elements : Elements
+    inside, inside_arcs : ndarray of bool, shape (D,) and (S,)
+        Which pieces lie in the opening.
+    power : float
+        Integral of the pupil's transmittance: the pattern is per unit of it.
+
+    Returns
+    -------
+    Veil
+
+    Notes
+    -----
+    Babinet: far from the image of the opening, dirt scatters as openings of its shape would. A disc of radius a that
+    takes the amplitude d scatters d^2 (pi a^2)^2 (2 J1(x) / x)^2, x = 2 pi a s. A band of width w along an arc of
+    radius R scatters d^2 w^2 sinc^2(w s) R / s along its normals (stationary phase). Pieces lie at random, so their
+    waves add in light. Each carries as much light as it takes: d^2 times its area (tested).
+    """
+    s = np.geomspace(1.0, 1e6, 1201)
+    terms = []
+    discs = elements.discs[inside]
+    if len(discs):
+        depth = 1.0 - np.sqrt(1.0 - discs[:, 3])
+        edges = np.geomspace(discs[:, 2].min() * 0.999, discs[:, 2].max() * 1.001, 33)
+        bins = np.clip(np.digitize(discs[:, 2], edges) - 1, 0, 31)
+        strength = np.bincount(bins, depth**2 * (math.pi * discs[:, 2] ** 2) ** 2, 32)
+        middle = np.sqrt(edges[1:] * edges[:-1])
+        radial = _airy(2.0 * math.pi * np.outer(s, middle)) @ strength / power
+        terms.append(VeilTerm(s, radial, np.ones(1)))
+    arcs = elements.arcs[inside_arcs]
+    if len(arcs):
+        bins = 720
+        angular = np.zeros(bins)
+        at = np.arange(bins) * math.pi / bins
+        for _, _, normal, length, _, bend in arcs:
+            off = np.abs((at - normal + 0.5 * math.pi) % math.pi - 0.5 * math.pi)
+            fan = np.clip((bend - off) / (math.pi / bins) + 0.5, 0.0, 1.0)
+            angular += fan * length / (2.0 * bend)
+        w = float(arcs[0, 4])
+        mean = float(angular.mean())
+        # the mean of sinc^2 over its fringes, once they are finer than the table
+        fringes = np.sinc(w * s) ** 2
+        smooth = np.where(w * s > 4.0, 0.5 / (math.pi * w * s) ** 2, fringes)
+        terms.append(VeilTerm(s, mean * w * w * smooth / s / power, angular / mean))
+    return tuple(terms)
+
+
+def _airy(x: Floats) -> Floats:
+    """(2 J1(x) / x)^2, and the mean over its rings, 4 / (pi x^3), beyond the tenth."""
+    grid = np.linspace(0.0, 32.0, 2049)
+    tau = (np.arange(64) + 0.5) * math.pi / 64
+    # Bessel's integral; the trapezium rule is exact to rounding for a periodic integrand
+    J1 = np.cos(tau - np.outer(grid, np.sin(tau))).mean(axis=1)
+    table = np.ones_like(grid)
+    table[1:] = (2.0 * J1[1:] / grid[1:]) ** 2
+    near: Floats = np.interp(x, grid, table)
+    return np.where(x > 31.5, 4.0 / (math.pi * np.maximum(x, 1.0) ** 3), near)

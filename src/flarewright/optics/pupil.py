@@ -1,0 +1,197 @@
+"""The wave behind the pupil, sampled: blades smooth or rough, images, and the dirt on them.
+
+Lengths are in radii of the round opening; rows rise with y, as the opening is seen from behind the camera.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..model.iris import Iris
+from .dirt import Elements, rasterise
+from .iris import blade_edges, transmission
+
+Floats = NDArray[np.float64]
+
+FFT_SIZE = 4096
+WINDOW = 12.0
+"""Width of the zero-padded pupil plane in pupil radii; the step in s is 1 / WINDOW, the Nyquist frequency 171."""
+
+PUPIL_REACH = 1.65
+"""No opening reaches farther than this: the corner of a straight triangle lies at 1.56."""
+
+__all__ = ["FFT_SIZE", "PUPIL_REACH", "WINDOW", "Picture", "Pupil", "pupil_amplitude"]
+
+
+@dataclass(frozen=True)
+class Picture:
+    """An image that a cache can compare: by its contents' digest."""
+
+    digest: bytes
+    pixels: NDArray[np.floating] = field(compare=False, repr=False)
+
+
+@dataclass(frozen=True)
+class Pupil:
+    """A sampled pupil.
+
+    Attributes
+    ----------
+    at : ndarray, shape (G,)
+        Places of the samples on both axes.
+    opening : ndarray, shape (G, G)
+        Transmittance of blades or mask alone.
+    amplitude : ndarray, shape (G, G)
+        Of the wave, dirt included; borders of blades are softened by a triangle two samples wide.
+    light : float
+        Integral of the transmittance, dirt included.
+    transmittance, amplitude_left : float
+        Mean of what dirt leaves of light and amplitude in the opening.
+    drawn : ndarray, shape (G, G), or None
+        Amplitude that a drawn image of dirt takes away.
+    """
+
+    at: Floats
+    opening: Floats
+    amplitude: Floats
+    light: float
+    transmittance: float = 1.0
+    amplitude_left: float = 1.0
+    drawn: Floats | None = None
+
+    def holds(self, pieces: Floats) -> NDArray[np.bool_]:
+        """Tell which pieces, by their x and y in the first two columns, lie in the opening."""
+        step = float(self.at[1] - self.at[0])
+        size = len(self.at)
+        place = np.floor((pieces[:, :2] - self.at[0]) / step + 0.5).astype(np.intp)
+        ok = ((place >= 0) & (place < size)).all(axis=1)
+        column, row = np.clip(place, 0, size - 1).T
+        found: NDArray[np.bool_] = ok & (self.opening[row, column] > 0.5)
+        return found
+
+
+def pupil_amplitude(
+    iris: Iris,
+    mask: Picture | None,
+    span: float,
+    radius_mm: float,
+    elements: Elements | None,
+    dirt_image: Picture | None,
+    turn: float,
+) -> Pupil:
+    """Sample a pupil.
+
+    Parameters
+    ----------
+    iris : Iris
+    mask : Picture or None
+        Transmittance over [-span, span] squared, in place of the blades.
+    span, radius_mm : float
+        As in `diffraction.pupil_pattern`.
+    elements : Elements or None
+        Dirt, turned already.
+    dirt_image : Picture or None
+        Transmittance over [-1, 1] squared; 1 outside.
+    turn : float
+        Turns blades and images, rad.
+
+    Returns
+    -------
+    Pupil
+
+    Raises
+    ------
+    ValueError
+        When no light is left.
+    """
+    spacing = WINDOW / FFT_SIZE
+    half = math.ceil(PUPIL_REACH / spacing)
+    at = (np.arange(-half, half) + 0.5) * spacing
+    turned = iris.model_copy(update={"rotation_deg": iris.rotation_deg + math.degrees(turn)})
+    if mask is None:
+        opening = _blades(turned, at, spacing, radius_mm)
+        amplitude = opening
+    else:
+        opening = _image(turned, mask, span, at, spacing)
+        if not opening.max() > 0.0:
+            raise ValueError("the iris mask is dark everywhere; white must mark the opening")
+        amplitude = np.sqrt(opening)
+    light = float(opening.sum()) * spacing**2
+    if elements is None:
+        return Pupil(at, opening, amplitude, light)
+    kept, passing = rasterise(elements, at)
+    drawn = None
+    if dirt_image is not None:
+        clear = _image(Iris(rotation_deg=math.degrees(turn)), dirt_image, 1.0, at, spacing)
+        clear[np.maximum(np.abs(at), np.abs(at)[:, None]) >= 1.0] = 1.0
+        drawn = amplitude * (1.0 - np.sqrt(clear))
+        kept, passing = kept * np.sqrt(clear), passing * clear
+    left = float((opening * passing).sum()) * spacing**2
+    if not left > 1e-6 * light:
+        raise ValueError("the dirt leaves no light; take less of it")
+    weight = float(amplitude.sum())
+    return Pupil(
+        at, opening, amplitude * kept, left, left / light, float((amplitude * kept).sum()) / weight, drawn
+    )
+
+
+def _blades(iris: Iris, at: Floats, spacing: float, radius_mm: float) -> Floats:
+    ramp = transmission(iris, 1.0, at, at[:, None], footprint=2.0 * spacing)
+    if iris.roughness_um > 0.0:
+        _roughen(ramp, iris, at, spacing, radius_mm)
+    # The linear ramp is a box's integral; this is the triangle's.
+    border = (ramp > 0.0) & (ramp < 1.0)
+    t = ramp[border]
+    ramp[border] = np.where(t < 0.5, 2.0 * t**2, 1.0 - 2.0 * (1.0 - t) ** 2)
+    return ramp
+
+
+def _roughen(ramp: Floats, iris: Iris, at: Floats, spacing: float, radius_mm: float) -> None:
+    """Push every blade's edge in and out by its own noise, in place."""
+    sigma = 1e-3 * iris.roughness_um / radius_mm
+    length = 1e-3 * iris.roughness_length_um / radius_mm
+    band = 6.0 * sigma + 2.0 * spacing
+    close = transmission(iris, 1.0, at, at[:, None], footprint=2.0 * band)
+    row, column = np.nonzero((close > 0.0) & (close < 1.0))
+    x, y = at[column], at[row]
+    worst = np.full(x.size, -np.inf)
+    rng = np.random.default_rng([iris.roughness_seed, 4])
+    edges = blade_edges(iris, 1.0)
+    round_one = len(edges) == 1
+    for nx, ny, offset, curvature in edges:
+        qx, qy = x - offset * nx, y - offset * ny
+        value = nx * qx + ny * qy + 0.5 * curvature * (qx * qx + qy * qy)
+        along = np.arctan2(y, x) if round_one else -ny * qx + nx * qy
+        noise = _noise(rng, length, np.pi if round_one else 2.0 * PUPIL_REACH, round_one)
+        worst = np.maximum(worst, value + sigma * np.interp(along, *noise))
+    ramp[row, column] = np.clip(0.5 - worst / (2.0 * spacing), 0.0, 1.0)
+
+
+def _noise(rng: np.random.Generator, length: float, reach: float, periodic: bool) -> tuple[Floats, Floats]:
+    """Gaussian noise of variance 1 on [-reach, reach] whose correlation is exp(-(d / length)^2)."""
+    # finer than the grid is averaged by it anyway
+    length = max(length, 0.25 * WINDOW / FFT_SIZE)
+    count = min(max(64, math.ceil(2.0 * reach / (length / 4.0))), 1 << 20)
+    if not periodic:
+        count *= 2  # the second half only keeps the ends apart
+    step = 2.0 * reach / (count if periodic else count / 2)
+    frequency = np.fft.rfftfreq(count, step)
+    white = np.fft.rfft(rng.normal(size=count))
+    # a kernel exp(-2 (d / length)^2) correlates with itself as exp(-(d / length)^2)
+    shaped = np.fft.irfft(white * np.exp(-0.5 * (math.pi * frequency * length) ** 2), count)
+    shaped /= np.sqrt(np.mean(np.exp(-((math.pi * np.fft.fftfreq(count, step) * length) ** 2))))
+    kept = count if periodic else count // 2
+    t = -reach + step * np.arange(kept + (1 if periodic else 0))
+    return t, np.append(shaped, shaped[0]) if periodic else shaped[:kept]
+
+
+def _image(iris: Iris, picture: Picture, span: float, at: Floats, spacing: float) -> Floats:
+    """Mean of 3 x 3 bilinear samples: the image may be finer than the grid."""
+    fine = (at[:, None] + np.array([-1.0, 0.0, 1.0]) * spacing / 3.0).ravel()
+    light = transmission(iris, span, fine, fine[:, None], mask=picture.pixels)
+    mean: Floats = light.reshape(len(at), 3, len(at), 3).mean(axis=(1, 3))
+    return mean
