@@ -113,6 +113,15 @@ PROJECT_FILES = {
     "misspelt rule": (PROJECT + '[[art.rules]]\nselect = "all"\ngian = 2\n', "did you mean 'gain'"),
     "rule in the wrong place": (PROJECT + "[output]\nblur_px = 2\n", "belongs into [[art.rules]]"),
     "gain of an unknown pass": (PROJECT + "[art.gain]\nglow = 2\n", "there is no pass 'glow'"),
+    "negative dust": (PROJECT + "[dirt]\ndust_per_mm2 = -1\n", "dirt.dust_per_mm2"),
+    "dust sizes upside down": (PROJECT + "[dirt]\ndust_um = [50, 5]\n", "least diameter"),
+    "opaque fingerprint": (PROJECT + "[dirt]\nfingerprint = 1.5\n", "dirt.fingerprint"),
+    "negative seed": (PROJECT + "[dirt]\nseed = -1\n", "dirt.seed"),
+    "misspelt dirt": (PROJECT + "[dirt]\ndust_per_mm = 1\n", "did you mean 'dust_per_mm2'"),
+    "starburst without size": (PROJECT + "[starburst]\nsize = 0\n", "starburst.size"),
+    "starburst turned too far": (PROJECT + "[starburst]\nspiral_deg = 360\n", "starburst.spiral_deg"),
+    "rough without length": (PROJECT + "[iris]\nroughness_length_um = 0\n", "iris.roughness_length_um"),
+    "light wider than the sky": (PROJECT + "diameter_deg = 200\n", "lights[0].diameter_deg"),
     "negative sensor": (PROJECT + "[camera]\nsensor_mm = [-36, 24]\n", "above 0 mm"),
 }
 
@@ -198,6 +207,15 @@ COMMAND_LINES = {
     "output folder missing": ([*H, "--light", "1,1", "-o", "no/a.exr"], "does not exist"),
     "output is a folder": ([*H, "--light", "1,1", "-o", "folder.exr"], "it is a folder"),
     "project missing": (["render", "--project", "no.toml", "-o", "a.exr"], "no.toml does not exist"),
+    "negative dust": ([*H, *GOOD, "--dust", "-1"], "--dust"),
+    "dust is nan": ([*H, *GOOD, "--dust", "nan"], "--dust"),
+    "negative scratches": ([*H, *GOOD, "--scratches", "-1"], "--scratches"),
+    "fingerprint 2": ([*H, *GOOD, "--fingerprint", "2"], "--fingerprint"),
+    "negative roughness": ([*H, *GOOD, "--roughness", "-1"], "--roughness"),
+    "seed below zero": ([*H, *GOOD, "--seed", "-1"], "--seed"),
+    "no dirt image": ([*H, *GOOD, "--dirt-image", "no.png"], "no.png"),
+    "two disc sizes for one light": ([*H, *GOOD, *["--light-diameter", "1"] * 2], "--light-diameter is given 2 times"),
+    "disc is negative": ([*H, *GOOD, "--light-diameter", "-1"], "--light-diameter"),
     "several at once": ([*H, *GOOD, "--fstop", "0", "--quality", "best"], "2 settings cannot be used"),
     "ghosts without a light": (["ghosts", "heliar-tronnier"], "missing option '--light'"),
     "ghosts in X-rays": (["ghosts", "heliar-tronnier", "--light", "1,1", "--wavelength-nm", "1"], "not visible"),
@@ -288,3 +306,9 @@ def test_a_binary_project_and_a_folder_as_project(capsys, folder):
     (folder / "bin.toml").write_bytes(bytes(range(256)))
     refuse(capsys, folder, ["project", "check", "bin.toml"], "UTF-8")
     refuse(capsys, folder, ["project", "check", "."], "is a folder")
+
+
+def test_dirt_that_cannot_be_drawn(capsys, folder):
+    for image, keyword in (("no.png", "no such dirt image"), ("picture.png", "cannot be read as an image")):
+        (folder / "bad.toml").write_text(PROJECT + f'[dirt]\nimage = "{image}"\n[quality]\nmode = "draft"\n')
+        refuse(capsys, folder, ["render", "--project", "bad.toml", "-o", "a.exr"], keyword)

@@ -27,6 +27,7 @@ EPILOG = (
 
 _LIGHT, _LENS, _CAMERA, _WORK, _ART, _OUT = "Light", "Lens", "Camera", "Quality", "Art direction", "Output"
 _REFERENCE = "Reference quality"
+_DIRT = "Starburst"
 
 
 def render(
@@ -54,6 +55,10 @@ def render(
             rich_help_panel=_LIGHT,
         ),
     ] = None,
+    light_diameter: Annotated[
+        list[float] | None,
+        typer.Option(help="Degrees across the light's disc, 0.53 for the sun; 0 is a point.", rich_help_panel=_LIGHT),
+    ] = None,
     fstop: Annotated[
         float | None, typer.Option(help="f-number; wide open when left out.", rich_help_panel=_LENS)
     ] = None,
@@ -67,6 +72,9 @@ def render(
     iris_image: Annotated[
         Path | None, typer.Option(help="A grey image as the iris; white transmits.", rich_help_panel=_LENS)
     ] = None,
+    roughness: Annotated[
+        float | None, typer.Option(help="Rms of the blades' edges, micrometres.", rich_help_panel=_LENS)
+    ] = None,
     coating: Annotated[
         str | None,
         typer.Option(
@@ -78,6 +86,25 @@ def render(
     focus: Annotated[
         float | None,
         typer.Option(help="Plane in focus, mm in front of the lens; infinity when left out.", rich_help_panel=_LENS),
+    ] = None,
+    dust: Annotated[
+        float | None, typer.Option(help="Specks of dust per mm^2 of the stop.", rich_help_panel=_DIRT)
+    ] = None,
+    scratches: Annotated[
+        float | None, typer.Option(help="Scratches per cm^2 of the stop.", rich_help_panel=_DIRT)
+    ] = None,
+    fingerprint: Annotated[
+        float | None, typer.Option(help="Light that a fingerprint's ridges take, 0 to 1.", rich_help_panel=_DIRT)
+    ] = None,
+    dirt_image: Annotated[
+        Path | None, typer.Option(help="A grey image of dirt over the stop; white transmits.", rich_help_panel=_DIRT)
+    ] = None,
+    cats_eye: Annotated[
+        bool,
+        typer.Option("--cats-eye", help="Starburst of the pupil as rims clip it at that angle.", rich_help_panel=_DIRT),
+    ] = False,
+    starburst_size: Annotated[
+        float | None, typer.Option(help="Stretches the starburst by hand; 1 is physics.", rich_help_panel=_ART)
     ] = None,
     size: Annotated[
         str | None, typer.Option(metavar="WxH", help="Picture in pixels (1280x720).", rich_help_panel=_CAMERA)
@@ -127,7 +154,7 @@ def render(
     threads: Annotated[
         int | None, typer.Option(min=1, help="All cores when left out; pixels do not change.", rich_help_panel=_WORK)
     ] = None,
-    seed: Annotated[int | None, typer.Option(help="Begins the random numbers.", rich_help_panel=_REFERENCE)] = None,
+    seed: Annotated[int | None, typer.Option(help="Begins all random numbers: rays, dirt, rough edges.", rich_help_panel=_REFERENCE)] = None,
     error: Annotated[
         float | None,
         typer.Option(help="Go on to this relative standard error (0.02).", rich_help_panel=_REFERENCE),
@@ -193,6 +220,8 @@ def render(
     flags = Flags(
         lens=lens, project=project, light=light or [], intensity=intensity or [], spectrum=spectrum or [],
         fstop=fstop, blades=blades, rotation=rotation, rounding=rounding, iris_image=iris_image, coating=coating,
+        light_diameter=light_diameter or [], roughness=roughness, dust=dust, scratches=scratches,
+        fingerprint=fingerprint, dirt_image=dirt_image, cats_eye=cats_eye, starburst_size=starburst_size,
         focus=focus, size=size, sensor=sensor, sensor_distance=sensor_distance, quality=quality,
         wavelengths=wavelengths, paths=paths, layers=layers, brightest=brightest, no_starburst=no_starburst,
         colorspace=colorspace, half=half, mute=mute or [], solo=solo or [], gain=gain or [], physical=physical,
@@ -223,7 +252,7 @@ def render(
 def _keep_inputs(settings: Project, project_file: Path | None, outputs: list[Path]) -> None:
     """Refuse to write over a file that this render reads."""
     read = [project_file, settings.lens if isinstance(settings.lens, str) else None]
-    read.append(settings.iris.mask if settings.iris is not None else None)
+    read += [settings.iris.mask if settings.iris is not None else None, settings.dirt.image]
     for source in read:
         for output in outputs:
             if source is not None and Path(source).exists() and output.exists() and output.samefile(source):

@@ -22,6 +22,15 @@ _FLAG_OF = {
     "iris.blades": "--blades",
     "iris.rotation_deg": "--rotation",
     "iris.rounding": "--rounding",
+    "iris.roughness_um": "--roughness",
+    "dirt.dust_per_mm2": "--dust",
+    "dirt.scratches_per_cm2": "--scratches",
+    "dirt.fingerprint": "--fingerprint",
+    "dirt.image": "--dirt-image",
+    "dirt.seed": "--seed",
+    "starburst.size": "--starburst-size",
+    "diameter_deg": "--light-diameter",
+    "quality.ringing": "--ringing",
     "camera.size_px": "--size",
     "camera.sensor_mm": "--sensor",
     "camera.sensor_distance": "--sensor-distance",
@@ -49,11 +58,19 @@ class Flags:
     light: list[str]
     intensity: list[float]
     spectrum: list[str]
+    light_diameter: list[float]
     fstop: float | None
     blades: int | None
     rotation: float | None
     rounding: float | None
+    roughness: float | None
     iris_image: Path | None
+    dust: float | None
+    scratches: float | None
+    fingerprint: float | None
+    dirt_image: Path | None
+    cats_eye: bool
+    starburst_size: float | None
     coating: str | None
     focus: float | None
     size: str | None
@@ -133,6 +150,9 @@ def _sections(flags: Flags) -> dict[str, dict[str, Any]]:
         if width != int(width) or height != int(height):
             raise ProjectError(f"--size {flags.size!r} is not two whole numbers of pixels; write --size 1280x720")
         size = (int(width), int(height))
+    dirt_image = None if flags.dirt_image is None else str(flags.dirt_image)
+    if dirt_image is not None and not Path(dirt_image).is_file():
+        raise ProjectError(f"--dirt-image {dirt_image} does not exist; give a grey PNG or EXR image")
     sensor = None if flags.sensor is None else pair(flags.sensor, "--sensor", "36x24 (mm)", "x")
     return {
         "camera": {
@@ -150,6 +170,14 @@ def _sections(flags: Flags) -> dict[str, dict[str, Any]]:
             "reference_error_of": flags.error_of,
             "reference_samples": flags.samples,
         },
+        "dirt": {
+            "dust_per_mm2": flags.dust,
+            "scratches_per_cm2": flags.scratches,
+            "fingerprint": flags.fingerprint,
+            "image": dirt_image,
+            "seed": flags.seed,
+        },
+        "starburst": {"cats_eye": True if flags.cats_eye else None, "size": flags.starburst_size},
         "output": {
             "layers": flags.layers,
             "brightest": flags.brightest,
@@ -168,10 +196,15 @@ def _lights(flags: Flags, base: tuple[Light, ...]) -> list[dict[str, Any]]:
     else:
         lights = [dict(light) for light in base]
     spectra = [parse_spectrum(text) for text in flags.spectrum]
-    for name, values in (("intensity", flags.intensity), ("spectrum", spectra)):
+    for name, values in (
+        ("intensity", flags.intensity),
+        ("spectrum", spectra),
+        ("diameter_deg", flags.light_diameter),
+    ):
+        flag = _FLAG_OF.get(name, f"--{name}")
         if values and len(values) not in (1, len(lights)):
             raise ProjectError(
-                f"--{name} is given {len(values)} times for {len(lights)} light{'s' if len(lights) > 1 else ''}; "
+                f"{flag} is given {len(values)} times for {len(lights)} light{'s' if len(lights) > 1 else ''}; "
                 "give it once for all lights, or once per light in the same order"
             )
         for k, light in enumerate(lights):
@@ -185,7 +218,14 @@ def _iris(flags: Flags, lens: Any, base: Project | None) -> dict[str, Any] | Non
     mask = None if flags.iris_image is None else str(flags.iris_image)
     if mask is not None and not Path(mask).is_file():
         raise ProjectError(f"--iris-image {mask} does not exist; give a grey PNG or EXR image")
-    changes = {"blades": flags.blades, "rotation_deg": flags.rotation, "rounding": flags.rounding, "mask": mask}
+    changes = {
+        "blades": flags.blades,
+        "rotation_deg": flags.rotation,
+        "rounding": flags.rounding,
+        "mask": mask,
+        "roughness_um": flags.roughness,
+        "roughness_seed": flags.seed if flags.roughness else None,
+    }
     given = {key: value for key, value in changes.items() if value is not None}
     if not given:
         return None

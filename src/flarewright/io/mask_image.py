@@ -14,13 +14,15 @@ from .exr import read_exr
 LARGEST = 4096
 
 
-def read_mask(path: str | Path) -> NDArray[np.float64]:
+def read_mask(path: str | Path, what: str = "iris") -> NDArray[np.float64]:
     """Read a grey image as transmittance.
 
     Parameters
     ----------
     path : str or Path
         PNG, TIFF, JPEG (by Pillow) or EXR; colour is averaged, white transmits.
+    what : str
+        What it is an image of, for messages.
 
     Returns
     -------
@@ -34,18 +36,19 @@ def read_mask(path: str | Path) -> NDArray[np.float64]:
     """
     place = Path(path)
     if not place.is_file():
-        raise ProjectError(f"{place}: there is no such iris image; give the path of a PNG or EXR file")
+        raise ProjectError(f"{place}: there is no such {what} image; give the path of a PNG or EXR file")
     try:
         grey = read_grey(place)
     except (OSError, ValueError, SyntaxError) as error:
         raise ProjectError(f"{place}: this cannot be read as an image ({error}); give a PNG or EXR file") from error
     if min(grey.shape) < 2 or max(grey.shape) > LARGEST:
         raise ProjectError(
-            f"{place}: an iris image has 2 to {LARGEST} pixels a side, this one is {grey.shape[1]}x{grey.shape[0]}"
+            f"{place}: an image of the {what} has 2 to {LARGEST} pixels a side, "
+            f"this one is {grey.shape[1]}x{grey.shape[0]}"
         )
     grey = np.clip(grey, 0.0, 1.0)
     if not np.isfinite(grey).all() or grey.max() <= 0.0:
-        raise ProjectError(f"{place}: the iris image is black or not finite, so no light passes; white transmits")
+        raise ProjectError(f"{place}: the {what} image is black or not finite, so no light passes; white transmits")
     return grey
 
 

@@ -26,6 +26,7 @@ from ..model import art as arts
 from ..model import coating as coatings
 from ..model import light as lights
 from ..model import project as choices
+from ..model import starburst as starbursts
 from ..model.camera import Camera
 from ..model.iris import Iris
 from ..model.lens import Lens, Surface
@@ -146,8 +147,9 @@ def _expanded(data: dict[str, Any], folder: Path, problems: list[str]) -> dict[s
         case other:
             problems.append(f"lens should be a name, a file or a table, not {shorten(other)}")
             out["lens"] = "?"
-    if isinstance(out.get("iris"), dict) and isinstance(out["iris"].get("mask"), str):
-        out["iris"] = {**out["iris"], "mask": str(folder / out["iris"]["mask"])}
+    for section, key in (("iris", "mask"), ("dirt", "image")):
+        if isinstance(out.get(section), dict) and isinstance(out[section].get(key), str):
+            out[section] = {**out[section], key: str(folder / out[section][key])}
     if "coating" in out:
         try:
             out["coating"] = _coating(out["coating"], folder)
@@ -309,6 +311,8 @@ _SECTIONS: dict[str, tuple[type[BaseModel], ...]] = {
     "coating": (
         choices.Preset, choices.Everywhere, choices.PerRow, coatings.QuarterWave, coatings.Film, coatings.Standard,
     ),
+    "dirt": (starbursts.Dirt,),
+    "starburst": (starbursts.Starburst,),
     "art": (arts.Art,),
     "rules": (arts.Rule,),
     "lens": (Lens,),
@@ -320,8 +324,9 @@ def _suggestion(keys: list[int | str]) -> str:
     wrong = str(keys[-1]) if keys else ""
     section = next((key for key in reversed(keys[:-1]) if isinstance(key, str)), "")
     known = [name for model in _SECTIONS.get(section, ()) for name in model.model_fields]
+    unfinished = any(name.startswith(f"{wrong}_") for name in known)
     for other, models in _SECTIONS.items():
-        if other and any(wrong in model.model_fields for model in models):
+        if other and not unfinished and any(wrong in model.model_fields for model in models):
             heading = {"lights": "[[lights]]", "rules": "[[art.rules]]"}.get(other, f"[{other}]")
             return f" here; it belongs into {heading}"
     if near := did_you_mean(wrong, known):

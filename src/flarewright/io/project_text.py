@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from ..errors import ProjectError
-from ..model import Art
+from ..model import Art, Dirt, Starburst
 from ..model import project as choices
 from ..model.project import CoatingChoice, Project
 from .coating_text import UNCOATED, format_coating
@@ -26,6 +26,8 @@ ABOUT = {
     "iris.mask": '"iris.png"   # an image instead of blades, white transmits',
     "lights.field_deg": "degrees right and up in the picture",
     "lights.intensity": "irradiance on a plane that faces the light",
+    "lights.diameter_deg": "across the light's disc: 0.53 for the sun, 0 for a point",
+    "iris.roughness_um": "rms of the blades' edges",
     "lights.spectrum": '"d65", "equal-energy", "black-body:3200", "lines:589.0,589.6" or "lamp.csv"',
     "camera.sensor_mm": "[36.0, 20.25]   # left out: 36 mm wide, square pixels",
     "camera.sensor_distance": "80.0   # last vertex to sensor, mm; left out: the paraxial focus",
@@ -42,6 +44,21 @@ ABOUT = {
     "output.colorspace": '"rec709" or "acescg", linear',
     "output.pixel_type": '"half" or "float"',
 }
+
+_TEACH_DIRT = """
+# What shapes the starburst besides the iris; docs/diffraction.md.
+# [dirt]
+# dust_per_mm2 = 0.5
+# dust_um = [5.0, 100.0]
+# scratches_per_cm2 = 1.0   # also: scratch_um, scratch_mm
+# fingerprint = 0.2
+# image = "dirt.png"   # a drawing, white transmits
+# seed = 1
+# in_ghosts = true
+# [starburst]
+# cats_eye = true   # the pupil as the light finds it, clipped by rims
+# size = 1.0   # by hand, as are intensity and spiral_deg
+"""
 
 _TEACH_ART = """
 # Changes by hand, on top of the physics; docs/art-direction.md. art.physical = true ignores them.
@@ -72,6 +89,9 @@ def project_text(project: Project, *, folder: Path | None = None, comments: bool
     if folder is not None:
         _make_relative(data, folder)
     data["coating"] = _short_coating(project.coating)
+    for section, plain in (("dirt", Dirt()), ("starburst", Starburst())):
+        if getattr(project, section) == plain:
+            del data[section]
     if project.art == Art():
         del data["art"]
     else:
@@ -84,6 +104,8 @@ def project_text(project: Project, *, folder: Path | None = None, comments: bool
     out: list[str] = []
     _emit_table(out, data, (), nothing, ABOUT if comments else {})
     teach = _TEACH_ART if comments and project.art == Art() else ""
+    if comments and "dirt" not in data and "starburst" not in data:
+        teach = _TEACH_DIRT + teach
     return "\n".join(out).strip() + "\n" + teach
 
 
@@ -95,8 +117,9 @@ def _make_relative(data: dict[str, Any], folder: Path) -> None:
         data["lens"] = relative(data["lens"])
         if "/" not in data["lens"] and not data["lens"].lower().endswith(LENS_SUFFIXES):
             data["lens"] = f"./{data['lens']}"
-    if data.get("iris", {}).get("mask"):
-        data["iris"]["mask"] = relative(data["iris"]["mask"])
+    for section, key in (("iris", "mask"), ("dirt", "image")):
+        if data.get(section, {}).get(key):
+            data[section][key] = relative(data[section][key])
 
 
 def _short_coating(choice: CoatingChoice) -> str | dict[str, Any]:

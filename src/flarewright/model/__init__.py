@@ -10,6 +10,7 @@ from .layer import Layer
 from .lens import Element, Lens, Row, Stop, Surface
 from .light import D65, BlackBody, EqualEnergy, Light, Lines, Spectrum, Tabulated
 from .project import AsLens, CoatingChoice, Everywhere, Output, PerRow, Preset, Project, Quality
+from .starburst import Dirt, Starburst
 
 __all__ = [
     "D65",
@@ -20,6 +21,7 @@ __all__ = [
     "Camera",
     "Coating",
     "CoatingChoice",
+    "Dirt",
     "Dispersion",
     "Element",
     "EqualEnergy",
@@ -43,6 +45,7 @@ __all__ = [
     "Spectrum",
     "Stack",
     "Standard",
+    "Starburst",
     "Stop",
     "Surface",
     "Tabulated",

@@ -37,7 +37,7 @@ class Iris(Frozen):
     mask: str | None = None
     roughness_um: float = Field(0.0, ge=0.0, le=1000.0)
     roughness_length_um: float = Field(200.0, gt=0.0, le=100000.0)
-    roughness_seed: int = Field(0, ge=0, lt=2**32)
+    roughness_seed: int = Field(0, ge=0, lt=2**63)
 
     @model_validator(mode="after")
     def _blades_make_an_opening(self) -> Iris:

@@ -67,6 +67,9 @@ class Light(Frozen):
     intensity : float
         Irradiance (luminous, so a white light of 1 is RGB 1, 1, 1) on a plane that faces the light.
     spectrum : Spectrum
+    diameter_deg : float
+        Angle across the light's round disc, 0.53 for the sun, 0 for a point; blurs the starburst and the rings in
+        ghosts.
     """
 
     name: str = "light"
@@ -76,3 +79,4 @@ class Light(Frozen):
     ]
     intensity: float = Field(1.0, ge=0.0)
     spectrum: Spectrum = D65()
+    diameter_deg: float = Field(0.0, ge=0.0, le=60.0)

@@ -13,6 +13,7 @@ from .coating import Coating
 from .iris import Iris
 from .lens import Lens
 from .light import Light
+from .starburst import Dirt, Starburst
 
 
 class AsLens(Frozen):
@@ -118,6 +119,10 @@ class Project(Frozen):
         None: wide open.
     iris : Iris or None
         None: the lens file's.
+    dirt : Dirt
+        What lies in the pupil; nothing by default.
+    starburst : Starburst
+        How the direct image is drawn.
     art : Art
         What is changed by hand; nothing by default.
     """
@@ -131,6 +136,8 @@ class Project(Frozen):
     camera: Camera = Camera()
     quality: Quality = Quality()
     output: Output = Output()
+    dirt: Dirt = Dirt()
+    starburst: Starburst = Starburst()
     art: Art = Art()
 
     @model_validator(mode="after")

@@ -44,13 +44,15 @@ class Dirt(Frozen):
     scratch_mm: float = Field(5.0, gt=0.0, le=200.0)
     fingerprint: float = Field(0.0, ge=0.0, le=1.0)
     image: str | None = None
-    seed: int = Field(0, ge=0, lt=2**32)
+    seed: int = Field(0, ge=0, lt=2**63)
     in_ghosts: bool = False
 
     @model_validator(mode="after")
     def _diameters_rise(self) -> Dirt:
         if self.dust_um[0] > self.dust_um[1]:
-            raise ValueError(f"dust_um: the least diameter {self.dust_um[0]:g} is above the largest {self.dust_um[1]:g}")
+            raise ValueError(
+                f"dust_um: the least diameter {self.dust_um[0]:g} is above the largest {self.dust_um[1]:g}"
+            )
         return self
 
     @property

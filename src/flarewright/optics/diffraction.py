@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from flarewright.model.iris import Iris
 from flarewright.model.starburst import Dirt
 
-from .dirt import Veil, VeilTerm, lay_elements, scattered
+from .dirt import Veil, VeilTerm, lay_elements, scattered, spread_area
 from .iris import blade_edges
 from .pupil import FFT_SIZE, WINDOW, Picture, pupil_amplitude
 
@@ -251,10 +251,13 @@ def _pattern(
     veil: Veil = ()
     if elements is not None:
         open_area = math.pi * pupil.transmittance if mask is None else pupil.light
-        veil = scattered(elements, pupil.holds(elements.discs), pupil.holds(elements.arcs), open_area)
-        if mask is not None:
-            veil = ()  # the measured wings hold it already
-        elif pupil.drawn is not None:
+        if mask is None:  # the measured wings of a mask hold it already
+            inside = pupil.holds(elements.discs), pupil.holds(elements.arcs)
+            # pieces that overlap scatter less than each for itself
+            alone = spread_area(elements, *inside) / math.pi
+            share = pupil.spread / alone if alone > 0.0 else 1.0
+            veil = tuple(replace(term, radial=share * term.radial) for term in scattered(elements, *inside, open_area))
+        if mask is None and pupil.drawn is not None:
             veil = (*veil, _drawn_veil(pupil.drawn, s, reach, spacing, open_area))
     P /= WINDOW**2
     table = np.zeros((len(s) + 1, len(s) + 1))

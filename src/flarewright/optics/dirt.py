@@ -24,7 +24,7 @@ _RIDGE_MM, _DROPLET_MM, _DROPLET_STEP_MM, _PRINT_MM = 0.5, 0.06, 0.15, (7.0, 9.0
 # half the angle over which a scratch bends
 _BEND_DEG = (0.5, 5.0)
 
-__all__ = ["Elements", "Veil", "VeilTerm", "lay_elements", "rasterise", "scattered"]
+__all__ = ["Elements", "Veil", "VeilTerm", "lay_elements", "rasterise", "scattered", "spread_area"]
 
 
 @dataclass(frozen=True)
@@ -141,7 +141,9 @@ def _fingerprint(dirt: Dirt) -> Floats:
     turn, shift = rng.uniform(0.0, 2.0 * np.pi), rng.uniform(-2.0, 2.0, 2)
     c, s = math.cos(turn), math.sin(turn)
     radius = _DROPLET_MM * rng.uniform(0.7, 1.3, x.size)
-    return np.column_stack([c * x - s * y + shift[0], s * x + c * y + shift[1], radius, np.full(x.size, dirt.fingerprint)])
+    return np.column_stack(
+        [c * x - s * y + shift[0], s * x + c * y + shift[1], radius, np.full(x.size, dirt.fingerprint)]
+    )
 
 
 def rasterise(elements: Elements, at: Floats) -> tuple[Floats, Floats]:
@@ -202,7 +204,7 @@ def _softened(distance: Floats) -> Floats:
 
 
 def _window(at: Floats, x: float, y: float, reach: float) -> tuple[slice, slice, Floats, Floats]:
-    """Samples within a square: slices of rows and columns, their x and their y."""
+    """Find the samples within a square: slices of rows and columns, their x and their y."""
     columns = slice(*np.searchsorted(at, [x - reach, x + reach]))
     rows = slice(*np.searchsorted(at, [y - reach, y + reach]))
     return rows, columns, at[columns], at[rows]
@@ -244,7 +246,7 @@ def scattered(elements: Elements, inside: NDArray[np.bool_], inside_arcs: NDArra
     Babinet: far from the image of the opening, dirt scatters as openings of its shape would. A disc of radius a that
     takes the amplitude d scatters d^2 (pi a^2)^2 (2 J1(x) / x)^2, x = 2 pi a s. A band of width w along an arc of
     radius R scatters d^2 w^2 sinc^2(w s) R / s along its normals (stationary phase). Pieces lie at random, so their
-    waves add in light. Each carries as much light as it takes: d^2 times its area (tested).
+    waves add in light. Each carries as much light as it takes: d^2 times its area (tested). Overlaps are not counted.
     """
     s = np.geomspace(1.0, 1e6, 1201)
     terms = []
@@ -259,12 +261,12 @@ def scattered(elements: Elements, inside: NDArray[np.bool_], inside_arcs: NDArra
         terms.append(VeilTerm(s, radial, np.ones(1)))
     arcs = elements.arcs[inside_arcs]
     if len(arcs):
-        bins = 720
-        angular = np.zeros(bins)
-        at = np.arange(bins) * math.pi / bins
+        directions = 720
+        angular = np.zeros(directions)
+        at = math.pi / directions * np.arange(directions, dtype=np.float64)
         for _, _, normal, length, _, bend in arcs:
             off = np.abs((at - normal + 0.5 * math.pi) % math.pi - 0.5 * math.pi)
-            fan = np.clip((bend - off) / (math.pi / bins) + 0.5, 0.0, 1.0)
+            fan = np.clip((bend - off) / (math.pi / directions) + 0.5, 0.0, 1.0)
             angular += fan * length / (2.0 * bend)
         w = float(arcs[0, 4])
         mean = float(angular.mean())
@@ -285,3 +287,20 @@ def _airy(x: Floats) -> Floats:
     table[1:] = (2.0 * J1[1:] / grid[1:]) ** 2
     near: Floats = np.interp(x, grid, table)
     return np.where(x > 31.5, 4.0 / (math.pi * np.maximum(x, 1.0) ** 3), near)
+
+
+def spread_area(elements: Elements, inside: NDArray[np.bool_], inside_arcs: NDArray[np.bool_]) -> float:
+    """Sum d^2 times the area of pieces: the light that they would scatter if none overlapped.
+
+    Parameters
+    ----------
+    elements, inside, inside_arcs
+        As in `scattered`.
+
+    Returns
+    -------
+    float
+    """
+    discs, arcs = elements.discs[inside], elements.arcs[inside_arcs]
+    depth = 1.0 - np.sqrt(1.0 - discs[:, 3])
+    return float(math.pi * (depth**2 * discs[:, 2] ** 2).sum() + (arcs[:, 3] * arcs[:, 4]).sum())

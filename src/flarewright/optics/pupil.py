@@ -51,6 +51,8 @@ class Pupil:
         Integral of the transmittance, dirt included.
     transmittance, amplitude_left : float
         Mean of what dirt leaves of light and amplitude in the opening.
+    spread : float
+        What the pieces of dirt scatter of the opening's light: mean transmittance less the squared mean amplitude.
     drawn : ndarray, shape (G, G), or None
         Amplitude that a drawn image of dirt takes away.
     """
@@ -61,6 +63,7 @@ class Pupil:
     light: float
     transmittance: float = 1.0
     amplitude_left: float = 1.0
+    spread: float = 0.0
     drawn: Floats | None = None
 
     def holds(self, pieces: Floats) -> NDArray[np.bool_]:
@@ -110,7 +113,7 @@ def pupil_amplitude(
     """
     spacing = WINDOW / FFT_SIZE
     half = math.ceil(PUPIL_REACH / spacing)
-    at = (np.arange(-half, half) + 0.5) * spacing
+    at: Floats = np.asarray((np.arange(-half, half) + 0.5) * spacing, dtype=np.float64)
     turned = iris.model_copy(update={"rotation_deg": iris.rotation_deg + math.degrees(turn)})
     if mask is None:
         opening = _blades(turned, at, spacing, radius_mm)
@@ -124,6 +127,7 @@ def pupil_amplitude(
     if elements is None:
         return Pupil(at, opening, amplitude, light)
     kept, passing = rasterise(elements, at)
+    spread = float((opening * passing).sum() / opening.sum() - ((amplitude * kept).sum() / amplitude.sum()) ** 2)
     drawn = None
     if dirt_image is not None:
         clear = _image(Iris(rotation_deg=math.degrees(turn)), dirt_image, 1.0, at, spacing)
@@ -135,7 +139,7 @@ def pupil_amplitude(
         raise ValueError("the dirt leaves no light; take less of it")
     weight = float(amplitude.sum())
     return Pupil(
-        at, opening, amplitude * kept, left, left / light, float((amplitude * kept).sum()) / weight, drawn
+        at, opening, amplitude * kept, left, left / light, float((amplitude * kept).sum()) / weight, spread, drawn
     )
 
 
@@ -185,8 +189,8 @@ def _noise(rng: np.random.Generator, length: float, reach: float, periodic: bool
     shaped = np.fft.irfft(white * np.exp(-0.5 * (math.pi * frequency * length) ** 2), count)
     shaped /= np.sqrt(np.mean(np.exp(-((math.pi * np.fft.fftfreq(count, step) * length) ** 2))))
     kept = count if periodic else count // 2
-    t = -reach + step * np.arange(kept + (1 if periodic else 0))
-    return t, np.append(shaped, shaped[0]) if periodic else shaped[:kept]
+    t = np.asarray(-reach + step * np.arange(kept + (1 if periodic else 0)), dtype=np.float64)
+    return t, np.asarray(np.append(shaped, shaped[0]) if periodic else shaped[:kept])
 
 
 def _image(iris: Iris, picture: Picture, span: float, at: Floats, spacing: float) -> Floats:

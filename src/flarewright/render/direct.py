@@ -2,27 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..kernels.bundle import draw_bundle, measure_bundle, node_densities
 from ..kernels.raster import blank_plane, to_pixels
-from ..model import Layer, Lens, Lines
-from ..optics.bundle import Bundle, find_region, trace_bundle, trace_grid
+from ..kernels.trace import ALIVE, REL, WEIGHT, X, Y
+from ..model import Lens
+from ..optics.bundle import Bundle, find_region, trace_bundle, trace_grid, trace_points
 from ..optics.paths import direct_path
-from .prepare import Settled
 from .shot import Shot
-from .starburst import NEAR_SPLIT, starburst_layer
 
 Floats = NDArray[np.float64]
 
 # pixels per mm that the grid of the direct path resolves; its flux needs no more
 _SCALE = 20.0
-# Hullin 2011, section 3.3: fine enough to blur the rings of single wavelengths into each other
-DIFFRACTION_STEP_NM = 5.0
+# the traced pupil's picture: pixels a side, and half its width in pupil radii
+PUPIL_SIDE = 1024
+PUPIL_SPAN = 1.65
 
 
 @dataclass(frozen=True)
@@ -95,47 +94,56 @@ def _through_mask(shot: Shot, bundle: Bundle, data: Floats, sums: Floats) -> flo
     return float(to_pixels(plane, side)[:, :, 0].sum(dtype=np.float64))
 
 
-def starburst_of(settled: Settled, shots: Sequence[Shot], images: Sequence[DirectImage], mask: Floats | None) -> Layer:
-    """Draw the direct image of every light, spread by diffraction at the iris.
+def traced_pupil(lens: Lens, shot: Shot, f_number: float) -> Floats | None:
+    """Draw the pupil that the direct path accepts, as the light converges on its image: the cat's eye.
 
     Parameters
     ----------
-    settled : Settled
-    shots, images : sequence
-        One a light.
-    mask : ndarray, shape (A, B), or None
-        The iris as an image.
+    lens : Lens
+    shot : Shot
+    f_number : float
 
     Returns
     -------
-    Layer
-        Named "starburst"; its light is the direct images' flux, in the unit of the ghosts.
+    ndarray, shape (PUPIL_SIDE, PUPIL_SIDE), or None
+        Transmittance, about 1 in the middle, row 0 up, over [-PUPIL_SPAN, PUPIL_SPAN] squared in pupil radii; None when
+        no light passes.
+
+    Notes
+    -----
+    A point d beside the image gets the phase k d.(L, M) of a ray that arrives with the direction cosines (L, M), so
+    the pattern is the transform of the light over 2 N (L, M), measured from the mean ray. Near the axis that is the
+    iris; off the axis rims clip it and the image plane sees it foreshortened. What a wave of even phase makes of it is
+    drawn: aberrations are left out.
     """
-    width, height = shots[0].size_px
-    total = np.zeros((height, width, 3), dtype=np.float32)
-    for shot, image in zip(shots, images, strict=True):
-        fine_nm = _diffracted_wavelengths(shot)
-        flux = np.interp(fine_nm, shot.packed.wavelengths_nm, image.throughput_mm2) * shot.light.intensity
-        if not flux.any():
-            continue
-        column = shot.to_pixels[0] + image.position_mm[0] * shot.to_pixels[2]
-        row = shot.to_pixels[1] - image.position_mm[1] * shot.to_pixels[3]
-        total += starburst_layer(
-            settled.iris,
-            settled.order.f_number,
-            (1.0 / float(shot.to_pixels[2]), 1.0 / float(shot.to_pixels[3])),
-            shot.size_px,
-            (float(column), float(row)),
-            fine_nm,
-            shot.weights(fine_nm) * flux[:, None],
-            mask=mask,
-            split=NEAR_SPLIT if settled.project.quality.mode == "final" else 1,
-        )
-    return Layer("starburst", total, (0, 0, width, height))
-
-
-def _diffracted_wavelengths(shot: Shot) -> Floats:
-    """Return steps of 5 nm over the visible range, or the lines of a spectrum of lines."""
-    if isinstance(shot.light.spectrum, Lines):
-        return np.array(sorted({nm for nm, _ in shot.light.spectrum.lines}))
-    return np.arange(380.0, 781.0, DIFFRACTION_STEP_NM)
+    path, tilt, opening, packed = direct_path(lens), shot.incidence.tilt, shot.opening, shot.packed
+    region = find_region(packed, path, tilt, opening.radius)
+    if region is None:
+        return None
+    bundle = trace_grid(packed, path, tilt, (opening.radius, opening.inner), region, tolerance=0.25, scale=_SCALE)
+    w = (len(packed.wavelengths_nm) - 1) // 2
+    data = trace_bundle(packed, w, bundle, tilt).copy()
+    sums = measure_bundle(
+        data, bundle.pupil, bundle.triangles, path.stop_crossings, opening.blades, shot.incidence.axes
+    )
+    if sums[0] <= 0.0:
+        return None
+    # a second plane tells the slopes
+    behind = trace_points(replace(packed, sensor_z=packed.sensor_z + 1.0), w, path, tilt, bundle.pupil)
+    slope = behind[:, X : Y + 1] - data[:, X : Y + 1]
+    cosines = slope / np.sqrt(1.0 + (slope**2).sum(axis=1, keepdims=True))
+    weight = data[:, WEIGHT] * data[:, ALIVE] * (data[:, REL] <= 1.0)
+    middle = (weight @ cosines[:, 1]) / weight.sum()
+    data[:, X], data[:, Y] = 2.0 * f_number * cosines[:, 0], 2.0 * f_number * (cosines[:, 1] - middle)
+    plane = np.zeros((3, PUPIL_SIDE, PUPIL_SIDE), dtype=np.float32)
+    zoom = 0.5 * PUPIL_SIDE / PUPIL_SPAN
+    to_pixels = np.array([PUPIL_SIDE / 2, PUPIL_SIDE / 2, zoom, zoom])
+    densities = node_densities(data, bundle.pupil, bundle.triangles)
+    draw_bundle(
+        data, bundle.pupil, bundle.triangles, densities, path.stop_crossings, opening.blades, opening.mask,
+        opening.half, shot.incidence.axes, to_pixels, 1.0, np.array([1.0, 0.0, 0.0]), plane,
+        np.empty(PUPIL_SIDE + 1, dtype=np.float32),
+    )  # fmt: skip
+    lit = plane[0].astype(np.float64)
+    level = float(np.median(lit[lit > 0.3 * lit.max()])) if lit.max() > 0.0 else 0.0
+    return lit / level if level > 0.0 else None

@@ -17,10 +17,11 @@ from ..optics.pack import facing
 from ..optics.paths import ghost_paths
 from .art import ResolvedArt, graded, resolve_art
 from .compose import beauty
-from .direct import DirectImage, direct_image, starburst_of
+from .direct import DirectImage, direct_image
 from .ghosts import render_ghosts
 from .prepare import Settled, settle
 from .shot import Shot, make_opening, make_shots
+from .starburst_pass import starburst_of
 
 if TYPE_CHECKING:
     from .ledger import Ledger

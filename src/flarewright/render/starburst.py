@@ -186,7 +186,8 @@ class _Painter:
         at = np.log(np.maximum(r, least))
         # times r^2 the table is nearly flat
         found = [np.interp(at, np.log(knots), column * knots**2) for column in table.T]
-        return np.stack(found, axis=-1) / np.maximum(r, least)[..., None] ** 2
+        summed: Floats = np.stack(found, axis=-1) / np.maximum(r, least)[..., None] ** 2
+        return summed
 
     @property
     def _scale(self) -> Floats:
@@ -194,7 +195,7 @@ class _Painter:
         return 2.0 * self.f_number * self.wave * 1e-6
 
     def _coherence(self, r: Floats) -> Floats:
-        """What roughness leaves of a spike at a radius, channel by channel."""
+        """Tell what roughness leaves of a spike at a radius, channel by channel."""
         sigma = self.pattern.roughness
 
         def spike(s: Floats) -> Floats:

@@ -1,0 +1,194 @@
+"""The starburst pass: every light's direct image with its own pupil, dirt, size and spectrum."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import ProjectError
+from ..io.mask_image import read_mask
+from ..model import Iris, Layer, Lines, Starburst
+from ..optics.diffraction import BladeWings, Pattern, Soil, pupil_pattern
+from .direct import PUPIL_SPAN, DirectImage, traced_pupil
+from .prepare import Settled
+from .shot import Shot
+from .starburst import NEAR_SPLIT, starburst_layer
+
+Floats = NDArray[np.float64]
+
+# Hullin 2011, section 3.3: fine enough to blur the rings of single wavelengths into each other
+DIFFRACTION_STEP_NM = 5.0
+# turned and grown copies that stand for the artist's smear
+SPIRAL_COPIES = 9
+
+__all__ = ["disc_blur", "starburst_of"]
+
+
+@dataclass(frozen=True)
+class _Scene:
+    """What all lights of a starburst share."""
+
+    settled: Settled
+    mask: Floats | None
+    soil: Soil | None
+    look: Starburst
+
+
+def starburst_of(settled: Settled, shots: Sequence[Shot], images: Sequence[DirectImage], mask: Floats | None) -> Layer:
+    """Draw the direct image of every light, spread by diffraction at the iris.
+
+    Parameters
+    ----------
+    settled : Settled
+    shots, images : sequence
+        One a light.
+    mask : ndarray, shape (A, B), or None
+        The iris as an image.
+
+    Returns
+    -------
+    Layer
+        Named "starburst"; its light is the direct images' flux less what dirt takes, in the unit of the ghosts, times
+        the artist's intensity.
+
+    Raises
+    ------
+    ProjectError
+        When the image of the dirt cannot be read, or dirt leaves no light.
+    """
+    project = settled.project
+    dirt = project.dirt
+    soil = None
+    if not dirt.clean:
+        soil = Soil(dirt, None if dirt.image is None else read_mask(dirt.image, what="dirt"))
+    look = Starburst(cats_eye=project.starburst.cats_eye) if project.art.physical else project.starburst
+    scene = _Scene(settled, mask, soil, look)
+    width, height = shots[0].size_px
+    total = np.zeros((height, width, 3), dtype=np.float32)
+    for shot, image in zip(shots, images, strict=True):
+        picture = _one_light(scene, shot, image)
+        if picture is not None:
+            total += picture
+    return Layer("starburst", total, (0, 0, width, height))
+
+
+def _one_light(scene: _Scene, shot: Shot, image: DirectImage) -> NDArray[np.floating] | None:
+    """Draw one light, its disc included; None when it is dark."""
+    fine_nm = _diffracted_wavelengths(shot)
+    flux = np.interp(fine_nm, shot.packed.wavelengths_nm, image.throughput_mm2) * shot.light.intensity
+    flux *= scene.look.intensity
+    if not flux.any():
+        return None
+    pixel = (1.0 / float(shot.to_pixels[2]), 1.0 / float(shot.to_pixels[3]))
+    column = float(shot.to_pixels[0] + image.position_mm[0] * shot.to_pixels[2])
+    row = float(shot.to_pixels[1] - image.position_mm[1] * shot.to_pixels[3])
+    order = scene.settled.order
+    # the sun's image is efl times its angle across
+    radius = order.efl * math.tan(0.5 * math.radians(shot.light.diameter_deg))
+    margin = (math.ceil(radius / pixel[0]) + 1, math.ceil(radius / pixel[1]) + 1) if radius > 0.0 else (0, 0)
+    width, height = shot.size_px
+    size = (width + 2 * margin[0], height + 2 * margin[1])
+    picture: NDArray[np.floating] | None = None
+    smear = math.radians(scene.look.spiral_deg)
+    turns = ((np.arange(SPIRAL_COPIES) + 0.5) / SPIRAL_COPIES - 0.5) * smear if smear > 0.0 else np.zeros(1)
+    for turn, made in zip(turns, _patterns(scene, shot, turns), strict=True):
+        pattern = made
+        if pattern is None:
+            return None
+        if smear > 0.0 and isinstance(pattern.wings, BladeWings):
+            # copies of a straight spike are as wide as the step between them, and leave no gap
+            half_fan = max(pattern.wings.half_fan, 0.5 * smear / SPIRAL_COPIES)
+            pattern = replace(pattern, wings=replace(pattern.wings, half_fan=half_fan))
+        drawn = starburst_layer(
+            scene.settled.iris,
+            order.f_number * scene.look.size * math.exp(float(turn)),
+            pixel,
+            size,
+            (column + margin[0], row + margin[1]),
+            fine_nm,
+            shot.weights(fine_nm) * (flux * pattern.transmittance / len(turns))[:, None],
+            pattern=pattern,
+            split=NEAR_SPLIT if scene.settled.project.quality.mode == "final" else 1,
+        )
+        picture = drawn if picture is None else picture + drawn
+    if picture is None or radius == 0.0:
+        return picture
+    blurred = disc_blur(picture, (radius / pixel[0], radius / pixel[1]))
+    return blurred[margin[1] : margin[1] + height, margin[0] : margin[0] + width]
+
+
+def _patterns(scene: _Scene, shot: Shot, turns: Floats) -> list[Pattern | None]:
+    """Make the pattern at every turn of the smear."""
+    order = scene.settled.order
+    iris, mask, span = scene.settled.iris, scene.mask, 1.0
+    if scene.look.cats_eye:
+        mask = traced_pupil(scene.settled.lens, shot, order.f_number)
+        if mask is None:
+            return [None] * len(turns)
+        # it is drawn as the blades stand
+        iris, span = Iris(), PUPIL_SPAN
+    try:
+        return [
+            pupil_pattern(iris, mask, span=span, radius_mm=order.stop_semi_diameter, soil=scene.soil, turn=float(turn))
+            for turn in turns
+        ]
+    except ValueError as error:
+        raise ProjectError(str(error)) from error
+
+
+def disc_blur(picture: NDArray[np.floating], radius_px: tuple[float, float]) -> Floats:
+    """Spread every pixel's light evenly over a disc.
+
+    Parameters
+    ----------
+    picture : ndarray, shape (H, W, C)
+    radius_px : tuple of float
+        Radius of the disc across and down, pixels.
+
+    Returns
+    -------
+    ndarray, shape (H, W, C)
+        What lands outside is lost to the picture; the disc's weights sum to 1.
+    """
+    height, width = picture.shape[:2]
+    reach = [math.ceil(r) + 1 for r in radius_px]
+    parts = 8
+    fine = [(np.arange((2 * k + 1) * parts) + 0.5) / parts - k - 0.5 for k in reach]
+    inside = (fine[0] / radius_px[0]) ** 2 + (fine[1][:, None] / radius_px[1]) ** 2 <= 1.0
+    disc = inside.reshape(2 * reach[1] + 1, parts, 2 * reach[0] + 1, parts).mean(axis=(1, 3))
+    if disc.sum() == 0.0:
+        disc[reach[1], reach[0]] = 1.0
+    disc /= disc.sum()
+    rows, columns = _smooth_size(height + 2 * reach[1]), _smooth_size(width + 2 * reach[0])
+    transfer = np.fft.rfft2(disc, (rows, columns))
+    out = np.empty(picture.shape)
+    for c in range(picture.shape[2]):
+        wide = np.fft.irfft2(
+            np.fft.rfft2(picture[..., c].astype(np.float64), (rows, columns)) * transfer, (rows, columns)
+        )
+        out[..., c] = wide[reach[1] : reach[1] + height, reach[0] : reach[0] + width]
+    return out
+
+
+def _smooth_size(least: int) -> int:
+    """Return the next length whose transform is fast."""
+    found = least
+    while True:
+        rest = found
+        for prime in (2, 3, 5):
+            while rest % prime == 0:
+                rest //= prime
+        if rest == 1:
+            return found
+        found += 1
+
+
+def _diffracted_wavelengths(shot: Shot) -> Floats:
+    """Return steps of 5 nm over the visible range, or the lines of a spectrum of lines."""
+    if isinstance(shot.light.spectrum, Lines):
+        return np.array(sorted({nm for nm, _ in shot.light.spectrum.lines}))
+    return np.arange(380.0, 781.0, DIFFRACTION_STEP_NM)

@@ -1,0 +1,243 @@
+"""Dirt, rough edges, the light's disc and the cat's eye: Parseval, Babinet, and what must not change."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from flarewright.model import Art, Camera, Dirt, Iris, Light, Output, Project, Quality, Starburst
+from flarewright.optics.diffraction import Pattern, Soil, pupil_pattern
+from flarewright.optics.dirt import FIELD, Elements, lay_elements, rasterise, scattered
+from flarewright.optics.pupil import FFT_SIZE, WINDOW, pupil_amplitude
+from flarewright.render.direct import PUPIL_SPAN, direct_image, traced_pupil
+from flarewright.render.prepare import settle
+from flarewright.render.render import render
+from flarewright.render.shot import make_opening, make_shots
+from flarewright.render.starburst import starburst_layer
+from flarewright.render.starburst_pass import disc_blur
+
+GREEN = (np.array([550.0]), np.ones((1, 3)))
+WAVES = np.arange(500.0, 601.0, 5.0)
+SOILS = {
+    "dust": Dirt(dust_per_mm2=2.0, dust_um=(20.0, 200.0), seed=3),
+    "fine dust": Dirt(dust_per_mm2=20.0, dust_um=(5.0, 40.0), seed=3),
+    "scratches": Dirt(scratches_per_cm2=5.0, scratch_um=40.0, seed=4),
+    "fingerprint": Dirt(fingerprint=0.5, seed=5),
+}
+
+
+def energy(terms):
+    """Integral over the plane of a veil's terms."""
+    return sum(2 * math.pi * np.trapezoid(t.radial * t.s**2, np.log(t.s)) * t.angular.mean() for t in terms)
+
+
+@pytest.mark.parametrize("name", ["dust", "scratches"])
+def test_babinet_dirt_scatters_as_much_light_as_it_takes(name):
+    elements = lay_elements(SOILS[name], 8.0)
+    discs, arcs = np.ones(len(elements.discs), bool), np.ones(len(elements.arcs), bool)
+    veil = scattered(elements, discs, arcs, power=2.0)
+    area = math.pi * (elements.discs[:, 2] ** 2).sum() + (elements.arcs[:, 3] * elements.arcs[:, 4]).sum()
+    # the table starts at s = 1, inside which a hundredth lies
+    assert energy(veil) == pytest.approx(area / 2.0, rel=0.03)
+
+
+def test_veil_of_random_discs_is_the_transform_of_their_picture():
+    """Second method: the pattern of the drawn dirt alone, averaged over rings, against the sum of Airy discs."""
+    spacing = WINDOW / FFT_SIZE
+    at = (np.arange(-560, 560) + 0.5) * spacing
+    s = np.fft.fftfreq(2048, spacing)
+    r = np.hypot(s, s[:, None])
+    rings = [(r > low) & (r < high) for low, high in ((8, 12), (12, 20), (20, 30), (30, 50))]
+    found, expected = np.zeros(len(rings)), np.zeros(len(rings))
+    for seed in range(8):
+        elements = lay_elements(Dirt(dust_per_mm2=0.2, dust_um=(150.0, 600.0), seed=seed), 8.0)
+        inside = np.hypot(*elements.discs[:, :2].T) < 1.2
+        amplitude, _ = rasterise(Elements(elements.discs[inside], elements.arcs), at)
+        P = np.abs(np.fft.fft2(1.0 - amplitude, (2048, 2048))) ** 2 * spacing**4 / np.sinc(spacing * r) ** 4
+        (term,) = scattered(elements, inside, np.ones(0, bool), power=1.0)
+        found += [P[ring].mean() for ring in rings]
+        expected += [np.interp(r[ring], term.s, term.radial).mean() for ring in rings]
+    # speckle: a ring of n grains is known to 1 / sqrt(n)
+    np.testing.assert_allclose(found, expected, rtol=0.1)
+
+
+@pytest.mark.parametrize("name", SOILS)
+@pytest.mark.parametrize("iris", [Iris(), Iris(blades=6, rotation_deg=7.0)])
+def test_unit_flux_whatever_lies_on_the_pupil(name, iris):
+    pattern = pupil_pattern(iris, radius_mm=8.0, soil=Soil(SOILS[name]))
+    size, pitch = (901, 901), 0.06
+    E = starburst_layer(
+        iris, 4.0, (pitch, pitch), size, (450.7, 450.2), WAVES, np.ones((len(WAVES), 3)), pattern=pattern
+    )
+    clean = starburst_layer(iris, 4.0, (pitch, pitch), size, (450.7, 450.2), WAVES, np.ones((len(WAVES), 3)))
+    assert E[..., 0].sum(dtype=float) * pitch**2 / len(WAVES) == pytest.approx(1.0, abs=2e-3)
+    assert 0.8 < pattern.transmittance < 0.9999
+    # far from the centre there is more light than without dirt
+    assert E[:, :300].sum(dtype=float) > 1.02 * clean[:, :300].sum(dtype=float)
+
+
+def test_parseval_in_the_fourier_core():
+    soil = SOILS["dust"]
+    pattern = pupil_pattern(Iris(), radius_mm=8.0, soil=Soil(soil))
+    elements = lay_elements(soil, 8.0)
+    pupil = pupil_amplitude(Iris(), None, 1.0, 8.0, elements, None, 0.0)
+    assert pupil.light == pytest.approx(math.pi * pattern.transmittance, rel=1e-4)
+    # what the dust takes: its area, overlaps and the rim aside
+    inside = np.hypot(*elements.discs[:, :2].T) < 1.0
+    assert 1.0 - pattern.transmittance == pytest.approx((elements.discs[inside, 2] ** 2).sum(), rel=0.05)
+    # the centre of the pattern: |mean amplitude|^2 of the area
+    K = (pattern.table.shape[0] - 1) // 2
+    centre = np.diff(np.diff(pattern.table[K : K + 2, K : K + 2], axis=0), axis=1)[0, 0] * pattern.knots_per_s**2
+    expected = (pupil.amplitude.sum() * (WINDOW / FFT_SIZE) ** 2) ** 2 / pupil.light
+    assert centre == pytest.approx(expected, rel=1e-4)
+
+
+def test_dirt_stays_where_it_is_when_the_iris_closes():
+    for dirt in SOILS.values():
+        wide, small = lay_elements(dirt, 8.0), lay_elements(dirt, 4.0)
+        for many, few in ((wide.discs, small.discs), (wide.arcs, small.arcs)):
+            central = np.hypot(many[:, 0], many[:, 1]) * 8.0 < 4.0 * FIELD - 0.5
+            assert np.isin(np.round(many[central, 0] * 8.0, 9), np.round(few[:, 0] * 4.0, 9)).all()
+        again, other = lay_elements(dirt, 8.0), lay_elements(dirt.replace(seed=99), 8.0)
+        np.testing.assert_array_equal(again.discs, wide.discs)
+        assert again.discs.shape != other.discs.shape or not np.array_equal(again.discs, other.discs) or len(again.arcs)
+
+
+def test_smooth_is_the_limit_of_rough():
+    smooth = pupil_pattern(Iris(blades=6))
+    nearly = pupil_pattern(Iris(blades=6, roughness_um=1e-3), radius_mm=8.0)
+    np.testing.assert_allclose(nearly.table, smooth.table, atol=1e-6)
+
+
+def test_roughness_takes_its_share_of_the_spike_and_keeps_the_flux():
+    """A Gaussian edge keeps exp(-(2 pi sigma s)^2) of the mirror-like spike (Debye and Waller)."""
+    sigma_um, radius = 40.0, 8.0
+    args = (4.0, (0.02, 0.02), (801, 801), (400.5, 400.5), *GREEN)
+    kept = []
+    iris = Iris(blades=4, roughness_um=sigma_um, roughness_length_um=100.0)
+    for seed in range(4):
+        rough = pupil_pattern(iris.replace(roughness_seed=seed), radius_mm=radius)
+        kept.append(spike(rough) / spike(pupil_pattern(Iris(blades=4))))
+    s = SPIKE_AT
+    assert np.mean(kept, axis=0) == pytest.approx(np.exp(-((2 * np.pi * sigma_um * 1e-3 / radius * s) ** 2)), abs=0.12)
+    E = starburst_layer(iris, *args, pattern=rough)
+    smooth = starburst_layer(Iris(blades=4), *args)
+    assert E.sum(dtype=float) == pytest.approx(smooth.sum(dtype=float), rel=3e-3)
+    # the spike that is lost lights the space between the spikes
+    assert E[450:, 500:560].sum() > 3 * smooth[450:, 500:560].sum()
+
+
+SPIKE_AT = np.array([15.0, 25.0, 35.0])
+
+
+def spike(pattern: Pattern):
+    """Light in narrow boxes on the upward spike around some s, fringes averaged."""
+    K = (pattern.table.shape[0] - 1) / 2
+    out = []
+    for s in SPIKE_AT:
+        y0, y1 = int(K + (s - 3) * pattern.knots_per_s), int(K + (s + 3) * pattern.knots_per_s)
+        x0, x1 = int(K - 4), int(K + 5)
+        t = pattern.table
+        out.append(t[y1, x1] - t[y0, x1] - t[y1, x0] + t[y0, x0])
+    return np.array(out)
+
+
+def shot_of(**changes):
+    given = {"lens": "canon-28-80", "f_number": 2.8, "lights": (Light(field_deg=(20.0, 10.0)),), **changes}
+    settled = settle(Project(**given))
+    shot = make_shots(settled, make_opening(settled, None))[0]
+    return settled, shot
+
+
+def test_the_traced_pupil_is_the_iris_on_the_axis():
+    settled, shot = shot_of(f_number=5.6, iris=Iris(blades=5, rotation_deg=12.0), lights=(Light(field_deg=(0.0, 0.0)),))
+    found = traced_pupil(settled.lens, shot, settled.order.f_number)
+    at = ((np.arange(1024) + 0.5) / 512 - 1) * PUPIL_SPAN
+    from flarewright.optics.iris import transmission
+
+    blades = transmission(settled.iris, 1.0, at, -at[:, None], footprint=0.004)
+    # the pupil's aberration is a few per mille of its radius
+    assert np.abs(np.clip(found, 0, 1) - blades).sum() < 0.02 * blades.sum()
+
+
+def test_rims_make_a_cats_eye_off_the_axis():
+    settled, shot = shot_of()
+    found = traced_pupil(settled.lens, shot, 2.8)
+    area = found.sum() * (2 * PUPIL_SPAN / 1024) ** 2
+    # etendue: the area in cosines times the image's area, which grows as 1 / cos^3, is the light (but for distortion)
+    _, straight = shot_of(lights=(Light(field_deg=(0.0, 0.0)),))
+    flux = direct_image(settled.lens, shot).throughput_mm2[3] / direct_image(settled.lens, straight).throughput_mm2[3]
+    assert area / math.pi < 0.8
+    assert area / math.pi == pytest.approx(flux * shot.incidence.cosine**3, rel=0.03)
+    y, x = np.nonzero(found > 0.5)
+    spread = np.linalg.eigvalsh(np.cov(x, y))
+    assert spread[0] < 0.8 * spread[1]
+
+
+def picture(name="starburst", **changes):
+    given = {
+        "lens": "heliar-tronnier", "f_number": 8.0, "lights": (Light(field_deg=(5.0, 2.0)),),
+        "camera": Camera(size_px=(300, 200)), "quality": Quality(mode="draft", wavelengths=3, paths="same-side"),
+        "output": Output(layers="passes"), **changes,
+    }  # fmt: skip
+    return next(layer.pixels for layer in render(Project(**given)).layers if layer.name == name)
+
+
+def test_the_lights_disc_blurs_and_keeps_the_flux():
+    point = picture()
+    for degrees in (0.02, 0.53, 3.0):
+        disc = picture(lights=(Light(field_deg=(5.0, 2.0), diameter_deg=degrees),))
+        assert disc.sum(dtype=float) == pytest.approx(point.sum(dtype=float), rel=2e-3)
+        radius = 99.24 * math.tan(math.radians(degrees / 2)) / (36 / 300)
+        if radius > 2:
+            bright = disc[..., 1] > 0.5 * disc[..., 1].max()
+            assert bright.sum() == pytest.approx(math.pi * radius**2, rel=0.1)
+
+
+def test_disc_blur_of_a_dot_is_the_disc():
+    dot = np.zeros((41, 51, 1))
+    dot[20, 25] = 1.0
+    disc = disc_blur(dot, (7.0, 5.0))[..., 0]
+    assert disc.sum() == pytest.approx(1.0, rel=1e-12)
+    y, x = np.mgrid[-20:21, -25:26]
+    assert disc[(x / 7) ** 2 + (y / 5) ** 2 < 0.7] == pytest.approx(1 / (math.pi * 35), rel=0.01)
+    assert np.abs(disc[(x / 7) ** 2 + (y / 5) ** 2 > 1.4]).max() < 1e-12
+
+
+def test_the_artists_hand_is_one_switch_away_from_the_physics():
+    plain = picture()
+    assert picture(starburst=Starburst(intensity=3.0)) == pytest.approx(3 * plain, rel=1e-5)
+    wide = picture(starburst=Starburst(size=40.0))
+    assert wide.sum(dtype=float) == pytest.approx(plain.sum(dtype=float), rel=0.1)
+    assert wide.max() < 0.6 * plain.max()
+    smeared = picture(starburst=Starburst(spiral_deg=10.0))
+    assert smeared.sum(dtype=float) == pytest.approx(plain.sum(dtype=float), rel=0.01)
+    by_hand = Starburst(size=4.0, intensity=3.0, spiral_deg=10.0)
+    np.testing.assert_array_equal(picture(starburst=by_hand, art=Art(physical=True)), plain)
+
+
+def test_dirt_takes_its_light_from_the_direct_image():
+    dirt = Dirt(dust_per_mm2=5.0, dust_um=(50.0, 200.0), seed=2)
+    settled, _ = shot_of(lens="heliar-tronnier", f_number=8.0)
+    kept = pupil_pattern(settled.iris, radius_mm=settled.order.stop_semi_diameter, soil=Soil(dirt)).transmittance
+    assert 0.5 < kept < 0.97
+    assert picture(dirt=dirt).sum(dtype=float) == pytest.approx(kept * picture().sum(dtype=float), rel=0.01)
+
+
+def test_a_drawn_image_of_dirt(tmp_path):
+    from PIL import Image
+
+    image = np.full((200, 200), 255, np.uint8)
+    image[:, 98:102] = 0
+    Image.fromarray(image).save(tmp_path / "hair.png")
+    with_hair = picture(dirt=Dirt(image=str(tmp_path / "hair.png")))
+    plain = picture()
+    # a bar of 1/50 of the width takes 2 / (50 pi) * 2 of a disc's light
+    assert with_hair.sum(dtype=float) == pytest.approx((1 - 0.04 * 2 / math.pi) * plain.sum(dtype=float), rel=5e-3)
+    row = int(100 - 99.24 * math.tan(math.radians(2.0)) / 0.12)
+    beside = np.r_[0:100]
+    gain = with_hair[row - 2 : row + 3, beside].sum() / plain[row - 2 : row + 3, beside].sum()
+    assert gain > 1.5
+    assert gain > 1.3 * with_hair[:, 270:290].sum() / plain[:, 270:290].sum()
