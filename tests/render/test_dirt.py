@@ -241,3 +241,17 @@ def test_a_drawn_image_of_dirt(tmp_path):
     gain = with_hair[row - 2 : row + 3, beside].sum() / plain[row - 2 : row + 3, beside].sum()
     assert gain > 1.5
     assert gain > 1.3 * with_hair[:, 270:290].sum() / plain[:, 270:290].sum()
+
+
+def test_dirt_in_ghosts_takes_its_share_and_leaves_the_edges():
+    dirt = Dirt(dust_per_mm2=1.0, dust_um=(300.0, 800.0), seed=2, in_ghosts=True)
+    given = {"f_number": 5.6, "iris": Iris(blades=6), "quality": Quality(wavelengths=1, paths="same-side")}
+    clean, dirty = picture("ghosts", **given), picture("ghosts", dirt=dirt, **given)
+    only_burst = picture("ghosts", dirt=dirt.replace(in_ghosts=False), **given)
+    np.testing.assert_array_equal(only_burst, clean)
+    settled, _ = shot_of(lens="heliar-tronnier", f_number=5.6, iris=Iris(blades=6))
+    kept = pupil_pattern(settled.iris, radius_mm=settled.order.stop_semi_diameter, soil=Soil(dirt)).transmittance
+    assert 0.6 < kept < 0.9
+    # ghosts bounded by the entrance see another part of the dirt
+    assert dirty.sum(dtype=float) == pytest.approx(kept * clean.sum(dtype=float), rel=0.15)
+    assert (dirty <= clean + 1e-4 * clean.max()).all()

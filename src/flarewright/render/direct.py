@@ -123,9 +123,8 @@ def traced_pupil(lens: Lens, shot: Shot, f_number: float) -> Floats | None:
     bundle = trace_grid(packed, path, tilt, (opening.radius, opening.inner), region, tolerance=0.25, scale=_SCALE)
     w = (len(packed.wavelengths_nm) - 1) // 2
     data = trace_bundle(packed, w, bundle, tilt).copy()
-    sums = measure_bundle(
-        data, bundle.pupil, bundle.triangles, path.stop_crossings, opening.blades, shot.incidence.axes
-    )
+    axes, crossings = shot.incidence.axes, path.stop_crossings
+    sums = measure_bundle(data, bundle.pupil, bundle.triangles, crossings, opening.blades, axes, bundle.halves)
     if sums[0] <= 0.0:
         return None
     # a second plane tells the slopes
@@ -140,9 +139,9 @@ def traced_pupil(lens: Lens, shot: Shot, f_number: float) -> Floats | None:
     to_pixels = np.array([PUPIL_SIDE / 2, PUPIL_SIDE / 2, zoom, zoom])
     densities = node_densities(data, bundle.pupil, bundle.triangles)
     draw_bundle(
-        data, bundle.pupil, bundle.triangles, densities, path.stop_crossings, opening.blades, opening.mask,
-        opening.half, shot.incidence.axes, to_pixels, 1.0, np.array([1.0, 0.0, 0.0]), plane,
-        np.empty(PUPIL_SIDE + 1, dtype=np.float32),
+        data, bundle.pupil, bundle.triangles, densities, crossings, opening.blades, opening.mask,
+        opening.half, axes, to_pixels, 1.0, np.array([1.0, 0.0, 0.0]), plane,
+        np.empty(PUPIL_SIDE + 1, dtype=np.float32), bundle.halves,
     )  # fmt: skip
     lit = plane[0].astype(np.float64)
     level = float(np.median(lit[lit > 0.3 * lit.max()])) if lit.max() > 0.0 else 0.0

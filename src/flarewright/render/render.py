@@ -20,8 +20,8 @@ from .compose import beauty
 from .direct import DirectImage, direct_image
 from .ghosts import render_ghosts
 from .prepare import Settled, settle
-from .shot import Shot, make_opening, make_shots
-from .starburst_pass import starburst_of
+from .shot import Shot, make_opening, make_shots, soiled_opening
+from .starburst_pass import read_soil, starburst_of
 
 if TYPE_CHECKING:
     from .ledger import Ledger
@@ -92,15 +92,19 @@ def render(
     # the judge shows the physics and nothing else
     art = ResolvedArt() if project.quality.mode == "reference" else resolve_art(settled)
     opening = make_opening(settled, mask)
-    shots = make_shots(settled, opening)
+    shots = seen = make_shots(settled, opening)
+    soil = read_soil(project.dirt)
+    if soil is not None and project.dirt.in_ghosts:
+        dirty = soiled_opening(opening, settled.iris, settled.order.stop_semi_diameter, soil)
+        seen = tuple(replace(shot, opening=dirty) for shot in shots)
     if project.quality.mode == "reference":
         drawn = _reference(settled, mask, run, threads, progress)
     else:
-        drawn = _ghosts(settled, shots, art, threads, progress)
+        drawn = _ghosts(settled, seen, art, threads, progress)
     images = [direct_image(settled.lens, shot) for shot in shots]
     passes = list(drawn.passes)
     if project.output.starburst:
-        passes.insert(0, starburst_of(settled, shots, images, mask))
+        passes.insert(0, starburst_of(settled, shots, images, mask, soil))
     passes = [graded(layer, art.gain.get(layer.name, 1.0)) for layer in passes]
     others = [graded(layer, art.gain.get("ghosts", 1.0)) for layer in drawn.others]
     whole = beauty(passes, project.camera.size_px)

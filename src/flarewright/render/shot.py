@@ -2,22 +2,26 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..model import Light, Project
+from ..model import Iris, Light, Project
 from ..model.camera import Colorspace
 from ..optics.bundle import Incidence, incidence
-from ..optics.iris import blade_edges, outline
+from ..optics.diffraction import Soil
+from ..optics.dirt import lay_elements, rasterise
+from ..optics.iris import blade_edges, outline, transmission
 from ..optics.pack import PackedLens, facing, pack_lens, resolve_coatings
 from ..optics.spectrum import band_weights, traced_wavelengths
 from .prepare import Settled
 
 Floats = NDArray[np.float64]
 
+# the picture of the dirt in ghosts: pixels a side, and half its width in radii
+SOIL_SIDE, SOIL_SPAN = 1024, 1.65
 # straight edges that stand for a rounded iris in draft quality
 DRAFT_EDGES = 48
 
@@ -135,6 +139,35 @@ def make_opening(settled: Settled, mask: Floats | None) -> Opening:
         mask=None,
         half=1.0,
     )
+
+
+def soiled_opening(opening: Opening, iris: Iris, semi: float, soil: Soil) -> Opening:
+    """Lay dirt on an opening, for ghosts.
+
+    Parameters
+    ----------
+    opening : Opening
+        From `make_opening`; its edges stay as they are.
+    iris : Iris
+    semi : float
+        Semi-diameter of the round opening, mm.
+    soil : Soil
+
+    Returns
+    -------
+    Opening
+        With a mask that holds what dirt lets through, and the iris image where there is one.
+    """
+    spacing = 2.0 * SOIL_SPAN / SOIL_SIDE
+    at = np.asarray((np.arange(SOIL_SIDE) + 0.5) * spacing - SOIL_SPAN, dtype=np.float64)
+    _, light = rasterise(lay_elements(soil.dirt, semi), at)
+    for image, turned in ((soil.image, Iris()), (opening.mask, iris)):
+        if image is not None:
+            seen = transmission(turned, 1.0, at, at[:, None], mask=image)
+            if image is soil.image:
+                seen[np.maximum(np.abs(at), np.abs(at)[:, None]) >= 1.0] = 1.0
+            light = light * seen
+    return replace(opening, mask=np.ascontiguousarray(light[::-1]), half=SOIL_SPAN * semi)
 
 
 def _straight(border: Floats) -> Floats:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..errors import ProjectError
 from ..io.mask_image import read_mask
-from ..model import Iris, Layer, Lines, Starburst
+from ..model import Dirt, Iris, Layer, Lines, Starburst
 from ..optics.diffraction import BladeWings, Pattern, Soil, pupil_pattern
 from .direct import PUPIL_SPAN, DirectImage, traced_pupil
 from .prepare import Settled
@@ -25,7 +25,7 @@ DIFFRACTION_STEP_NM = 5.0
 # turned and grown copies that stand for the artist's smear
 SPIRAL_COPIES = 9
 
-__all__ = ["disc_blur", "starburst_of"]
+__all__ = ["disc_blur", "read_soil", "starburst_of"]
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,34 @@ class _Scene:
     look: Starburst
 
 
-def starburst_of(settled: Settled, shots: Sequence[Shot], images: Sequence[DirectImage], mask: Floats | None) -> Layer:
+def read_soil(dirt: Dirt) -> Soil | None:
+    """Read what lies on the pupil; None when it is clean.
+
+    Parameters
+    ----------
+    dirt : Dirt
+
+    Returns
+    -------
+    Soil or None
+
+    Raises
+    ------
+    ProjectError
+        When its image cannot be read.
+    """
+    if dirt.clean:
+        return None
+    return Soil(dirt, None if dirt.image is None else read_mask(dirt.image, what="dirt"))
+
+
+def starburst_of(
+    settled: Settled,
+    shots: Sequence[Shot],
+    images: Sequence[DirectImage],
+    mask: Floats | None,
+    soil: Soil | None = None,
+) -> Layer:
     """Draw the direct image of every light, spread by diffraction at the iris.
 
     Parameters
@@ -48,6 +75,8 @@ def starburst_of(settled: Settled, shots: Sequence[Shot], images: Sequence[Direc
         One a light.
     mask : ndarray, shape (A, B), or None
         The iris as an image.
+    soil : Soil or None
+        From `read_soil`.
 
     Returns
     -------
@@ -58,14 +87,11 @@ def starburst_of(settled: Settled, shots: Sequence[Shot], images: Sequence[Direc
     Raises
     ------
     ProjectError
-        When the image of the dirt cannot be read, or dirt leaves no light.
+        When dirt leaves no light.
     """
     project = settled.project
-    dirt = project.dirt
-    soil = None
-    if not dirt.clean:
-        soil = Soil(dirt, None if dirt.image is None else read_mask(dirt.image, what="dirt"))
-    look = Starburst(cats_eye=project.starburst.cats_eye) if project.art.physical else project.starburst
+    physical = project.art.physical or project.quality.mode == "reference"
+    look = Starburst(cats_eye=project.starburst.cats_eye) if physical else project.starburst
     scene = _Scene(settled, mask, soil, look)
     width, height = shots[0].size_px
     total = np.zeros((height, width, 3), dtype=np.float32)
@@ -112,7 +138,7 @@ def _one_light(scene: _Scene, shot: Shot, image: DirectImage) -> NDArray[np.floa
             fine_nm,
             shot.weights(fine_nm) * (flux * pattern.transmittance / len(turns))[:, None],
             pattern=pattern,
-            split=NEAR_SPLIT if scene.settled.project.quality.mode == "final" else 1,
+            split=NEAR_SPLIT if scene.settled.project.quality.mode != "draft" else 1,
         )
         picture = drawn if picture is None else picture + drawn
     if picture is None or radius == 0.0:
