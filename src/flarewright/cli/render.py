@@ -154,7 +154,9 @@ def render(
     threads: Annotated[
         int | None, typer.Option(min=1, help="All cores when left out; pixels do not change.", rich_help_panel=_WORK)
     ] = None,
-    seed: Annotated[int | None, typer.Option(help="Begins all random numbers: rays, dirt, rough edges.", rich_help_panel=_REFERENCE)] = None,
+    seed: Annotated[
+        int | None, typer.Option(help="Begins all random numbers: rays, dirt, rough edges.", rich_help_panel=_REFERENCE)
+    ] = None,
     error: Annotated[
         float | None,
         typer.Option(help="Go on to this relative standard error (0.02).", rich_help_panel=_REFERENCE),
