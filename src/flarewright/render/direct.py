@@ -132,17 +132,18 @@ def traced_pupil(lens: Lens, shot: Shot, f_number: float) -> Floats | None:
     slope = behind[:, X : Y + 1] - data[:, X : Y + 1]
     cosines = slope / np.sqrt(1.0 + (slope**2).sum(axis=1, keepdims=True))
     weight = data[:, WEIGHT] * data[:, ALIVE] * (data[:, REL] <= 1.0)
-    middle = (weight @ cosines[:, 1]) / weight.sum()
-    data[:, X], data[:, Y] = 2.0 * f_number * cosines[:, 0], 2.0 * f_number * (cosines[:, 1] - middle)
-    plane = np.zeros((3, PUPIL_SIDE, PUPIL_SIDE), dtype=np.float32)
+    middle = (weight @ cosines) / weight.sum()
+    if bundle.halves == 2:
+        middle[0] = 0.0
+    data[:, X : Y + 1] = 2.0 * f_number * (cosines - middle)
+    plane = blank_plane(PUPIL_SIDE, PUPIL_SIDE)
     zoom = 0.5 * PUPIL_SIDE / PUPIL_SPAN
-    to_pixels = np.array([PUPIL_SIDE / 2, PUPIL_SIDE / 2, zoom, zoom])
+    view = np.array([PUPIL_SIDE / 2, PUPIL_SIDE / 2, zoom, zoom])
     densities = node_densities(data, bundle.pupil, bundle.triangles)
     draw_bundle(
         data, bundle.pupil, bundle.triangles, densities, crossings, opening.blades, opening.mask,
-        opening.half, axes, to_pixels, 1.0, np.array([1.0, 0.0, 0.0]), plane,
-        np.empty(PUPIL_SIDE + 1, dtype=np.float32), bundle.halves,
+        opening.half, axes, view, 1.0, np.array([1.0, 0.0, 0.0]), plane, bundle.halves,
     )  # fmt: skip
-    lit = plane[0].astype(np.float64)
+    lit = to_pixels(plane, PUPIL_SIDE)[:, :, 0].astype(np.float64)
     level = float(np.median(lit[lit > 0.3 * lit.max()])) if lit.max() > 0.0 else 0.0
     return lit / level if level > 0.0 else None
