@@ -254,4 +254,5 @@ def test_dirt_in_ghosts_takes_its_share_and_leaves_the_edges():
     assert 0.6 < kept < 0.9
     # ghosts bounded by the entrance see another part of the dirt
     assert dirty.sum(dtype=float) == pytest.approx(kept * clean.sum(dtype=float), rel=0.15)
-    assert (dirty <= clean + 1e-4 * clean.max()).all()
+    # smooth cells are drawn whole where nothing cuts them, triangle by triangle through a mask
+    assert (dirty <= clean + 0.02 * clean.max()).all()
