@@ -29,6 +29,7 @@ from flarewright.model import (
     Lens,
     Medium,
     PerRow,
+    Position,
     QuarterWave,
     Stack,
     Standard,
@@ -428,6 +429,7 @@ def lenses(draw):
     rows.insert(draw(st.integers(0, len(rows))), Stop(thickness=draw(st.floats(-100.0, 100.0))))
     if isinstance(rows[-1], Stop):
         rows[-2] = rows[-2].replace(medium=None)
+    stop = next(k for k, row in enumerate(rows) if isinstance(row, Stop))
     preset = st.lists(st.none() | coatings, min_size=len(rows), max_size=len(rows)).map(tuple)
     positive = st.none() | st.floats(1e-3, 1e6)
     return Lens(
@@ -450,6 +452,22 @@ def lenses(draw):
         else draw(
             st.lists(st.builds(Element, rows=st.just((0, 0)), decentre=pairs.filter(bool)), max_size=1).map(tuple)
         ),
+        positions=draw(
+            st.lists(
+                st.builds(
+                    Position,
+                    name=texts.filter(str.strip),
+                    gaps=st.floats(0.0, 90.0).map(lambda gap: ((stop, gap),)),
+                    focal_length=positive,
+                    focus_distance=positive,
+                    field_deg=st.none() | st.floats(0.1, 89.0),
+                ),
+                max_size=1,
+            ).map(tuple)
+        )
+        if not isinstance(rows[-1], Stop)
+        else (),
+        squeeze=draw(st.none() | st.floats(0.25, 4.0)),
         coating_presets=draw(st.dictionaries(texts, preset, max_size=2)),
     )
 

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from flarewright.errors import LensError
-from flarewright.model import Camera, Figure, Iris, Light, Output, Project, Quality, Stop
+from flarewright.model import Camera, Figure, Imperfection, Iris, Light, Output, Plate, Project, Quality, Stop
 from flarewright.optics.paraxial import first_order
 from flarewright.optics.shape import transposed
 from flarewright.render.prepare import load_lens
+from flarewright.render.reference import ORDER_2
 from flarewright.render.render import render
 
 SIZE = (96, 96)
@@ -87,3 +88,35 @@ def test_a_figure_image_is_read_and_tears_the_symmetry(tmp_path):
     missing = lens.replace(rows=(bumpy.rows[0].replace(figure=figure.replace(image="no.png")), *lens.rows[1:]))
     with pytest.raises(LensError, match="no such figure image"):
         picture(missing, (0, 0))
+
+
+BUILT = {
+    "one sample of it": {"imperfection": Imperfection(seed=2, decentre_um=200.0, tilt_arcmin=20.0, figure_nm=300.0)},
+    "behind a filter, before a mirror": {
+        "filter": Plate(thickness=2.0, n_d=1.5, v_d=60.0),
+        "mirror": {"sensor_reflectance": 0.2, "cover_glass": Plate(thickness=1.0, gap=1.0, n_d=1.5, v_d=60.0)},
+    },
+    "anamorphic": {"lens": "anamorphic-heliar-2x"},
+}
+
+
+@pytest.mark.parametrize("name", BUILT)
+def test_the_judge_agrees(name):
+    """Final quality's ghosts in the picture against random rays through the same lens, two reflections each."""
+    parts = {"lens": "triplet-pestrecov", **BUILT[name]}
+    camera = Camera(size_px=(64, 48), sensor_mm=(36.0, 27.0), **parts.pop("mirror", {}))
+    quality = Quality(wavelengths=3, bridge=False, reference_error=4e-3, reference_error_of="total")
+    project = Project(
+        **parts, lights=(Light(field_deg=(6.0, 3.0)),), f_number=5.6, camera=camera, quality=quality,
+        output=Output(layers="passes", starburst=False),
+    )  # fmt: skip
+
+    def flux(mode, layer):
+        rendering = render(project.replace(quality=quality.replace(mode=mode)))
+        return rendering, next(a.pixels.sum(dtype=np.float64) for a in rendering.layers if a.name == layer)
+
+    final = flux("final", "ghosts")[1]
+    judged, mean = flux("reference", ORDER_2)
+    error = judged.summary["reference"]["relative_standard_error"] * mean
+    assert mean > 0.0
+    assert abs(final - mean) < 4.0 * error + 2e-3 * mean

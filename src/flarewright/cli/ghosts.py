@@ -36,6 +36,20 @@ def ghosts(
         float | None, typer.Option(help="Distance of the plane in focus, mm; infinity when left out.")
     ] = None,
     sensor_distance: Annotated[float | None, typer.Option(help="Last vertex to sensor, mm.")] = None,
+    zoom: Annotated[
+        str | None, typer.Option(metavar="MM|NAME", help="Focal length, or a position of the lens file.")
+    ] = None,
+    filter_plate: Annotated[
+        str | None, typer.Option("--filter", metavar="GLASS:MM[:GAP]", help="A plane filter in front: N-BK7:2.")
+    ] = None,
+    cover_glass: Annotated[
+        str | None, typer.Option(metavar="GLASS:MM[:GAP]", help="Plane glass in front of the sensor: N-BK7:2:0.5.")
+    ] = None,
+    sensor_reflectance: Annotated[float, typer.Option(help="Part of the light the sensor mirrors back, 0 to 1.")] = 0.0,
+    imperfection: Annotated[
+        str | None,
+        typer.Option(metavar="SEED[:UM:ARCMIN[:NM]]", help="One sample of the lens within tolerances."),
+    ] = None,
     brightest: Annotated[int | None, typer.Option(min=1, help="List only so many.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
@@ -44,6 +58,7 @@ def ghosts(
     Rays are traced, not paraxial, to the unbounded sensor plane. The throughput is the flux on it when the light gives
     an irradiance of 1 on a plane facing it; the peak irradiance is relative to the direct image's flux.
     """
+    from ..io.plate_text import parse_imperfection, parse_plate
     from ..io.project_file import parse_coating_choice
 
     angles = field_angles(light)
@@ -53,6 +68,14 @@ def ghosts(
         raise ProjectError(f"--paths {paths!r} is unknown; choose all or same-side")
     choice = parse_coating_choice(coating)
     f_number = chosen_fstop(fstop)
+
+    in_front = None if filter_plate is None else parse_plate(filter_plate, "--filter")
+    behind = None if cover_glass is None else parse_plate(cover_glass, "--cover-glass")
+    sample = None if imperfection is None else parse_imperfection(imperfection)
+    if not 0.0 <= sensor_reflectance <= 1.0:
+        raise ProjectError(
+            f"--sensor-reflectance {sensor_reflectance:g} is no part of the light; choose between 0 and 1"
+        )
 
     from ..render.analysis import ghosts as analyse
     from ..render.first_run import compile_for_analysis
@@ -73,6 +96,11 @@ def ghosts(
         paths=paths,
         sensor_distance=sensor_distance,
         focus_distance=focus,
+        zoom=zoom,
+        sensor_reflectance=sensor_reflectance,
+        imperfection=sample,
+        filter_plate=in_front,
+        cover_glass=behind,
     )
     tell(remarks)
     if as_json:

@@ -28,6 +28,9 @@ def show(
         str | None, typer.Option(metavar="X,Y", help="Draw the rays of this light beside those of the axis.")
     ] = None,
     ghost: Annotated[str | None, typer.Option(metavar="J-I", help="Draw the rays of this ghost path.")] = None,
+    zoom: Annotated[
+        str | None, typer.Option(metavar="MM|NAME", help="Focal length, or a position of the lens file.")
+    ] = None,
     fstop: Annotated[float | None, typer.Option(help="f-number; wide open when left out.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
@@ -38,10 +41,10 @@ def show(
     if plot is not None:
         check_place(plot, ".svg")
 
-    from ..render.prepare import first_order, load_lens
+    from ..render.prepare import build, first_order, load_lens
 
     remarks: list[str] = []
-    prescription = load_lens(lens, remarks=remarks)
+    prescription = build(load_lens(lens, remarks=remarks), zoom=zoom).lens
     order = first_order(prescription, f_number)
     if plot is not None:
         from ..io.atomic import write_atomically
@@ -119,6 +122,8 @@ def as_data(lens: Lens, order: FirstOrder) -> dict[str, Any]:
         "stop_semi_diameter_mm": order.stop_semi_diameter,
         "sensor_distance_mm": order.sensor_distance,
         "blades": lens.iris.blades,
+        "positions": [position.name for position in lens.positions],
+        "squeeze": lens.squeeze,
         "elements": [element.model_dump(mode="json") for element in lens.elements],
         "coating_presets": sorted(lens.coating_presets),
         "rows": rows,
@@ -190,6 +195,10 @@ def _print(data: dict[str, Any]) -> None:
         f"exit pupil {data['exit_pupil_diameter_mm']:.3f} wide at z = {data['exit_pupil_z_mm']:.3f} "
         "(z from the first vertex)"
     )
+    if data["squeeze"]:
+        terminal.print(f"anamorphic: squeezes the picture across by {data['squeeze']:g}")
+    if data["positions"]:
+        terminal.print(f"positions (--zoom): {', '.join(data['positions'])}, or a focal length between them")
     for element in data["elements"]:
         terminal.print(
             "element of rows {}-{}: decentred {:g}, {:g} mm, tilted {:g}, {:g} degrees".format(

@@ -21,7 +21,7 @@ def check(
     from ..render.prepare import settle
 
     settled = settle(read_project(file))
-    resolve_coatings(settled.lens, settled.project.coating)
+    resolve_coatings(settled.lens, settled.coating)
     resolve_art(settled)
     if as_json:
         print_json(

@@ -106,6 +106,44 @@ def render(
     starburst_size: Annotated[
         float | None, typer.Option(help="Stretches the starburst by hand; 1 is physics.", rich_help_panel=_ART)
     ] = None,
+    zoom: Annotated[
+        str | None,
+        typer.Option(metavar="MM|NAME", help="Focal length, or a position of the lens file.", rich_help_panel=_LENS),
+    ] = None,
+    filter_plate: Annotated[
+        str | None,
+        typer.Option(
+            "--filter",
+            metavar="GLASS:MM[:GAP]",
+            help="A plane filter in front: N-BK7:2, or with its gap to the lens, 1.52:2:10.",
+            rich_help_panel=_LENS,
+        ),
+    ] = None,
+    imperfection: Annotated[
+        str | None,
+        typer.Option(
+            metavar="SEED[:UM:ARCMIN[:NM]]",
+            help="One sample within tolerances: decentre (10 um), tilt (1 arcmin), figure (0 nm rms).",
+            rich_help_panel=_LENS,
+        ),
+    ] = None,
+    cover_glass: Annotated[
+        str | None,
+        typer.Option(
+            metavar="GLASS:MM[:GAP]", help="Plane glass in front of the sensor: N-BK7:2:0.5.", rich_help_panel=_CAMERA
+        ),
+    ] = None,
+    sensor_reflectance: Annotated[
+        float | None,
+        typer.Option(help="Part of the light the sensor mirrors back, 0 to 1 (0).", rich_help_panel=_CAMERA),
+    ] = None,
+    squeeze: Annotated[
+        float | None,
+        typer.Option(help="Of an anamorphic lens; its file's when left out.", rich_help_panel=_CAMERA),
+    ] = None,
+    desqueeze: Annotated[
+        bool, typer.Option("--desqueeze", help="Draw an anamorphic picture wide.", rich_help_panel=_CAMERA)
+    ] = False,
     size: Annotated[
         str | None, typer.Option(metavar="WxH", help="Picture in pixels (1280x720).", rich_help_panel=_CAMERA)
     ] = None,
@@ -228,6 +266,8 @@ def render(
         wavelengths=wavelengths, paths=paths, layers=layers, brightest=brightest, no_starburst=no_starburst,
         colorspace=colorspace, half=half, mute=mute or [], solo=solo or [], gain=gain or [], physical=physical,
         seed=seed, error=error, error_of=error_of, samples=samples, resumed=None if state is None else state.project,
+        zoom=zoom, filter_plate=filter_plate, imperfection=imperfection, cover_glass=cover_glass,
+        sensor_reflectance=sensor_reflectance, squeeze=squeeze, desqueeze=desqueeze,
     )  # fmt: skip
     settings = build_project(flags)
     run = _reference_run(settings, output, state, time_limit)
@@ -340,7 +380,6 @@ def _write(
 
     project = rendering.project
     width, height = project.camera.size_px
-    sensor = project.camera.sensor
     remarks = list(
         write_exr(
             output,
@@ -348,7 +387,7 @@ def _write(
             (width, height),
             pixel_type=project.output.pixel_type,
             metadata={"version": __version__, "project": project_text(project)},
-            pixel_aspect=(sensor[0] / width) / (sensor[1] / height),
+            pixel_aspect=project.camera.pixel_aspect,
             colorspace=project.output.colorspace,
             full_windows=full_windows,
         )

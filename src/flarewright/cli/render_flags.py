@@ -10,6 +10,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from ..errors import ProjectError
+from ..io.plate_text import parse_imperfection, parse_plate
 from ..io.project_file import ProjectFileError, explain, parse_coating_choice, read_project
 from ..io.spectrum_text import parse_spectrum
 from ..model import Art, Iris, Light, Project, Rule
@@ -35,6 +36,8 @@ _FLAG_OF = {
     "camera.sensor_mm": "--sensor",
     "camera.sensor_distance": "--sensor-distance",
     "camera.focus_distance": "--focus",
+    "camera.sensor_reflectance": "--sensor-reflectance",
+    "camera.squeeze": "--squeeze",
     "quality.mode": "--quality",
     "quality.wavelengths": "--wavelengths",
     "quality.paths": "--paths",
@@ -88,6 +91,13 @@ class Flags:
     solo: list[str]
     gain: list[str]
     physical: bool
+    zoom: str | None = None
+    filter_plate: str | None = None
+    imperfection: str | None = None
+    cover_glass: str | None = None
+    sensor_reflectance: float | None = None
+    squeeze: float | None = None
+    desqueeze: bool = False
     seed: int | None = None
     error: float | None = None
     error_of: str | None = None
@@ -124,6 +134,12 @@ def build_project(flags: Flags) -> Project:
         fields["f_number"] = flags.fstop
     if flags.coating is not None:
         fields["coating"] = parse_coating_choice(flags.coating)
+    if flags.zoom is not None:
+        fields["zoom"] = flags.zoom
+    if flags.filter_plate is not None:
+        fields["filter"] = parse_plate(flags.filter_plate, "--filter")
+    if flags.imperfection is not None:
+        fields["imperfection"] = parse_imperfection(flags.imperfection)
     if (iris := _iris(flags, fields["lens"], base)) is not None:
         fields["iris"] = iris
     for section, changes in _sections(flags).items():
@@ -160,6 +176,10 @@ def _sections(flags: Flags) -> dict[str, dict[str, Any]]:
             "sensor_mm": sensor,
             "sensor_distance": flags.sensor_distance,
             "focus_distance": flags.focus,
+            "cover_glass": None if flags.cover_glass is None else parse_plate(flags.cover_glass, "--cover-glass"),
+            "sensor_reflectance": flags.sensor_reflectance,
+            "squeeze": flags.squeeze,
+            "desqueeze": True if flags.desqueeze else None,
         },
         "quality": {
             "mode": flags.quality,

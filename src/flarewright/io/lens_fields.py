@@ -66,6 +66,8 @@ TOP_NUMBERS = {
     ),
 }
 
+TOP_NUMBERS["squeeze"] = NumberField("by how much an anamorphic lens squeezes its picture across", 0.25, 4.0, unit="")
+
 ROW_NUMBERS = {
     "conic": NumberField("conic constant, 0 is a sphere", -1e6, 1e6, unit=""),
     "thickness": NumberField("distance to the next row's vertex", -1000.0, 10000.0),
@@ -83,7 +85,7 @@ TOP_TEXTS = {
     "notes": "what was noticed",
 }
 
-TOP_KEYS = ("schema_version", *TOP_TEXTS, *TOP_NUMBERS, "iris", "rows", "elements", "coating_presets")
+TOP_KEYS = ("schema_version", *TOP_TEXTS, *TOP_NUMBERS, "iris", "rows", "elements", "positions", "coating_presets")
 STOP_KEYS = ("stop", "thickness")
 SHAPE_KEYS = ("radius_x", "curvature_x", "conic_x", "asphere", "decentre", "tilt_deg", "figure")
 SURFACE_KEYS = ("radius", "curvature", "glass", "semi_diameter_estimated", "coating", *ROW_NUMBERS, *SHAPE_KEYS)

@@ -11,7 +11,7 @@ from flarewright.model.iris import Iris
 from .atomic import write_atomically
 from .coating_text import UNCOATED, format_coating
 from .lens_fields import TOP_NUMBERS, TOP_TEXTS
-from .shape_fields import shape_parts
+from .shape_fields import POSITION_NUMBERS, shape_parts
 
 
 def write_lens(lens: Lens, path: str | Path) -> None:
@@ -50,6 +50,15 @@ def format_lens(lens: Lens) -> str:
     for element in lens.elements:
         lines += ["", "[[elements]]", f"rows = [{element.rows[0]}, {element.rows[1]}]"]
         lines += [f"{key} = [{', '.join(map(_number, getattr(element, key)))}]" for key in ("decentre", "tilt_deg")]
+    for position in lens.positions:
+        gaps = ", ".join(f"{row} = {_number(gap)}" for row, gap in position.gaps)
+        lines += ["", "[[positions]]", f"name = {_quoted(position.name)}"]
+        lines += [
+            f"{key} = {_number(getattr(position, key))}"
+            for key in POSITION_NUMBERS
+            if getattr(position, key) is not None
+        ]
+        lines.append(f"gaps = {{ {gaps} }}")
     if lens.iris != Iris():
         lines += ["", "[iris]", *(f"{key} = {_value(value)}" for key, value in lens.iris if value is not None)]
     if lens.coating_presets:

@@ -28,11 +28,14 @@ from ..model import light as lights
 from ..model import project as choices
 from ..model import starburst as starbursts
 from ..model.camera import Camera
+from ..model.imperfection import Imperfection
 from ..model.iris import Iris
 from ..model.lens import Lens, Surface
+from ..model.plate import Plate
 from ..model.project import CoatingChoice, Output, Project, Quality
 from .coating_text import coating_from, parse_coating, read_coating_file
 from .lens_file import lens_from_table
+from .plate_text import parse_plate
 from .project_text import ABOUT, lens_location, project_text
 from .sentences import count, did_you_mean, shorten
 from .spectrum_text import parse_spectrum
@@ -156,9 +159,32 @@ def _expanded(data: dict[str, Any], folder: Path, problems: list[str]) -> dict[s
         except FlarewrightError as error:
             problems.append(f"coating: {error}")
             del out["coating"]
+    for section, key in (("", "filter"), ("camera", "cover_glass")):
+        _expand_plate(out, section, key, problems)
     if isinstance(out.get("lights"), list):
         out["lights"] = [_light(light, f"lights[{k}]", folder, problems) for k, light in enumerate(out["lights"])]
     return out
+
+
+def _expand_plate(out: dict[str, Any], section: str, key: str, problems: list[str]) -> None:
+    """Let a plate be a short text, "N-BK7:2:5", and its coating too."""
+    table = out.get(section) if section else out
+    where = f"{section}.{key}" if section else key
+    if not isinstance(table, dict) or key not in table:
+        return
+    plate = table[key]
+    try:
+        if isinstance(plate, str):
+            plate = parse_plate(plate, where)
+        elif isinstance(plate, dict) and isinstance(plate.get("coating"), str):
+            plate = {**plate, "coating": parse_coating(plate["coating"])}
+    except FlarewrightError as error:
+        problems.append(str(error) if isinstance(plate, str) else f"{where}.coating: {error}")
+        plate = None
+    if section:
+        out[section] = {**table, key: plate}
+    else:
+        out[key] = plate
 
 
 def _embedded_lens(table: dict[str, Any], folder: Path, problems: list[str]) -> Any:
@@ -307,6 +333,9 @@ _SECTIONS: dict[str, tuple[type[BaseModel], ...]] = {
     "quality": (Quality,),
     "output": (Output,),
     "lights": (lights.Light,),
+    "filter": (Plate,),
+    "cover_glass": (Plate,),
+    "imperfection": (Imperfection,),
     "spectrum": (lights.EqualEnergy, lights.D65, lights.BlackBody, lights.Lines, lights.Tabulated),
     "coating": (
         choices.Preset, choices.Everywhere, choices.PerRow, coatings.QuarterWave, coatings.Film, coatings.Standard,

@@ -7,7 +7,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from flarewright.model import Element, Figure, Surface
+from flarewright.model import Element, Figure, Position, Surface
 from flarewright.model.figure import LARGEST_NM, MOST_NOLL
 from flarewright.model.lens import MOST_TERMS
 
@@ -22,6 +22,14 @@ TERM = NumberField("a term of A4 r^4 + A6 r^6 + ...", -1e3, 1e3, unit="")
 OFFSET = NumberField("decentre", -100.0, 100.0)
 TILT = NumberField("tilt", -45.0, 45.0, unit="degrees")
 HEIGHT_NM = NumberField("height", -LARGEST_NM, LARGEST_NM, unit="nm")
+
+GAP = NumberField("gap", 0.0, 10000.0)
+POSITION_NUMBERS = {
+    "focal_length": NumberField("focal length there, as the source states it", 0.0, 1e9, low_open=True),
+    "focus_distance": NumberField("plane in focus there, for positions of the focus", 0.0, 1e9, low_open=True),
+    "f_number": NumberField("f-number there, where it is another", 0.3, 256.0, low_open=True, unit=""),
+    "field_deg": NumberField("half field of view there", 0.0, 90.0, True, True, unit="degrees"),
+}
 
 WAVE_NM = 632.8
 """Figure errors in waves are waves of the red helium-neon line, as test plates are read."""
@@ -86,6 +94,60 @@ def read_elements(table: object, problems: list[str]) -> tuple[Element, ...]:
         if len(problems) == before:
             found.append(Element(**fields))
     return tuple(found)
+
+
+def read_positions(table: object, problems: list[str]) -> tuple[Position, ...]:
+    """Check the `[[positions]]` of a lens file; what they make together the lens itself checks."""
+    if not isinstance(table, list):
+        problems.append(f"positions is {shorten(table)}: write [[positions]] with name and gaps below it")
+        return ()
+    found = []
+    for number, entry in enumerate(table):
+        where = f"position {number}"
+        if not isinstance(entry, dict):
+            problems.append(f"{where} is {shorten(entry)}: a table with name and gaps was expected")
+            continue
+        before = len(problems)
+        _unknown(entry, ("name", "gaps", *POSITION_NUMBERS), where, problems)
+        name, gaps = entry.get("name"), entry.get("gaps")
+        if not isinstance(name, str) or not name.strip():
+            problems.append(f'{where}: name is {shorten(name)}: give it one, name = "wide" for example')
+        if not isinstance(gaps, dict) or not gaps or not all(key.isdecimal() for key in gaps):
+            problems.append(f"{where}: gaps is {shorten(gaps)}: give the thickness behind rows, gaps = {{ 5 = 8.78 }}")
+            gaps = {}
+        fields: dict[str, Any] = {
+            key: _number(entry[key], f"{where}: {key}", field, problems)
+            for key, field in POSITION_NUMBERS.items()
+            if key in entry
+        }
+        read = [(int(row), _number(gap, f"{where}: gap behind row {row}", GAP, problems)) for row, gap in gaps.items()]
+        if len(problems) == before:
+            found.append(Position(name=str(name), gaps=tuple((row, gap or 0.0) for row, gap in read), **fields))
+    return tuple(found)
+
+
+def positions_schema() -> dict[str, Any]:
+    """Return the JSON Schema of `positions`."""
+    return {
+        "type": "array",
+        "description": "settings of a zoom, or of the focus: gaps that move",
+        "items": {
+            "type": "object",
+            "additionalProperties": False,
+            "required": ["name", "gaps"],
+            "properties": {
+                "name": {"type": "string", "minLength": 1, "description": "what the setting is called"},
+                "gaps": {
+                    "type": "object",
+                    "minProperties": 1,
+                    "propertyNames": {"pattern": "^[0-9]+$"},
+                    "additionalProperties": GAP.schema(),
+                    "description": "thickness behind each row that moves, the same rows in every position",
+                },
+                **{key: field.schema() for key, field in POSITION_NUMBERS.items()},
+            },
+        },
+    }
 
 
 def _figure(value: object, where: str, folder: Path | None, problems: list[str]) -> Figure | None:

@@ -5,10 +5,12 @@ from .camera import Camera
 from .coating import Bare, Coating, Film, QuarterWave, Stack, Standard
 from .figure import Figure
 from .glass import Dispersion, Medium
+from .imperfection import Imperfection
 from .iris import Iris
 from .layer import Layer
-from .lens import Element, Lens, Row, Stop, Surface
+from .lens import Element, Lens, Position, Row, Stop, Surface
 from .light import D65, BlackBody, EqualEnergy, Light, Lines, Spectrum, Tabulated
+from .plate import Plate
 from .project import AsLens, CoatingChoice, Everywhere, Output, PerRow, Preset, Project, Quality
 from .starburst import Dirt, Starburst
 
@@ -28,6 +30,7 @@ __all__ = [
     "Everywhere",
     "Figure",
     "Film",
+    "Imperfection",
     "Iris",
     "Layer",
     "Lens",
@@ -36,6 +39,8 @@ __all__ = [
     "Medium",
     "Output",
     "PerRow",
+    "Plate",
+    "Position",
     "Preset",
     "Project",
     "Quality",

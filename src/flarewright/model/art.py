@@ -13,7 +13,7 @@ from .base import Frozen
 SELECTOR = re.compile(
     r"(?P<opposite>not\s+)?"
     r"(?:(?P<all>all)|row:(?P<row>\d{1,4})|largest:(?P<largest>\d{1,6})|brightest:(?P<brightest>\d{1,6})|"
-    r"bounded:(?P<bounded>stop|entrance)|(?P<names>\d+(?:-\d+)+(?:,\d+(?:-\d+)+)*))"
+    r"bounded:(?P<bounded>stop|entrance)|(?P<names>(?:sensor|\d+)(?:-\d+)+(?:,(?:sensor|\d+)(?:-\d+)+)*))"
 )
 """How ghosts are chosen; what each form means stands at `Rule`."""
 

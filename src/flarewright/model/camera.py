@@ -7,6 +7,7 @@ from typing import Literal
 from pydantic import Field
 
 from .base import Frozen
+from .plate import Plate
 
 
 class Camera(Frozen):
@@ -20,6 +21,15 @@ class Camera(Frozen):
         Width and height of the sensor that the picture covers; None: 36 mm wide, square pixels.
     sensor_distance : float or None
         Last vertex to sensor in mm, overrides the lens; None: the lens file's, else the paraxial focus.
+    cover_glass : Plate or None
+        A plane plate in front of the sensor.
+    sensor_reflectance : float
+        Part of the light that the sensor sends back as a mirror does; 0: none. It makes ghosts "sensor-I".
+    squeeze : float or None
+        By how much the lens squeezes the picture across: the file's pixel aspect tells viewers to show it wide again.
+        None: the lens file's.
+    desqueeze : bool
+        Draw the picture unsqueezed: `size_px` and the default sensor are those of the wide picture.
     focus_distance : float or None
         Distance of the plane in focus, mm in front of the first vertex, overrides the lens; None: the lens file's,
         else infinity.
@@ -29,12 +39,26 @@ class Camera(Frozen):
     sensor_mm: tuple[float, float] | None = None
     sensor_distance: float | None = Field(None, gt=0.0)
     focus_distance: float | None = Field(None, gt=0.0)
+    cover_glass: Plate | None = None
+    sensor_reflectance: float = Field(0.0, ge=0.0, le=1.0)
+    squeeze: float | None = Field(None, ge=0.25, le=4.0)
+    desqueeze: bool = False
 
     @property
     def sensor(self) -> tuple[float, float]:
         """Width and height of the sensor in mm, the default filled in."""
         width, height = self.size_px
-        return self.sensor_mm or (36.0, 36.0 * height / width)
+        if self.sensor_mm is not None:
+            return self.sensor_mm
+        # as high as without a squeeze, and as wide as makes the picture's pixels square when they are shown
+        high = 36.0 * height / width
+        return (36.0 / (self.squeeze or 1.0), high) if self.desqueeze else (36.0, high)
+
+    @property
+    def pixel_aspect(self) -> float:
+        """Width of a pixel over its height, as a viewer shall show it."""
+        (width, height), (across, down) = self.size_px, self.sensor
+        return (across * (self.squeeze or 1.0) / width) / (down / height)
 
 
 Colorspace = Literal["rec709", "acescg"]

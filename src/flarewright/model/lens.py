@@ -118,6 +118,30 @@ class Element(Frozen):
         return any(self.decentre) or any(self.tilt_deg)
 
 
+class Position(Frozen):
+    """A setting of the zoom or of the focus: the gaps that move.
+
+    Attributes
+    ----------
+    name : str
+    gaps : tuple of (int, float)
+        Row and its thickness there, mm.
+    focal_length : float or None
+        As the source states it, mm; told where the gaps give another.
+    focus_distance : float or None
+        Plane in focus, mm in front of the first vertex, of a focus position; None: infinity.
+    f_number, field_deg : float or None
+        Where they differ from the lens'.
+    """
+
+    name: str = Field(min_length=1)
+    gaps: tuple[tuple[int, Annotated[float, Field(ge=-1000.0, le=10000.0)]], ...] = Field(min_length=1)
+    focal_length: float | None = Field(None, gt=0.0)
+    focus_distance: float | None = Field(None, gt=0.0)
+    f_number: float | None = Field(None, gt=0.3, le=256.0)
+    field_deg: float | None = Field(None, gt=0.0, lt=90.0)
+
+
 class Lens(Frozen):
     """A validated prescription.
 
@@ -136,10 +160,14 @@ class Lens(Frozen):
         Last vertex to sensor, mm; None puts the sensor at the paraxial focus.
     focus_distance : float or None
         Distance of the plane in focus in front of the first vertex, mm; None is infinity.
+    squeeze : float or None
+        By how much an anamorphic lens squeezes its picture across.
     iris : Iris
         Default blades.
     elements : tuple of Element
         Groups of rows that stand beside the axis or askew.
+    positions : tuple of Position
+        Settings of a zoom, or of the focus where gaps inside the lens change with it.
     coating_presets : dict of str to tuple of Coating or None
         Named sets, one entry per row (the stop's is ignored).
     """
@@ -153,9 +181,11 @@ class Lens(Frozen):
     field_deg: float | None = Field(None, gt=0.0, lt=90.0)
     sensor_distance: float | None = Field(None, gt=0.0)
     focus_distance: float | None = Field(None, gt=0.0)
+    squeeze: float | None = Field(None, ge=0.25, le=4.0)
     iris: Iris = Iris()
     rows: tuple[Row, ...] = Field(min_length=2)
     elements: tuple[Element, ...] = ()
+    positions: tuple[Position, ...] = ()
     coating_presets: dict[str, tuple[Coating | None, ...]] = Field(default_factory=dict)
 
     @property
@@ -175,6 +205,7 @@ class Lens(Frozen):
         if isinstance(last, Surface) and last.medium is not None:
             raise ValueError(f"row {len(self.rows) - 1}: behind the last row must be air, not glass")
         self._elements_are_apart(stops[0])
+        self._positions_agree()
         for name, coatings in self.coating_presets.items():
             if len(coatings) != len(self.rows):
                 raise ValueError(
@@ -195,3 +226,23 @@ class Lens(Frozen):
                 if row in taken:
                     raise ValueError(f"{where} shares row {row} with element {taken[row]}; a row belongs to one")
                 taken[row] = number
+
+    def _positions_agree(self) -> None:
+        names = [position.name.lower() for position in self.positions]
+        moving: set[int] | None = None
+        for position in self.positions:
+            where = f"position {position.name!r}"
+            rows = {row for row, _ in position.gaps}
+            if names.count(position.name.lower()) > 1:
+                raise ValueError(f"{where} is there twice; give each a name of its own")
+            if not rows <= set(range(len(self.rows) - 1)):
+                raise ValueError(f"{where}: gaps lie behind rows 0 to {len(self.rows) - 2}")
+            if moving is not None and rows != moving:
+                raise ValueError(f"{where}: every position gives the same gaps, those behind rows {sorted(moving)}")
+            moving = rows
+            for row, gap in position.gaps:
+                surface = self.rows[row]
+                if isinstance(surface, Surface) and surface.medium is not None:
+                    raise ValueError(f"{where}: behind row {row} is glass, which does not change its thickness")
+                if gap < 0.0:
+                    raise ValueError(f"{where}: the gap behind row {row} is {gap:g} mm; gaps that move are 0 or more")

@@ -10,9 +10,11 @@ from .art import Art
 from .base import Frozen
 from .camera import Camera, Colorspace
 from .coating import Coating
+from .imperfection import Imperfection
 from .iris import Iris
 from .lens import Lens
 from .light import Light
+from .plate import Plate
 from .starburst import Dirt, Starburst
 
 
@@ -123,6 +125,12 @@ class Project(Frozen):
         What lies in the pupil; nothing by default.
     starburst : Starburst
         How the direct image is drawn.
+    zoom : str or float or None
+        One of the lens' positions by name, or a focal length in mm; None: as the rows stand.
+    filter : Plate or None
+        A plane plate in front of the lens.
+    imperfection : Imperfection or None
+        One sample of the lens within tolerances; None: as designed.
     art : Art
         What is changed by hand; nothing by default.
     """
@@ -138,6 +146,9 @@ class Project(Frozen):
     output: Output = Output()
     dirt: Dirt = Dirt()
     starburst: Starburst = Starburst()
+    zoom: str | Annotated[float, Field(gt=0.0)] | None = None
+    filter: Plate | None = None
+    imperfection: Imperfection | None = None
     art: Art = Art()
 
     @model_validator(mode="after")

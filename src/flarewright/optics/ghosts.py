@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from math import ceil, sqrt
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +18,7 @@ from ..kernels.trace import ALIVE, REL, STOP_X, WEIGHT, X, Y
 from ..model import AsLens, CoatingChoice, Iris, Lens
 from .bundle import Bundle, Incidence, find_region, incidence, trace_bundle, trace_grid, trace_points
 from .iris import blade_edges
-from .pack import PackedLens, facing, pack_lens, resolve_coatings
+from .pack import PackedLens, SensorMirror, facing, pack_lens, resolve_coatings
 from .paraxial import D_LINE_NM, FirstOrder, first_order, path_matrices
 from .paths import LightPath, direct_path, ghost_paths
 
@@ -39,7 +40,7 @@ class GhostRow:
     Attributes
     ----------
     first_reflection, second_reflection : int or None
-        Rows j, then i < j; None for the direct image.
+        Rows j, then i < j; None for the direct image. The sensor as the first mirror is "sensor".
     throughput_mm2 : float
         Flux on the unbounded sensor plane when the light gives irradiance 1 on a plane facing it.
     centroid_mm : tuple of float
@@ -58,7 +59,7 @@ class GhostRow:
         Where the path focuses a distant light, mm behind the sensor (negative: in front); None for an afocal path.
     """
 
-    first_reflection: int | None
+    first_reflection: int | Literal["sensor"] | None
     second_reflection: int | None
     throughput_mm2: float
     centroid_mm: tuple[float, float]
@@ -104,6 +105,7 @@ def ghost_table(
     paths: str = "all",
     sensor_distance: float | None = None,
     focus_distance: float | None = None,
+    sensor: SensorMirror | None = None,
     threads: int | None = None,
 ) -> GhostTable:
     """Analyse every ghost of a lens for one distant light.
@@ -122,6 +124,8 @@ def ghost_table(
     paths : {"all", "same-side"}
     sensor_distance, focus_distance : float, optional
         Override the lens file's, mm.
+    sensor : SensorMirror, optional
+        The sensor reflects too: adds the paths "sensor-i".
     threads : int, optional
         None: all cores; the numbers do not depend on it.
 
@@ -137,10 +141,10 @@ def ghost_table(
     """
     order = first_order(lens, f_number, sensor_distance=sensor_distance, focus_distance=focus_distance)
     coatings = resolve_coatings(lens, AsLens() if coating is None else coating)
-    packed = pack_lens(lens, order, coatings, np.array([wavelength_nm]))
+    packed = pack_lens(lens, order, coatings, np.array([wavelength_nm]), sensor=sensor)
     light = incidence(field_deg)
     packed = facing(packed, light.axes)
-    todo = (direct_path(lens), *ghost_paths(lens, paths))
+    todo = (direct_path(lens), *ghost_paths(lens, paths, sensor=sensor is not None))
     with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
         measured = list(pool.map(lambda path: _measure(lens, packed, path, light), todo))
     direct = measured[0]
@@ -169,7 +173,8 @@ def _measure(lens: Lens, packed: PackedLens, path: LightPath, light: Incidence) 
     bounded_by, focus = _paraxial_facts(lens, packed, path)
     blades = blade_edges(Iris(), packed.stop_semi)
     region = find_region(packed, path, light.tilt, packed.stop_semi)
-    j, i = path.first_reflection, path.second_reflection
+    j: int | Literal["sensor"] | None = "sensor" if path.sensor else path.first_reflection
+    i = path.second_reflection
     nothing = GhostRow(j, i, 0.0, (0.0, 0.0), 0.0, 0.0, 0.0, bounded_by, focus)
     if region is None:
         return nothing

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import LensError, ProjectError
+from ..kernels.intersect import AXES, DEGREE, TANGENT
 from ..model import AsLens, Coating, CoatingChoice, Everywhere, Lens, PerRow, Preset, Stop
 from ..model.coating import StandardName
 from .coatings import film_stack, reflectance_table
@@ -82,6 +83,21 @@ class PackedLens:
         return int(np.flatnonzero(self.inv_semi)[0])
 
 
+@dataclass(frozen=True)
+class SensorMirror:
+    """The sensor as a mirror.
+
+    Attributes
+    ----------
+    reflectance : float
+    radius : float
+        Of the circle around it, mm; infinite for an unbounded plane.
+    """
+
+    reflectance: float
+    radius: float = float("inf")
+
+
 def resolve_coatings(lens: Lens, choice: CoatingChoice) -> tuple[Coating | None, ...]:
     """Decide the coating of every row.
 
@@ -127,6 +143,8 @@ def pack_lens(
     first_order: FirstOrder,
     coatings: tuple[Coating | None, ...],
     wavelengths_nm: NDArray[np.float64],
+    *,
+    sensor: SensorMirror | None = None,
 ) -> PackedLens:
     """Turn a complete lens into arrays.
 
@@ -139,6 +157,8 @@ def pack_lens(
     coatings : tuple of Coating or None
         One a row (`resolve_coatings`).
     wavelengths_nm : ndarray, shape (W,)
+    sensor : SensorMirror, optional
+        Adds the sensor as the last row; the lens' own rows keep their numbers.
 
     Returns
     -------
@@ -161,7 +181,7 @@ def pack_lens(
         semi[k], inv_semi[k] = row.semi_diameter, 1.0 / row.semi_diameter
         curvature[k], conic[k] = row.curvature, row.conic
     n_gap = np.array([gap_indices(lens, float(w)) for w in wavelengths_nm])
-    return PackedLens(
+    packed = PackedLens(
         curvature=curvature,
         conic=conic,
         z_vertex=z,
@@ -176,6 +196,30 @@ def pack_lens(
         shapes=shape_table(lens),
         symmetric=symmetric(lens),
         curvature_x=curvature_across(lens),
+    )
+    return packed if sensor is None else _with_sensor(packed, sensor)
+
+
+def _with_sensor(packed: PackedLens, sensor: SensorMirror) -> PackedLens:
+    """Append the sensor: a plane between air and air that reflects alike at every angle."""
+    waves = len(packed.wavelengths_nm)
+    mirror = np.full((waves, 1, REFLECTANCE_SAMPLES), sensor.reflectance)
+    shapes, across = packed.shapes, packed.curvature_x
+    if shapes is not None:
+        plane = np.zeros((1, shapes.shape[1]))
+        plane[0, AXES : AXES + 9], plane[0, TANGENT], plane[0, DEGREE] = np.eye(3).ravel(), np.inf, -1.0
+        shapes = np.concatenate([shapes, plane])
+    return replace(
+        packed,
+        curvature=np.append(packed.curvature, 0.0),
+        conic=np.append(packed.conic, 0.0),
+        z_vertex=np.append(packed.z_vertex, packed.sensor_z),
+        semi=np.append(packed.semi, sensor.radius),
+        inv_semi=np.append(packed.inv_semi, 1.0 / sensor.radius),
+        n_gap=np.concatenate([packed.n_gap, np.ones((waves, 1))], axis=1),
+        reflectance=np.concatenate([packed.reflectance, mirror], axis=1),
+        shapes=shapes,
+        curvature_x=None if across is None else np.append(across, 0.0),
     )
 
 

@@ -100,6 +100,8 @@ def _along(
 ) -> tuple[list[Matrix], Matrix]:
     to_stop = np.empty((path.stop_crossings, 2, 2))
     n, z = gap_indices(lens, wavelength_nm), vertex_positions(lens)
+    if path.sensor:
+        curvature, z, n = np.append(curvature, 0.0), np.append(z, sensor_z), np.append(n, 1.0)
     total = _path_matrices(path.rows, path.actions, curvature, z, n, sensor_z, to_stop)
     return list(to_stop), np.array(total).reshape(2, 2)
 

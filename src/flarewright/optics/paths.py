@@ -22,17 +22,22 @@ class LightPath:
         Rows of the two mirrors (j, then i < j); None for the direct path.
     rows, actions : ndarray, shape (S,), int64
         Row of each step; REFRACT, REFLECT or STOP.
+    sensor : bool
+        The first mirror is the sensor, which stands as one row more behind the lens' own.
     """
 
     first_reflection: int | None
     second_reflection: int | None
     rows: NDArray[np.int64]
     actions: NDArray[np.int64]
+    sensor: bool = False
 
     @property
     def name(self) -> str:
-        """Name of the path: "j-i", or "direct"."""
-        return "direct" if self.first_reflection is None else f"{self.first_reflection}-{self.second_reflection}"
+        """Name of the path: "j-i", "sensor-i", or "direct"."""
+        if self.first_reflection is None:
+            return "direct"
+        return f"{'sensor' if self.sensor else self.first_reflection}-{self.second_reflection}"
 
     @cached_property
     def stop_crossings(self) -> int:
@@ -76,7 +81,29 @@ def ghost_path(lens: Lens, j: int, i: int) -> LightPath:
     return _path(lens, legs, (j, i))
 
 
-def ghost_paths(lens: Lens, which: str = "all") -> tuple[LightPath, ...]:
+def sensor_path(lens: Lens, i: int) -> LightPath:
+    """Return the path that reflects first at the sensor, then at row i.
+
+    Parameters
+    ----------
+    lens : Lens
+    i : int
+        Not the stop.
+
+    Returns
+    -------
+    LightPath
+        The sensor is row len(lens.rows) of its steps.
+    """
+    count = len(lens.rows)
+    there, back, again = range(count), range(count - 1, i - 1, -1), range(i + 1, count)
+    rows = [*there, count, *back, *again]
+    actions = [STOP if row < count and isinstance(lens.rows[row], Stop) else REFRACT for row in rows]
+    actions[count] = actions[count + len(back)] = REFLECT
+    return LightPath(count, i, np.array(rows, dtype=np.int64), np.array(actions, dtype=np.int64), sensor=True)
+
+
+def ghost_paths(lens: Lens, which: str = "all", *, sensor: bool = False) -> tuple[LightPath, ...]:
     """Enumerate the two-reflection paths (Hullin 2011, section 4.1 and "Aperture Culling").
 
     Parameters
@@ -84,15 +111,20 @@ def ghost_paths(lens: Lens, which: str = "all") -> tuple[LightPath, ...]:
     lens : Lens
     which : {"all", "same-side"}
         All n(n-1)/2 paths of n surfaces, or the f(f-1)/2 + b(b-1)/2 that reflect twice on one side of the stop.
+    sensor : bool
+        Whether the sensor is a mirror too: one path more for each surface, or each behind the stop.
 
     Returns
     -------
     tuple of LightPath
-        Ordered by (j, i).
+        Ordered by (j, i), the sensor's last.
     """
     stop = lens.stop_row
     mirrors = [k for k in range(len(lens.rows)) if k != stop]
     pairs = [(j, i) for j in mirrors for i in mirrors if i < j]
     if which == "same-side":
         pairs = [(j, i) for j, i in pairs if (j < stop) == (i < stop)]
-    return tuple(ghost_path(lens, j, i) for j, i in pairs)
+    own = tuple(ghost_path(lens, j, i) for j, i in pairs)
+    if not sensor:
+        return own
+    return own + tuple(sensor_path(lens, i) for i in mirrors if which == "all" or i > stop)

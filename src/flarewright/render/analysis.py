@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from ..model import CoatingChoice, Lens
+from ..errors import ProjectError
+from ..model import CoatingChoice, Imperfection, Lens, Plate
 from ..optics.ghosts import GhostTable, ghost_table
+from ..optics.pack import SensorMirror
 from ..optics.paraxial import D_LINE_NM, FirstOrder
-from .prepare import as_lens, first_order
+from .prepare import as_lens, build, first_order
 
 
 def paraxial(
@@ -51,6 +53,11 @@ def ghosts(
     paths: str = "all",
     sensor_distance: float | None = None,
     focus_distance: float | None = None,
+    zoom: str | float | None = None,
+    filter_plate: Plate | None = None,
+    cover_glass: Plate | None = None,
+    sensor_reflectance: float = 0.0,
+    imperfection: Imperfection | None = None,
     threads: int | None = None,
 ) -> GhostTable:
     """Analyse every ghost of a lens for one distant light (`optics.ghosts.ghost_table`).
@@ -69,6 +76,14 @@ def ghosts(
     paths : {"all", "same-side"}
     sensor_distance, focus_distance : float, optional
         Override the lens file's, mm.
+    zoom : str or float, optional
+        A position's name or a focal length, mm.
+    filter_plate, cover_glass : Plate, optional
+        Plane plates in front of the lens and of the sensor; they are rows too.
+    sensor_reflectance : float
+        Above 0 the sensor, unbounded here, is a mirror too, and there are paths "sensor-i".
+    imperfection : Imperfection, optional
+        One sample of the lens within tolerances.
     threads : int, optional
         None: all cores; the numbers do not depend on it.
 
@@ -82,15 +97,22 @@ def ghosts(
         As `paraxial`, and for a coating that does not fit the lens.
     """
     known = as_lens(lens)
-    first_order(known, f_number)  # refuses an f-number that the lens does not open to
+    built = build(
+        known, coating, zoom=zoom, filter_plate=filter_plate, cover_glass=cover_glass, imperfection=imperfection,
+        sensor_distance=sensor_distance, focus_distance=focus_distance,
+    )  # fmt: skip
+    first_order(built.lens, f_number)  # refuses an f-number that the lens does not open to
+    if not 0.0 <= sensor_reflectance <= 1.0:
+        raise ProjectError(f"a sensor reflects between 0 and 1 of the light, not {sensor_reflectance:g}")
     return ghost_table(
-        known,
+        built.lens,
         field_deg,
         f_number=f_number,
-        coating=coating,
+        coating=built.coating,
         wavelength_nm=wavelength_nm,
         paths=paths,
-        sensor_distance=sensor_distance,
-        focus_distance=focus_distance,
+        sensor_distance=built.sensor_distance,
+        focus_distance=built.focus_distance,
+        sensor=SensorMirror(sensor_reflectance) if sensor_reflectance > 0.0 else None,
         threads=threads,
     )

@@ -169,7 +169,7 @@ def resolve_art(settled: Settled) -> ResolvedArt:
     art, project = settled.project.art, settled.project
     if art.physical or (not art.rules and not art.gain):
         return ResolvedArt()
-    facts = _Facts(settled, ghost_paths(settled.lens, project.quality.paths))
+    facts = _Facts(settled, ghost_paths(settled.lens, project.quality.paths, sensor=settled.sensor is not None))
     found = {path.name: PLAIN for path in facts.paths}
     across = project.camera.size_px[0] / project.camera.sensor[0]
     down = project.camera.size_px[1] / project.camera.sensor[1]
@@ -224,16 +224,16 @@ class _Facts:
     @cached_property
     def tables(self) -> list[GhostTable]:
         """The ghost analysis for every light."""
-        project, camera = self.settled.project, self.settled.project.camera
+        project, order = self.settled.project, self.settled.order
         return [
             ghost_table(
                 self.settled.lens,
                 light.field_deg,
                 f_number=project.f_number,
-                coating=project.coating,
+                coating=self.settled.coating,
                 paths=project.quality.paths,
-                sensor_distance=camera.sensor_distance,
-                focus_distance=camera.focus_distance,
+                sensor_distance=order.sensor_distance,
+                sensor=self.settled.sensor,
             )
             for light in project.lights
         ]

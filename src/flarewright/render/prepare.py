@@ -3,19 +3,26 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import hypot
 from pathlib import Path
 
-from ..errors import LensError, ProjectError
+from ..errors import GlassError, LensError, ProjectError
 from ..io.height_image import read_heights
 from ..io.lens_file import read_lens
 from ..io.library import lens_path
+from ..io.media import attach
 from ..io.media import complete as complete_media
-from ..model import Iris, Lens, Project, Surface
+from ..io.media import remarks as media_remarks
+from ..model import AsLens, CoatingChoice, Imperfection, Iris, Lens, Medium, Plate, Project, Surface
 from ..model.raw_lens import RawLens
+from ..optics.imperfection import imperfect
+from ..optics.pack import SensorMirror, resolve_coatings
 from ..optics.paraxial import FirstOrder
 from ..optics.paraxial import first_order as _first_order
+from ..optics.plates import with_cover_glass, with_filter
 from ..optics.repair import repair
 from ..optics.semi_diameters import complete
+from ..optics.zoom import at_position, focused, zoomed
 
 
 def load_lens(name_or_path: str | Path, *, remarks: list[str] | None = None) -> Lens:
@@ -71,7 +78,7 @@ def complete_lens(lens: Lens, *, remarks: list[str] | None = None) -> Lens:
     if remarks is not None:
         remarks.extend(found)
     order = first_order(known)
-    full = complete(known)
+    full = _complete_everywhere(known)
     surfaces = sum(isinstance(row, Surface) for row in full.rows)
     estimated = [str(k) for k, row in enumerate(full.rows) if isinstance(row, Surface) and row is not known.rows[k]]
     if remarks is not None:
@@ -83,7 +90,28 @@ def complete_lens(lens: Lens, *, remarks: list[str] | None = None) -> Lens:
         stated = lens.stated_focal_length
         if stated is not None and abs(order.efl / stated - 1.0) > 0.02:
             remarks.append(f"the focal length is {order.efl:.2f} mm, the file says {stated:g} mm")
+        for position in full.positions:
+            efl = first_order(at_position(full, position)).efl
+            if position.focal_length is not None and abs(efl / position.focal_length - 1.0) > 0.02:
+                told = f"the focal length is {efl:.2f} mm, the file says {position.focal_length:g} mm"
+                remarks.append(f"position {position.name!r}: {told}")
     return full
+
+
+def _complete_everywhere(lens: Lens) -> Lens:
+    """Estimate missing semi-diameters so that they pass the light of every position."""
+    full = complete(lens)
+    rows = list(full.rows)
+    for position in lens.positions if full is not lens else ():
+        for k, row in enumerate(complete(at_position(lens, position)).rows):
+            mine = rows[k]
+            if isinstance(row, Surface) and isinstance(mine, Surface) and row.semi_diameter_estimated:
+                assert row.semi_diameter is not None
+                assert mine.semi_diameter is not None
+                if row.semi_diameter > mine.semi_diameter:
+                    rows[k] = mine.replace(semi_diameter=row.semi_diameter)
+    found: Lens = full.replace(rows=tuple(rows)) if lens.positions else full
+    return found
 
 
 def _with_heights(lens: Lens) -> Lens:
@@ -154,18 +182,148 @@ def first_order(
 
 
 @dataclass(frozen=True)
+class Built:
+    """A lens with everything that stands around it, ready to be packed.
+
+    Attributes
+    ----------
+    lens : Lens
+        Zoomed and focused, its filter and cover glass among its rows, one sample of it where imperfection is asked for.
+    coating : CoatingChoice
+        What its rows carry.
+    sensor_distance, focus_distance : float or None
+        What is left of the wishes for them, to be given to `first_order`.
+    remarks : tuple of str
+    """
+
+    lens: Lens
+    coating: CoatingChoice
+    sensor_distance: float | None
+    focus_distance: float | None
+    remarks: tuple[str, ...] = ()
+
+
+def build(
+    lens: Lens,
+    coating: CoatingChoice | None = None,
+    *,
+    zoom: str | float | None = None,
+    filter_plate: Plate | None = None,
+    cover_glass: Plate | None = None,
+    imperfection: Imperfection | None = None,
+    sensor_distance: float | None = None,
+    focus_distance: float | None = None,
+) -> Built:
+    """Put a complete lens together with its zoom, filter, cover glass and imperfection.
+
+    Parameters
+    ----------
+    lens : Lens
+    coating : CoatingChoice, optional
+        Of the lens' own rows; plates have theirs. None: as the lens file says.
+    zoom : str or float, optional
+        A position's name or a focal length, mm.
+    filter_plate, cover_glass : Plate, optional
+    imperfection : Imperfection, optional
+    sensor_distance, focus_distance : float, optional
+        Override the lens file's, mm, measured from the lens' own last and first vertex.
+
+    Returns
+    -------
+    Built
+
+    Raises
+    ------
+    FlarewrightError
+        When one of them does not fit the lens.
+    """
+    remarks: list[str] = []
+    choice: CoatingChoice = AsLens() if coating is None else coating
+    lens = focused(zoomed(lens, zoom), focus_distance if zoom is None else None)
+    if filter_plate is not None or cover_glass is not None:
+        # rows get their coatings before they get other numbers
+        coats = resolve_coatings(lens, choice)
+        rows = [
+            row.replace(coating=coat) if isinstance(row, Surface) else row
+            for row, coat in zip(lens.rows, coats, strict=True)
+        ]
+        lens, choice = lens.replace(rows=tuple(rows)), AsLens()
+    if cover_glass is not None:
+        lens = with_cover_glass(
+            lens, cover_glass, _medium(cover_glass, "cover glass", remarks),
+            sensor_distance=sensor_distance, focus_distance=focus_distance,
+        )  # fmt: skip
+        sensor_distance = focus_distance = None
+        last = len(lens.rows) - 1
+        remarks.append(f"the cover glass is rows {last - 1} and {last}")
+    if filter_plate is not None:
+        lens, focus_distance = _behind_filter(lens, filter_plate, focus_distance, remarks)
+    if filter_plate is not None or cover_glass is not None:
+        lens = complete(lens)
+    return Built(imperfect(lens, imperfection), choice, sensor_distance, focus_distance, tuple(remarks))
+
+
+def _behind_filter(
+    lens: Lens, plate: Plate, focus_distance: float | None, remarks: list[str]
+) -> tuple[Lens, float | None]:
+    """Put a filter in front; the plane in focus stays where it is, but is nearer to the new first vertex."""
+    found = with_filter(lens, plate, _medium(plate, "filter", remarks))
+    ahead = found.rows[0].thickness + found.rows[1].thickness
+    remarks.append("the filter is rows 0 and 1; the lens' own rows begin at 2")
+    for stated in (focus_distance, found.focus_distance):
+        if stated is not None and stated <= ahead:
+            raise ProjectError(f"the plane in focus, {stated:g} mm in front of {lens.name}, lies behind its filter")
+    if found.focus_distance is not None:
+        found = found.replace(focus_distance=found.focus_distance - ahead)
+    return found, None if focus_distance is None else focus_distance - ahead
+
+
+def _medium(plate: Plate, what: str, remarks: list[str]) -> Medium:
+    """Find the glass of a plate."""
+    glass = "N-BK7" if plate.glass is None and plate.n_d is None else plate.glass
+    try:
+        medium, finding = attach(glass, plate.n_d, plate.v_d)
+    except GlassError as error:
+        raise ProjectError(f"{what}: {error}") from None
+    remarks.extend(media_remarks([(0, finding)], what))
+    return medium
+
+
+@dataclass(frozen=True)
 class Settled:
-    """A project with its lens loaded and its opening computed."""
+    """A project with its lens built and its opening computed.
+
+    Attributes
+    ----------
+    project : Project
+    lens : Lens
+        As it is traced: with filter and cover glass, zoomed, one sample of it.
+    coating : CoatingChoice
+        Of that lens.
+    iris : Iris
+    order : FirstOrder
+        Of the lens as designed.
+    remarks : tuple of str
+    """
 
     project: Project
     lens: Lens
+    coating: CoatingChoice
     iris: Iris
     order: FirstOrder
     remarks: tuple[str, ...]
 
+    @property
+    def sensor(self) -> SensorMirror | None:
+        """The sensor as a mirror, if it is one."""
+        camera = self.project.camera
+        if camera.sensor_reflectance == 0.0:
+            return None
+        return SensorMirror(camera.sensor_reflectance, 0.5 * hypot(*camera.sensor))
+
 
 def settle(project: Project) -> Settled:
-    """Load the lens of a project and compute its opening and focus.
+    """Load the lens of a project, build what it asks for, and compute its opening and focus.
 
     Parameters
     ----------
@@ -178,17 +336,26 @@ def settle(project: Project) -> Settled:
     Raises
     ------
     FlarewrightError
-        As `load_lens` and `first_order`.
+        As `load_lens`, `build` and `first_order`.
     """
     remarks: list[str] = []
     lens = as_lens(project.lens, remarks=remarks)
     camera = project.camera
+    if camera.squeeze is None and lens.squeeze is not None:
+        camera = camera.replace(squeeze=lens.squeeze)
+        project = project.replace(camera=camera)
+    built = build(
+        lens, project.coating, zoom=project.zoom, filter_plate=project.filter, cover_glass=camera.cover_glass,
+        imperfection=project.imperfection, sensor_distance=camera.sensor_distance,
+        focus_distance=camera.focus_distance,
+    )  # fmt: skip
+    lens = built.lens
     order = first_order(
-        lens, project.f_number, sensor_distance=camera.sensor_distance, focus_distance=camera.focus_distance
+        lens, project.f_number, sensor_distance=built.sensor_distance, focus_distance=built.focus_distance
     )
     if order.sensor_distance > 1e5:
         raise LensError(
             f"{lens.name}: the sensor would stand {order.sensor_distance / 1000:.0f} m behind the lens; check the focus"
         )
     iris = project.iris if project.iris is not None else lens.iris
-    return Settled(project, lens, iris, order, tuple(remarks))
+    return Settled(project, lens, built.coating, iris, order, (*remarks, *built.remarks))

@@ -14,7 +14,7 @@ import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import ceil, inf, sqrt
 from pathlib import Path
 from typing import Any
@@ -109,7 +109,7 @@ def spectral_shots(settled: Settled, mask: Floats | None) -> tuple[Shot, ...]:
     quality = project.quality
     if quality.bridge:
         quality = quality.replace(wavelengths=max(quality.wavelengths, SPECTRAL_SAMPLES))
-    fine = Settled(project.replace(quality=quality), settled.lens, settled.iris, settled.order, settled.remarks)
+    fine = replace(settled, project=project.replace(quality=quality))
     return make_shots(fine, make_opening(fine, mask))
 
 
@@ -144,6 +144,11 @@ def render_reference(
         When the state to go on from belongs to other settings.
     """
     quality = settled.project.quality
+    if settled.project.camera.sensor_reflectance == 1.0:
+        raise ProjectError(
+            "reference quality follows light until something keeps it, and a sensor that reflects all light keeps "
+            "none; choose a sensor_reflectance below 1"
+        )
     shots = spectral_shots(settled, mask)
     prints = _fingerprints(settled, shots[0])
     sources = [ray_source(shot, quality.seed, side=SIDE, light=k) for k, shot in enumerate(shots)]
@@ -173,7 +178,7 @@ def render_reference(
         finally:
             adder.shutdown(wait=True)
             save()
-    return _finish(sums, shots, quality, reason)
+    return _finish(sums, shots, quality, reason, 1.0 - settled.project.camera.sensor_reflectance)
 
 
 def _at_once(shot: Shot, threads: int | None) -> int:
@@ -204,6 +209,7 @@ def _fingerprints(settled: Settled, shot: Shot) -> dict[str, str]:
         "coating": project.coating.model_dump(mode="json"),
         "light": [light.model_dump(mode="json") for light in project.lights],
         "picture": [project.camera.size_px, project.camera.sensor, project.output.colorspace],
+        "sensor reflectance": project.camera.sensor_reflectance,
         "spectral sampling": [quality.wavelengths, quality.bridge, SPECTRAL_SAMPLES, HEROES],
         "seed": [quality.seed, SIDE],
     }
@@ -266,12 +272,13 @@ def _estimate(sums: Sums, quality: Quality, run: ReferenceRun, begin: float) -> 
     return min(1.0, max(parts)), f"{told}, {sums.batches * SIDE**2 / 1e6:.2f} million points"
 
 
-def _finish(sums: Sums, shots: Sequence[Shot], quality: Quality, reason: str) -> ReferencePass:
+def _finish(sums: Sums, shots: Sequence[Shot], quality: Quality, reason: str, kept: float) -> ReferencePass:
     shot = shots[0]
-    pixel_area = 1.0 / float(shot.to_pixels[2] * shot.to_pixels[3])
-    mean, variance = sums.mean("planes") / pixel_area, sums.variance("planes") / pixel_area**2
+    # a ray ends in the sensor with what the sensor keeps of it; the picture is what falls on the sensor
+    area = kept / float(shot.to_pixels[2] * shot.to_pixels[3])
+    mean, variance = sums.mean("planes") / area, sums.variance("planes") / area**2
     ledger = ledger_of(sums)
-    flux, high = float(sums.mean("figures")[GHOSTS]), _share_of_high_orders(ledger)
+    flux, high = float(sums.mean("figures")[GHOSTS]) / kept, _share_of_high_orders(ledger)
     errors = {of: relative_error(sums, of) for of in ("total", "blocks")}
     facts = {
         "batches": sums.batches,

@@ -116,7 +116,7 @@ def render(
         account = trace_ledger(shots, project.quality.seed, threads=threads)
     summary = {**_summary(settled, shots, images, art), **drawn.facts}
     return Rendering(
-        project,
+        settled.project,
         layers,
         {**summary, "ledger": account.as_data()} if ledger and account is not None else summary,
         (*settled.remarks, *drawn.remarks, *_remarks(settled, shots[0])),
@@ -143,7 +143,7 @@ def _ghosts(
     progress: Progress | None,
 ) -> _Drawn:
     project = settled.project
-    paths = ghost_paths(settled.lens, project.quality.paths)
+    paths = ghost_paths(settled.lens, project.quality.paths, sensor=settled.sensor is not None)
     singles = project.output.brightest if project.output.layers == "ghosts" else 0
     ghosts = render_ghosts(
         shots, paths, project.quality, singles=singles, art=art.paths, threads=threads, progress=progress

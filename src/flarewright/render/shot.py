@@ -196,14 +196,14 @@ def make_shots(settled: Settled, opening: Opening) -> tuple[Shot, ...]:
     width, height = project.camera.size_px
     sensor = project.camera.sensor
     to_pixels = np.array([width / 2.0, height / 2.0, width / sensor[0], height / sensor[1]])
-    coatings = resolve_coatings(settled.lens, project.coating)
+    coatings = resolve_coatings(settled.lens, settled.coating)
     packs: dict[tuple[float, ...], PackedLens] = {}
     shots = []
     for light in project.lights:
         wavelengths_nm = traced_wavelengths(project.quality.wavelengths, light.spectrum)
         key = tuple(wavelengths_nm)
         if key not in packs:
-            packs[key] = pack_lens(settled.lens, settled.order, coatings, wavelengths_nm)
+            packs[key] = pack_lens(settled.lens, settled.order, coatings, wavelengths_nm, sensor=settled.sensor)
         colorspace = project.output.colorspace
         seen = incidence(light.field_deg)
         packed = facing(packs[key], seen.axes)
