@@ -143,6 +143,10 @@ PROJECT_FILES = {
     "sensor reflectance above 1": (PROJECT + "[camera]\nsensor_reflectance = 2\n", "sensor_reflectance"),
     "squeeze of 10": (PROJECT + "[camera]\nsqueeze = 10\n", "camera.squeeze"),
     "imperfection without a seed": (PROJECT + "[imperfection]\ndecentre_um = 5\n", "imperfection.seed is missing"),
+    "ghosts moved beyond all sensors": (
+        PROJECT + "[imperfection]\nseed = 1\nghost_offset_mm = 1e3\n",
+        "imperfection.ghost_offset_mm",
+    ),
     "imperfection below nothing": (
         PROJECT + "[imperfection]\nseed = 1\ntilt_arcmin = -1\n",
         "imperfection.tilt_arcmin",
@@ -256,6 +260,8 @@ COMMAND_LINES = {
     "imperfection without a seed": ([*H, *GOOD, "--imperfection", "x"], "--imperfection 'x' is no sample"),
     "imperfection of too many parts": ([*H, *GOOD, "--imperfection", "1:2:3:4:5"], "is no sample"),
     "imperfection below nothing": ([*H, *GOOD, "--imperfection", "1:-5"], "--imperfection '1:-5'"),
+    "ghosts moved by less than nothing": ([*H, *GOOD, "--ghost-offset", "-1"], "--ghost-offset"),
+    "ghosts moved by nan": ([*H, *GOOD, "--ghost-offset", "nan"], "--ghost-offset"),
     "squeeze of nothing": ([*H, *GOOD, "--squeeze", "0"], "--squeeze"),
     "ghosts of a bright sensor": (["ghosts", "heliar-tronnier", "--light", "1,1", "--sensor-reflectance", "2"],
                                   "no part of the light"),

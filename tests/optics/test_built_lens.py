@@ -215,7 +215,47 @@ def test_focus_positions_are_taken_by_the_distance(heliar):
     assert (half.rows[2].thickness, half.rows[4].thickness) == (pytest.approx(3.32), pytest.approx(4.58))
     assert half.focus_distance == 2000.0
     assert build(floating).lens is floating
-    with pytest.raises(ProjectError, match="down to 1000 mm, not for 500 mm"):
+    assert build(floating, focus_distance=1000.0).lens.rows[4].thickness == pytest.approx(4.98)
+    with pytest.raises(ProjectError, match="from infinity to 1000 mm, not for 500 mm"):
         build(floating, focus_distance=500.0)
     with pytest.raises(ProjectError, match="are for focus"):
         build(floating, zoom=100.0)
+    # rows written for the near end: the far position is focused at infinity all the same
+    near_end = floating.replace(focus_distance=1000.0)
+    assert build(near_end, zoom="far").lens.focus_distance is None
+    assert build(near_end, zoom="near").lens.focus_distance == 1000.0
+
+
+def test_a_zoom_that_focuses_by_its_gaps_takes_both_at_once(heliar):
+    def position(name, efl, gaps, **more):
+        return Position(name=name, focal_length=efl, gaps=tuple(zip((2, 4), gaps, strict=True)), **more)
+
+    four = (
+        position("wide", 99.24, (3.52, 4.18), f_number=4.5),
+        position("tele", 105.0, (2.52, 4.18), f_number=5.5),
+        position("wide near", 99.24, (3.52, 5.18), focus_distance=1000.0, f_number=4.5),
+        position("tele near", 105.0, (2.52, 6.18), focus_distance=1000.0, f_number=5.5),
+    )
+    zoom = heliar.replace(positions=four)
+
+    def gaps(**wish):
+        rows = build(zoom, **wish).lens.rows
+        return rows[2].thickness, rows[4].thickness
+
+    assert gaps(zoom="wide") == (3.52, 4.18)
+    assert gaps(zoom="tele near") == (2.52, 6.18)
+    assert gaps(zoom="wide", focus_distance=2000.0) == pytest.approx((3.52, 4.68))
+    middle = first_order(build(zoom, zoom="wide").lens).efl, first_order(build(zoom, zoom="tele").lens).efl
+    efl = 0.5 * sum(middle)
+    far = gaps(zoom=efl)
+    assert first_order(build(zoom, zoom=efl).lens).efl == pytest.approx(efl, rel=1e-8)
+    part = (3.52 - far[0]) / 1.0
+    # the ring stays where it is, the focus goes half of the way in 1 / distance
+    assert gaps(zoom=efl, focus_distance=2000.0) == pytest.approx((far[0], 4.18 + 0.5 * (1.0 + part)))
+    set_to = build(zoom, zoom=efl, focus_distance=2000.0)
+    assert set_to.lens.f_number == pytest.approx(4.5 + part)
+    assert first_order(set_to.lens, focus_distance=set_to.focus_distance).sensor_distance > first_order(set_to.lens).bfl
+    with pytest.raises(ProjectError, match="several focal lengths; give the zoom too"):
+        build(zoom, focus_distance=2000.0)
+    with pytest.raises(ProjectError, match="not for 300 mm"):
+        build(zoom, zoom=efl, focus_distance=300.0)

@@ -8,10 +8,12 @@ from pupil_sum import by_name, layer_flux, layers_of, mono, picture, scene
 
 import flarewright as fw
 from flarewright.errors import ProjectError
-from flarewright.model import Art, Light, Rule
+from flarewright.model import Art, Imperfection, Light, Rule
+from flarewright.optics.imperfection import ghost_offset
+from flarewright.optics.paths import ghost_paths
 from flarewright.render.art import PathArt, resolve_art
 from flarewright.render.grade import gaussian, ramp_factors
-from flarewright.render.prepare import settle
+from flarewright.render.prepare import load_lens, settle
 from flarewright.render.render import render
 
 SIZE = (200, 160)
@@ -62,6 +64,44 @@ def test_the_identity_is_bit_identical(mode):
             assert a.window == b.window
             assert a.about == b.about
             np.testing.assert_array_equal(a.pixels, b.pixels)
+
+
+# --- offsets by chance
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_chance_moves_every_ghost_by_its_own_draw(mode):
+    """Hullin et al. 2011, section 7: a variance that translates each ghost; the light stays."""
+    sample = Imperfection(seed=6, decentre_um=0.0, tilt_arcmin=0.0, ghost_offset_mm=3.0)
+    moved = project(mode).replace(imperfection=sample)
+    plain, changed = render(project(mode)), render(moved)
+    assert changed.summary["physical"] is False
+    before, after = by_name(plain), by_name(changed)
+    seen = []
+    for name in ("4-1", "8-7", "4-3"):
+        path = next(path for path in ghost_paths(settle(moved).lens) if path.name == name)
+        right, up = ghost_offset(path, sample)
+        a, b = (moments(picture(layers[f"ghost.{name}"], SIZE)) for layers in (before, after))
+        # 200 pixels on 150 mm; only ghosts that lie in the picture with all their light are compared
+        if before[f"ghost.{name}"].pixels.sum() == pytest.approx(after[f"ghost.{name}"].pixels.sum(), rel=1e-3):
+            assert (b[0] - a[0], b[1] - a[1]) == pytest.approx((right * 4 / 3, up * 4 / 3), abs=0.02)
+            seen.append((right, up))
+    assert len(set(seen)) >= 2
+    again = render(moved)
+    assert all(np.array_equal(x.pixels, y.pixels) for x, y in zip(changed.layers, again.layers, strict=True))
+    physical = render(moved.replace(art=Art(physical=True)))
+    assert all(np.array_equal(x.pixels, y.pixels) for x, y in zip(plain.layers, physical.layers, strict=True))
+
+
+def test_the_draws_have_the_deviation_asked_for():
+    paths = ghost_paths(load_lens("canon-28-80"))
+    drawn = np.array([ghost_offset(p, Imperfection(seed=s, ghost_offset_mm=0.5)) for s in range(8) for p in paths])
+    assert drawn.shape == (8 * 351, 2)
+    error = 0.5 / np.sqrt(len(drawn))
+    assert np.abs(drawn.mean(axis=0)).max() < 4.0 * error
+    assert drawn.std(axis=0) == pytest.approx([0.5, 0.5], abs=4.0 * error / np.sqrt(2.0))
+    assert abs(np.corrcoef(drawn.T)[0, 1]) < 4.0 / np.sqrt(len(drawn))
+    assert ghost_offset(paths[0], None) == (0.0, 0.0)
 
 
 # --- gain, tint, mute

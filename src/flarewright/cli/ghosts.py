@@ -101,8 +101,9 @@ def ghosts(
         imperfection=sample,
         filter_plate=in_front,
         cover_glass=behind,
+        remarks=remarks,
     )
-    tell(remarks)
+    tell(dict.fromkeys(remarks))
     if as_json:
         print_json(as_data(table, brightest))
     else:

@@ -127,6 +127,14 @@ def render(
             rich_help_panel=_LENS,
         ),
     ] = None,
+    ghost_offset: Annotated[
+        float | None,
+        typer.Option(
+            metavar="MM",
+            help="Moves each ghost by chance, standard deviation; seeded by --imperfection, else --seed.",
+            rich_help_panel=_ART,
+        ),
+    ] = None,
     cover_glass: Annotated[
         str | None,
         typer.Option(
@@ -266,8 +274,8 @@ def render(
         wavelengths=wavelengths, paths=paths, layers=layers, brightest=brightest, no_starburst=no_starburst,
         colorspace=colorspace, half=half, mute=mute or [], solo=solo or [], gain=gain or [], physical=physical,
         seed=seed, error=error, error_of=error_of, samples=samples, resumed=None if state is None else state.project,
-        zoom=zoom, filter_plate=filter_plate, imperfection=imperfection, cover_glass=cover_glass,
-        sensor_reflectance=sensor_reflectance, squeeze=squeeze, desqueeze=desqueeze,
+        zoom=zoom, filter_plate=filter_plate, imperfection=imperfection, ghost_offset=ghost_offset,
+        cover_glass=cover_glass, sensor_reflectance=sensor_reflectance, squeeze=squeeze, desqueeze=desqueeze,
     )  # fmt: skip
     settings = build_project(flags)
     run = _reference_run(settings, output, state, time_limit)

@@ -37,6 +37,7 @@ _FLAG_OF = {
     "camera.sensor_distance": "--sensor-distance",
     "camera.focus_distance": "--focus",
     "camera.sensor_reflectance": "--sensor-reflectance",
+    "imperfection.ghost_offset_mm": "--ghost-offset",
     "camera.squeeze": "--squeeze",
     "quality.mode": "--quality",
     "quality.wavelengths": "--wavelengths",
@@ -94,6 +95,7 @@ class Flags:
     zoom: str | None = None
     filter_plate: str | None = None
     imperfection: str | None = None
+    ghost_offset: float | None = None
     cover_glass: str | None = None
     sensor_reflectance: float | None = None
     squeeze: float | None = None
@@ -140,6 +142,13 @@ def build_project(flags: Flags) -> Project:
         fields["filter"] = parse_plate(flags.filter_plate, "--filter")
     if flags.imperfection is not None:
         fields["imperfection"] = parse_imperfection(flags.imperfection)
+    if flags.ghost_offset is not None:
+        # alone it moves ghosts only: the lens stays as designed
+        nothing = {"seed": flags.seed or 0, "decentre_um": 0.0, "tilt_arcmin": 0.0}
+        fields["imperfection"] = {
+            **dict(fields.get("imperfection") or nothing),
+            "ghost_offset_mm": flags.ghost_offset,
+        }
     if (iris := _iris(flags, fields["lens"], base)) is not None:
         fields["iris"] = iris
     for section, changes in _sections(flags).items():

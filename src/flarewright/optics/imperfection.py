@@ -8,6 +8,7 @@ import numpy as np
 
 from ..errors import ProjectError
 from ..model import Element, Figure, Imperfection, Lens, Surface
+from .paths import LightPath
 
 # astigmatism, coma, trefoil, the first spherical term and what follows: no piston, tilt or power
 TERMS = tuple(range(5, 16))
@@ -102,3 +103,29 @@ def _polished(row: Surface, k: int, sample: Imperfection) -> Surface:
     figure = row.figure if row.figure is not None else Figure()
     found: Surface = row.replace(figure=figure.replace(zernike_nm=tuple(total.items())))
     return found
+
+
+def ghost_offset(path: LightPath, sample: Imperfection | None) -> tuple[float, float]:
+    """Return by how much a ghost is moved by hand, so to say: not by physics, but by chance.
+
+    Parameters
+    ----------
+    path : LightPath
+        A ghost.
+    sample : Imperfection or None
+
+    Returns
+    -------
+    tuple of float
+        Right and up on the sensor, as the upright picture shows it, mm.
+
+    Notes
+    -----
+    Hullin et al. 2011, section 7, "Imperfect Symmetries": a variance that translates each ghost. Gaussian along either
+    axis; every path has random numbers of its own.
+    """
+    if sample is None or sample.ghost_offset_mm == 0.0:
+        return 0.0, 0.0
+    generator = np.random.default_rng([sample.seed, 2, path.first_reflection or 0, path.second_reflection or 0])
+    right, up = sample.ghost_offset_mm * generator.standard_normal(2)
+    return float(right), float(up)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import pairwise
-from math import inf
 from typing import Any
 
 from ..errors import ProjectError
@@ -13,6 +13,8 @@ from .paraxial import first_order
 # focal lengths are met to this part
 CLOSE = 1e-9
 STEPS = 200
+# a focal length this far beyond the ends is taken as the end: makers round what they engrave
+SLACK = 5e-3
 
 
 def at_position(lens: Lens, position: Position) -> Lens:
@@ -32,62 +34,76 @@ def at_position(lens: Lens, position: Position) -> Lens:
     for row, gap in position.gaps:
         rows[row] = rows[row].replace(thickness=gap)
     changes: dict[str, Any] = {"rows": tuple(rows), "positions": ()}
-    for name in ("f_number", "field_deg", "focus_distance"):
+    for name in ("f_number", "field_deg"):
         if getattr(position, name) is not None:
             changes[name] = getattr(position, name)
+    if _for_focus(lens):
+        # a position without a distance stands for infinity then, whatever the rows as written are focused at
+        changes["focus_distance"] = position.focus_distance
     changes["stated_focal_length"] = position.focal_length
     found: Lens = lens.replace(**changes)
     return found
 
 
-def zoomed(lens: Lens, zoom: str | float | None) -> Lens:
-    """Set the zoom.
+def positioned(lens: Lens, zoom: str | float | None, distance: float | None) -> Lens:
+    """Set zoom and focus.
 
     Parameters
     ----------
     lens : Lens
     zoom : str or float or None
         A position's name, or a focal length in mm; None: the gaps as its rows have them.
+    distance : float or None
+        Of the plane in focus, mm in front of the first vertex; None: infinity, or what the named position is for. It
+        moves gaps only where the lens has positions for focus.
 
     Returns
     -------
     Lens
+        The same lens where nothing is asked for.
 
     Raises
     ------
     ProjectError
-        When the lens has no such position.
+        When the lens has no such position, or does not focus there.
 
     Notes
     -----
-    Between two neighbouring positions every gap changes in proportion, and so far that the paraxial focal length is the
-    one asked for. A real zoom's cams run along curves; the ends of each stretch are the patent's.
+    Positions that state one focal length are one setting of the zoom. Within it gaps change in proportion to 1 /
+    distance, as a helicoid's path does to first order. Between two settings every gap changes in proportion, and so
+    far that the paraxial focal length, focused as far away as the lens' positions go, is the one asked for; the same
+    part of the way is then taken at the distance asked for. A real zoom's cams run along curves; the ends of each
+    stretch are the patent's.
     """
-    if zoom is None:
+    if zoom is None and (distance is None or not _for_focus(lens)):
         return lens
     if not lens.positions:
         raise ProjectError(
             f"{lens.name} has no positions to zoom to; take out the zoom, or give its file [[positions]]"
         )
-    names = ", ".join(repr(position.name) for position in lens.positions)
-    number = _number(zoom)
-    if number is None:
-        for position in lens.positions:
-            if position.name.lower() == str(zoom).strip().lower():
+    number = None if zoom is None else _number(zoom)
+    if zoom is None:
+        settings = _settings(lens)
+        if len(settings) > 1:
+            raise ProjectError(f"{lens.name} has focus positions for several focal lengths; give the zoom too")
+        return at_position(lens, _focused(lens, settings[0], distance))
+    if number is not None:
+        return at_position(lens, _between(lens, number, distance))
+    for position in lens.positions:
+        if position.name.lower() == str(zoom).strip().lower():
+            if distance is None:
                 return at_position(lens, position)
-        raise ProjectError(f"{lens.name} has no position {zoom!r}; it has: {names}, or give a focal length in mm")
-    if any(position.focus_distance is not None for position in lens.positions):
-        raise ProjectError(f"the positions of {lens.name} are for focus; choose one by its name ({names}) or by focus")
-    efl = {position.name: first_order(at_position(lens, position)).efl for position in lens.positions}
-    ordered = sorted(lens.positions, key=lambda position: efl[position.name])
-    low, high = efl[ordered[0].name], efl[ordered[-1].name]
-    if not low * (1.0 - 5e-3) <= number <= high * (1.0 + 5e-3):
-        raise ProjectError(f"{lens.name} zooms from {low:.2f} to {high:.2f} mm, not to {number:g} mm")
-    number = min(max(number, low), high)
-    for one, other in pairwise(ordered):
-        if efl[one.name] <= number <= efl[other.name]:
-            return at_position(lens, _between(lens, one, other, number))
-    return at_position(lens, ordered[0])
+            mine = next(setting for setting in _settings(lens) if position in setting)
+            return at_position(lens, _focused(lens, mine, distance))
+    raise ProjectError(f"{lens.name} has no position {zoom!r}; it has: {_names(lens)}, or give a focal length in mm")
+
+
+def _for_focus(lens: Lens) -> bool:
+    return any(position.focus_distance is not None for position in lens.positions)
+
+
+def _names(lens: Lens) -> str:
+    return ", ".join(repr(position.name) for position in lens.positions)
 
 
 def _number(zoom: str | float) -> float | None:
@@ -99,74 +115,98 @@ def _number(zoom: str | float) -> float | None:
     return float(zoom)
 
 
-def _between(lens: Lens, one: Position, other: Position, focal_length: float) -> Position:
+def _nearness(position: Position) -> float:
+    return 0.0 if position.focus_distance is None else 1.0 / position.focus_distance
+
+
+def _settings(lens: Lens) -> list[list[Position]]:
+    """Group positions by the focal length they state, each group from far to near."""
+    groups: dict[float | None, list[Position]] = {}
+    for position in lens.positions:
+        groups.setdefault(position.focal_length if _for_focus(lens) else len(groups), []).append(position)
+    return [sorted(group, key=_nearness) for group in groups.values()]
+
+
+def _focused(lens: Lens, setting: Sequence[Position], distance: float | None) -> Position:
+    """Return the position of one setting of the zoom for a focus distance."""
+    if not _for_focus(lens):
+        return setting[0]
+    near = 0.0 if distance is None else 1.0 / distance
+    farthest, nearest = setting[0], setting[-1]
+    if not _nearness(farthest) * (1.0 - 1e-9) <= near <= _nearness(nearest) * (1.0 + 1e-9):
+        told = [f"{1.0 / n:g} mm" if (n := _nearness(end)) else "infinity" for end in (farthest, nearest)]
+        asked = "infinity" if distance is None else f"{distance:g} mm"
+        raise ProjectError(f"{lens.name} has focus positions from {told[0]} to {told[1]}, not for {asked}")
+    for one, other in pairwise(setting):
+        if near <= _nearness(other) * (1.0 + 1e-9):
+            part = (near - _nearness(one)) / (_nearness(other) - _nearness(one))
+            found: Position = mixed(lens, one, other, part).replace(focus_distance=distance)
+            return found
+    return setting[0]
+
+
+def _between(lens: Lens, focal_length: float, distance: float | None) -> Position:
+    """Return the position of a focal length: a part of the way from one setting of the zoom to the next."""
+    settings = _settings(lens)
+    if _for_focus(lens) and any(setting[0].focal_length is None for setting in settings):
+        raise ProjectError(
+            f"the positions of {lens.name} are for focus and state no focal lengths; choose one by its name "
+            f"({_names(lens)}) or by focus"
+        )
+    found = sorted(((first_order(at_position(lens, each[0])).efl, k) for k, each in enumerate(settings)))
+    low, high = found[0][0], found[-1][0]
+    if not low * (1.0 - SLACK) <= focal_length <= high * (1.0 + SLACK):
+        raise ProjectError(f"{lens.name} zooms from {low:.2f} to {high:.2f} mm, not to {focal_length:g} mm")
+    number = min(max(focal_length, low), high)
+    for (_, a), (above, b) in pairwise(found):
+        if number <= above:
+            part = _part(lens, settings[a][0], settings[b][0], number)
+            one, other = _focused(lens, settings[a], distance), _focused(lens, settings[b], distance)
+            met: Position = mixed(lens, one, other, part).replace(focal_length=number)
+            return met
+    return _focused(lens, settings[0], distance)
+
+
+def _part(lens: Lens, one: Position, other: Position, focal_length: float) -> float:
     """Bisect for the part of the way from one position to another that has a focal length."""
     low, high = 0.0, 1.0
     part = 0.0
     for _ in range(STEPS):
         part = 0.5 * (low + high)
-        efl = first_order(at_position(lens, mixed(one, other, part))).efl
+        efl = first_order(at_position(lens, mixed(lens, one, other, part))).efl
         if abs(efl / focal_length - 1.0) < CLOSE:
             break
         low, high = (part, high) if efl < focal_length else (low, part)
-    found: Position = mixed(one, other, part).replace(focal_length=focal_length)
-    return found
+    return part
 
 
-def mixed(one: Position, other: Position, part: float) -> Position:
-    """Return the position that lies a part of the way from one to another."""
+def mixed(lens: Lens, one: Position, other: Position, part: float) -> Position:
+    """Return the position that lies a part of the way from one to another.
+
+    Parameters
+    ----------
+    lens : Lens
+        Whose f-number and field stand where a position states none.
+    one, other : Position
+    part : float
+        0 is the one, 1 the other.
+
+    Returns
+    -------
+    Position
+        Focused where the one is.
+    """
     there = dict(other.gaps)
     gaps = tuple((row, gap + part * (there[row] - gap)) for row, gap in one.gaps)
 
     def between(name: str) -> float | None:
-        a, b = getattr(one, name), getattr(other, name)
+        a, b = (getattr(lens if getattr(p, name) is None else p, name) for p in (one, other))
         return None if a is None or b is None else float(a + part * (b - a))
 
     return Position(
         name=f"between {one.name} and {other.name}",
         gaps=gaps,
+        focus_distance=one.focus_distance,
         f_number=between("f_number"),
         field_deg=between("field_deg"),
     )
-
-
-def focused(lens: Lens, distance: float | None) -> Lens:
-    """Set the focus of a lens whose positions are for focus; any other is returned as it is.
-
-    Parameters
-    ----------
-    lens : Lens
-    distance : float or None
-        Of the plane in focus, mm in front of the first vertex; None: as the rows stand.
-
-    Returns
-    -------
-    Lens
-
-    Raises
-    ------
-    ProjectError
-        When the lens does not focus that near.
-
-    Notes
-    -----
-    Between neighbouring positions gaps change in proportion to 1 / distance, as a helicoid's path does to first order.
-    """
-    if distance is None or not any(position.focus_distance is not None for position in lens.positions):
-        return lens
-
-    def nearness(position: Position) -> float:
-        return 1.0 / (inf if position.focus_distance is None else position.focus_distance)
-
-    ordered = sorted(lens.positions, key=nearness)
-    near = 1.0 / distance
-    if near > nearness(ordered[-1]) * (1.0 + 1e-9) or near < nearness(ordered[0]) * (1.0 - 1e-9):
-        raise ProjectError(
-            f"{lens.name} has focus positions down to {1.0 / nearness(ordered[-1]):g} mm, not for {distance:g} mm"
-        )
-    for one, other in pairwise(ordered):
-        if nearness(one) <= near <= nearness(other) * (1.0 + 1e-9):
-            part = (near - nearness(one)) / (nearness(other) - nearness(one))
-            found: Lens = at_position(lens, mixed(one, other, part)).replace(focus_distance=distance)
-            return found
-    return at_position(lens, ordered[-1])

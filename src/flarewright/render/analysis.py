@@ -58,6 +58,7 @@ def ghosts(
     cover_glass: Plate | None = None,
     sensor_reflectance: float = 0.0,
     imperfection: Imperfection | None = None,
+    remarks: list[str] | None = None,
     threads: int | None = None,
 ) -> GhostTable:
     """Analyse every ghost of a lens for one distant light (`optics.ghosts.ghost_table`).
@@ -84,6 +85,8 @@ def ghosts(
         Above 0 the sensor, unbounded here, is a mirror too, and there are paths "sensor-i".
     imperfection : Imperfection, optional
         One sample of the lens within tolerances.
+    remarks : list of str, optional
+        What is assumed on the way, and which rows a filter and a cover glass are, is appended to it.
     threads : int, optional
         None: all cores; the numbers do not depend on it.
 
@@ -96,11 +99,13 @@ def ghosts(
     FlarewrightError
         As `paraxial`, and for a coating that does not fit the lens.
     """
-    known = as_lens(lens)
+    known = as_lens(lens, remarks=remarks)
     built = build(
         known, coating, zoom=zoom, filter_plate=filter_plate, cover_glass=cover_glass, imperfection=imperfection,
         sensor_distance=sensor_distance, focus_distance=focus_distance,
     )  # fmt: skip
+    if remarks is not None:
+        remarks.extend(built.remarks)
     first_order(built.lens, f_number)  # refuses an f-number that the lens does not open to
     if not 0.0 <= sensor_reflectance <= 1.0:
         raise ProjectError(f"a sensor reflects between 0 and 1 of the light, not {sensor_reflectance:g}")

@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ProjectError
-from ..model import Layer
+from ..model import Layer, Project
 from ..model.art import SELECTOR, Rule
 from ..optics.ghosts import GhostTable, bounding_edges, ghost_table
+from ..optics.imperfection import ghost_offset
 from ..optics.paths import LightPath, ghost_paths
 from .prepare import Settled
 
@@ -149,8 +150,15 @@ class ResolvedArt:
         return not self.paths and not self.gain
 
 
+def directed(project: Project) -> bool:
+    """Tell whether a project changes ghosts by hand, or by chance without a cause."""
+    art, sample = project.art, project.imperfection
+    moved = sample is not None and sample.ghost_offset_mm > 0.0
+    return not art.physical and bool(art.rules or art.gain or moved)
+
+
 def resolve_art(settled: Settled) -> ResolvedArt:
-    """Find out which ghosts the rules choose, and add up what they change.
+    """Find out which ghosts the rules choose, and add up what they change; offsets by chance come first.
 
     Parameters
     ----------
@@ -167,10 +175,10 @@ def resolve_art(settled: Settled) -> ResolvedArt:
         When a rule names a path or row that the lens does not have, or a blur is too wide.
     """
     art, project = settled.project.art, settled.project
-    if art.physical or (not art.rules and not art.gain):
+    if not directed(project):
         return ResolvedArt()
     facts = _Facts(settled, ghost_paths(settled.lens, project.quality.paths, sensor=settled.sensor is not None))
-    found = {path.name: PLAIN for path in facts.paths}
+    found = {path.name: replace(PLAIN, offset=ghost_offset(path, project.imperfection)) for path in facts.paths}
     across = project.camera.size_px[0] / project.camera.sensor[0]
     down = project.camera.size_px[1] / project.camera.sensor[1]
     for k, rule in enumerate(art.rules):
@@ -294,4 +302,4 @@ def _pairs(rows: Sequence[object]) -> int:
     return surfaces * (surfaces - 1) // 2
 
 
-__all__ = ["PLAIN", "REACH", "Frame", "PathArt", "Ramp", "ResolvedArt", "graded", "resolve_art"]
+__all__ = ["PLAIN", "REACH", "Frame", "PathArt", "Ramp", "ResolvedArt", "directed", "graded", "resolve_art"]

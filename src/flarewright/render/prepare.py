@@ -22,7 +22,7 @@ from ..optics.paraxial import first_order as _first_order
 from ..optics.plates import with_cover_glass, with_filter
 from ..optics.repair import repair
 from ..optics.semi_diameters import complete
-from ..optics.zoom import at_position, focused, zoomed
+from ..optics.zoom import at_position, positioned
 
 
 def load_lens(name_or_path: str | Path, *, remarks: list[str] | None = None) -> Lens:
@@ -91,8 +91,11 @@ def complete_lens(lens: Lens, *, remarks: list[str] | None = None) -> Lens:
         if stated is not None and abs(order.efl / stated - 1.0) > 0.02:
             remarks.append(f"the focal length is {order.efl:.2f} mm, the file says {stated:g} mm")
         for position in full.positions:
+            if position.focal_length is None or position.focus_distance is not None:
+                # a patent's focal lengths are those at infinity
+                continue
             efl = first_order(at_position(full, position)).efl
-            if position.focal_length is not None and abs(efl / position.focal_length - 1.0) > 0.02:
+            if abs(efl / position.focal_length - 1.0) > 0.02:
                 told = f"the focal length is {efl:.2f} mm, the file says {position.focal_length:g} mm"
                 remarks.append(f"position {position.name!r}: {told}")
     return full
@@ -239,7 +242,7 @@ def build(
     """
     remarks: list[str] = []
     choice: CoatingChoice = AsLens() if coating is None else coating
-    lens = focused(zoomed(lens, zoom), focus_distance if zoom is None else None)
+    lens = positioned(lens, zoom, focus_distance)
     if filter_plate is not None or cover_glass is not None:
         # rows get their coatings before they get other numbers
         coats = resolve_coatings(lens, choice)

@@ -15,7 +15,8 @@ from ..model import Layer, Project
 from ..optics.bundle import incidence
 from ..optics.pack import facing
 from ..optics.paths import ghost_paths
-from .art import ResolvedArt, graded, resolve_art
+from ..optics.shape import ideal
+from .art import ResolvedArt, directed, graded, resolve_art
 from .compose import beauty
 from .direct import DirectImage, direct_image
 from .ghosts import render_ghosts
@@ -172,9 +173,8 @@ def _reference(
     told = list(found.remarks)
     if settled.project.output.layers == "ghosts":
         told.append("reference quality has no layer for each ghost; final quality has")
-    art = settled.project.art
-    if not art.physical and (art.rules or art.gain):
-        told.append("reference quality shows the physics: art direction is left out")
+    if directed(settled.project):
+        told.append("reference quality shows the physics: art direction and offsets by chance are left out")
     if settled.project.quality.paths != "all":
         told.append(f"reference quality traces every path, not only {settled.project.quality.paths} ones")
     return _Drawn(found.layers, found.variances, {"reference": found.facts}, tuple(told), found.ledger)
@@ -188,6 +188,8 @@ def _remarks(settled: Settled, shot: Shot) -> tuple[str, ...]:
         told.append(
             f"a distant light is out of focus by {blur_px:.1f} pixels; the starburst is drawn as if it were in focus"
         )
+    if settled.project.quality.mode == "draft" and ideal(settled.lens) != settled.lens:
+        told.append("draft quality draws the lens as designed, without decentre, tilt and figure errors")
     return tuple(told)
 
 
