@@ -129,6 +129,7 @@ PROJECT_FILES = {
     "starburst without size": (PROJECT + "[starburst]\nsize = 0\n", "starburst.size"),
     "starburst turned too far": (PROJECT + "[starburst]\nspiral_deg = 360\n", "starburst.spiral_deg"),
     "rough without length": (PROJECT + "[iris]\nroughness_length_um = 0\n", "iris.roughness_length_um"),
+    "light behind the lens": (PROJECT + "distance = -5\n", "lights[0].distance"),
     "light wider than the sky": (PROJECT + "diameter_deg = 200\n", "lights[0].diameter_deg"),
     "zoom of a prime": ("zoom = 50.0\n" + PROJECT, "has no positions"),
     "filter that is a number": ("filter = 3\n" + PROJECT, "filter"),
@@ -161,6 +162,10 @@ REF = ["--quality", "reference"]
 COMMAND_LINES = {
     "unknown command": (["rendre"], "no such command 'rendre'"),
     "no output": ([*H, "--light", "1,1"], "missing option '-o'"),
+    "light at no distance": ([*H, *GOOD, "--distance", "0"], "--distance should be greater than 0"),
+    "distance is nan": ([*H, *GOOD, "--distance", "nan"], "--distance should be a finite number"),
+    "too many distances": (
+        [*H, *GOOD, "--distance", "5", "--distance", "6"], "--distance is given 2 times for 1 light"),
     "no lens": (["render", *GOOD], "no lens is given"),
     "no light": ([*H, "-o", "a.exr"], "no light is given"),
     "unknown flag": ([*H, *GOOD, "--glow"], "no such option: --glow"),

@@ -17,7 +17,7 @@ one = np.ones(K)
 out = np.empty((8, STOP_X))
 trace_nodes(
     np.arange(K), np.zeros(K, dtype=np.int64), 0.01 * one, 0.0 * one, np.arange(K) * 1.0, 0.1 * one,
-    np.array([1.0, 1.5, 1.0]), np.zeros((K, 9)), 50.0, 0.0, np.zeros(8), np.zeros(8), out,
+    np.array([1.0, 1.5, 1.0]), np.zeros((K, 9)), 50.0, 0.0, 0.0, np.zeros(8), np.zeros(8), out,
 )
 (text,) = trace_nodes.inspect_asm().values()
 lines = [line for line in text.splitlines() if "vsqrtpd" in line]

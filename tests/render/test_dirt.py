@@ -15,8 +15,8 @@ from flarewright.render.direct import PUPIL_SPAN, direct_image, traced_pupil
 from flarewright.render.prepare import settle
 from flarewright.render.render import render
 from flarewright.render.shot import make_opening, make_shots
+from flarewright.render.spread import disc_kernel, spread
 from flarewright.render.starburst import starburst_layer
-from flarewright.render.starburst_pass import disc_blur
 
 GREEN = (np.array([550.0]), np.ones((1, 3)))
 WAVES = np.arange(500.0, 601.0, 5.0)
@@ -199,7 +199,7 @@ def test_the_lights_disc_blurs_and_keeps_the_flux():
 def test_disc_blur_of_a_dot_is_the_disc():
     dot = np.zeros((41, 51, 1))
     dot[20, 25] = 1.0
-    disc = disc_blur(dot, (7.0, 5.0))[..., 0]
+    disc = spread(dot, disc_kernel((7.0, 5.0)))[..., 0]
     assert disc.sum() == pytest.approx(1.0, rel=1e-12)
     y, x = np.mgrid[-20:21, -25:26]
     assert disc[(x / 7) ** 2 + (y / 5) ** 2 < 0.7] == pytest.approx(1 / (math.pi * 35), rel=0.01)

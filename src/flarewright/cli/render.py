@@ -59,6 +59,13 @@ def render(
         list[float] | None,
         typer.Option(help="Degrees across the light's disc, 0.53 for the sun; 0 is a point.", rich_help_panel=_LIGHT),
     ] = None,
+    distance: Annotated[
+        list[float] | None,
+        typer.Option(
+            help="Light in front of the lens, mm; inf, or left out: distant. Once for all, or once per light.",
+            rich_help_panel=_LIGHT,
+        ),
+    ] = None,
     fstop: Annotated[
         float | None, typer.Option(help="f-number; wide open when left out.", rich_help_panel=_LENS)
     ] = None,
@@ -268,8 +275,9 @@ def render(
     flags = Flags(
         lens=lens, project=project, light=light or [], intensity=intensity or [], spectrum=spectrum or [],
         fstop=fstop, blades=blades, rotation=rotation, rounding=rounding, iris_image=iris_image, coating=coating,
-        light_diameter=light_diameter or [], roughness=roughness, dust=dust, scratches=scratches,
-        fingerprint=fingerprint, dirt_image=dirt_image, cats_eye=cats_eye, starburst_size=starburst_size,
+        light_diameter=light_diameter or [], distance=distance or [], roughness=roughness, dust=dust,
+        scratches=scratches, fingerprint=fingerprint, dirt_image=dirt_image, cats_eye=cats_eye,
+        starburst_size=starburst_size,
         focus=focus, size=size, sensor=sensor, sensor_distance=sensor_distance, quality=quality,
         wavelengths=wavelengths, paths=paths, layers=layers, brightest=brightest, no_starburst=no_starburst,
         colorspace=colorspace, half=half, mute=mute or [], solo=solo or [], gain=gain or [], physical=physical,

@@ -31,6 +31,7 @@ _FLAG_OF = {
     "dirt.seed": "--seed",
     "starburst.size": "--starburst-size",
     "diameter_deg": "--light-diameter",
+    "distance": "--distance",
     "quality.ringing": "--ringing",
     "camera.size_px": "--size",
     "camera.sensor_mm": "--sensor",
@@ -63,6 +64,7 @@ class Flags:
     intensity: list[float]
     spectrum: list[str]
     light_diameter: list[float]
+    distance: list[float]
     fstop: float | None
     blades: int | None
     rotation: float | None
@@ -229,6 +231,7 @@ def _lights(flags: Flags, base: tuple[Light, ...]) -> list[dict[str, Any]]:
         ("intensity", flags.intensity),
         ("spectrum", spectra),
         ("diameter_deg", flags.light_diameter),
+        ("distance", [None if distance == float("inf") else distance for distance in flags.distance]),
     ):
         flag = _FLAG_OF.get(name, f"--{name}")
         if values and len(values) not in (1, len(lights)):

@@ -32,6 +32,7 @@ ABOUT = {
     "iris.blades": "0 is round",
     "iris.mask": '"iris.png"   # an image instead of blades, white transmits',
     "lights.field_deg": "degrees right and up in the picture",
+    "lights.distance": "mm in front of the first vertex; left out: so far away that its rays are parallel",
     "lights.intensity": "irradiance on a plane that faces the light",
     "lights.diameter_deg": "across the light's disc: 0.53 for the sun, 0 for a point",
     "iris.roughness_um": "rms of the blades' edges",

@@ -2,6 +2,8 @@
 
 from math import sqrt
 
+import numpy as np
+
 from ._jit import inlined
 
 REFRACT = 0
@@ -13,6 +15,39 @@ LANES = 64
 # columns of a traced node
 X, Y, WEIGHT, REL, ALIVE = 0, 1, 2, 3, 4
 STOP_X = 5  # then stop y, and the same for a second and third crossing
+
+
+@inlined
+def ray_from_near(tilt, nearness, px, py):
+    """Start a ray of a light at a finite distance.
+
+    Parameters
+    ----------
+    tilt : float
+        The ray through the first vertex runs along (0, sin tilt, cos tilt).
+    nearness : float
+        1 / distance from the light to the first vertex, 1/mm.
+    px, py : float
+        Where the ray crosses the plane of the first vertex, mm.
+
+    Returns
+    -------
+    dx, dy, dz : float
+        Unit direction.
+    irradiance : float
+        On the plane of the first vertex at the start, over that at the vertex.
+
+    Notes
+    -----
+    The light stands at -(0, sin tilt, cos tilt) / nearness, so a ray runs along u = (0, sin tilt, cos tilt) +
+    nearness (px, py, 0), and |u| is its length over that of the ray through the vertex. Irradiance falls as the cosine
+    over the square of the distance, and the cosine as 1 / distance: |u|^-3.
+    """
+    ux = nearness * px
+    uy = np.sin(tilt) + nearness * py
+    uz = np.cos(tilt)
+    inverse = 1.0 / sqrt(ux * ux + uy * uy + uz * uz)
+    return inverse * ux, inverse * uy, inverse * uz, inverse * inverse * inverse
 
 
 @inlined

@@ -122,7 +122,7 @@ def paraxial_weight(rows, actions, curvature, curvature_x, z_vertex, n_gap, refl
 @compiled
 def draw_matrix_ghosts(
     rows, actions, starts, crossings, curvature, curvature_x, z_vertex, n_gap, reflectance, sensor_z,
-    entrance, slope, slope_x, edges, iris_radius, mask, mask_half, axes, to_pixels, gain, rgb, plane,
+    entrance, slope, slope_x, nearness, edges, iris_radius, mask, mask_half, axes, to_pixels, gain, rgb, plane,
 ):  # fmt: skip
     """Draw many paths at many wavelengths with matrices (Lee and Eisemann 2013; Van Acoleyen 2025, chapter 4).
 
@@ -145,6 +145,8 @@ def draw_matrix_ghosts(
         Slope of the rays in the meridional plane.
     slope_x : float
         Slope across it; 0 in the meridional frame.
+    nearness : float
+        1 / distance along the axis from the light to the first vertex, 1/mm; 0 for a distant light.
     edges : ndarray, shape (B, 4)
         The iris as straight blades.
     iris_radius : float
@@ -168,9 +170,16 @@ def draw_matrix_ghosts(
         path_rows, path_actions = rows[starts[p] : starts[p + 1]], actions[starts[p] : starts[p + 1]]
         for w in range(n_gap.shape[0]):
             a, b, _, _ = path_matrices(path_rows, path_actions, curvature, z_vertex, n_gap[w], sensor_z, to_stop)
+            # the rays of a near light spread: their slope grows with their height
+            a += nearness * b
             ax, bx = a, b
             if curvature_x is not None:
                 ax, bx, _, _ = path_matrices(path_rows, path_actions, curvature_x, z_vertex, n_gap[w], sensor_z, across)
+                ax += nearness * bx
+            for c in range(crossings[p]):
+                to_stop[c, 0, 0] += nearness * to_stop[c, 0, 1]
+                if curvature_x is not None:
+                    across[c, 0, 0] += nearness * across[c, 0, 1]
             count = _project_entrance(
                 polygon, entrance, slope, slope_x, a, b, ax, bx, to_stop, across, crossings[p], axes
             )
@@ -181,7 +190,7 @@ def draw_matrix_ghosts(
             beside = 0.0 if curvature_x is None else _centre(across, slope_x, iris_radius, entrance)
             weight = paraxial_weight(
                 path_rows, path_actions, curvature, curvature_x, z_vertex, n_gap[w], reflectance[w],
-                centre, slope, beside, slope_x,
+                centre, slope + nearness * centre, beside, slope_x + nearness * beside,
             )  # fmt: skip
             flux = gain * weight * abs(polygon_area(polygon, count, PP, PQ))
             for k in range(count):

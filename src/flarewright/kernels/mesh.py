@@ -115,7 +115,7 @@ def _fan_areas(data, nodes):
 
 @compiled
 def build_mesh(
-    rows, actions, curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, tilt,
+    rows, actions, curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, tilt, nearness,
     crossings, iris_radius, iris_inner, box, nx, ny, max_level, tolerance, flux_tolerance, scale, view_radius,
 ):  # fmt: skip
     """Trace a path on a grid that is refined where the map bends, folds or is cut, and triangulate it without cracks.
@@ -173,7 +173,7 @@ def build_mesh(
         first = n_nodes
         pupil, data, n_nodes = _add_nodes(lattice, pupil, data, n_nodes, cells, level, depth, ny, box)
         _trace(
-            rows, actions, curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, tilt,
+            rows, actions, curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, tilt, nearness,
             pupil, data, first, n_nodes,
         )  # fmt: skip
         children = np.empty(4 * cells.size, dtype=np.int64)
@@ -208,7 +208,7 @@ def build_mesh(
         forced = _leaves(state, offsets, level)
         pupil, data, n_nodes = _add_nodes(lattice, pupil, data, n_nodes, forced, level, depth, ny, box)
     _trace(
-        rows, actions, curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, tilt,
+        rows, actions, curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, tilt, nearness,
         pupil, data, first, n_nodes,
     )  # fmt: skip
     pupil, data = _resized(pupil, data, n_nodes, n_nodes)
@@ -250,15 +250,16 @@ def _resized(pupil, data, n_nodes, room):
 
 @inner
 def _trace(
-    rows, actions, curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, tilt, pupil, data, first, end
-):
+    rows, actions, curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, tilt, nearness,
+    pupil, data, first, end,
+):  # fmt: skip
     """Trace new nodes at every wavelength that shapes the grid."""
     px, py = np.empty(end - first), np.empty(end - first)
     for k in range(first, end):
         px[k - first], py[k - first] = pupil[k, 0], pupil[k, 1]
     for v in range(n_gap.shape[0]):
         trace_nodes(
-            rows, actions, curvature, conic, z_vertex, inv_semi, n_gap[v], reflectance[v], sensor_z, tilt,
+            rows, actions, curvature, conic, z_vertex, inv_semi, n_gap[v], reflectance[v], sensor_z, tilt, nearness,
             px, py, data[v, first:end],
         )  # fmt: skip
 

@@ -82,8 +82,9 @@ def trace_batch(
     sensor_z : float
     rows : tuple of int
         The stop's row and that of the first surface.
-    direction : ndarray, shape (3,)
-        Of the light's rays.
+    direction : ndarray, shape (4,)
+        Of the light's ray through the first vertex, and the light's nearness (`kernels.trace.trace_nodes`), 0 for a
+        distant light.
     axes : ndarray, shape (2, 2)
         Upright (x, y) of the axes in which `box` is given.
     box : ndarray, shape (4,)
@@ -126,6 +127,7 @@ def trace_batch(
     cell_x, cell_y = (box[1] - box[0]) / side, (box[3] - box[2]) / side
     stream, pool = np.empty(6, dtype=np.uint64), np.empty(4)
     stack = np.empty((STACK, 12))
+    start = np.empty(5)
     stream[4], stream[5] = key[0], key[1]
     for point in range(points):
         stream[0], stream[1] = np.uint64(0), np.uint64(point)
@@ -134,10 +136,13 @@ def trace_batch(
         px = box[0] + (point % side + pool[0]) * cell_x
         py = box[2] + (point // side + pool[1]) * cell_y
         x, y = px * axes[0, 0] + py * axes[1, 0], px * axes[0, 1] + py * axes[1, 1]
+        # a near light's rays spread, and fall off (`kernels.bend.ray_from_near`)
+        dx, dy, dz = direction[0] + direction[3] * x, direction[1] + direction[3] * y, direction[2]
+        inverse = 1.0 / np.sqrt(dx * dx + dy * dy + dz * dz) if direction[3] > 0.0 else 1.0
+        start[0], start[1], start[2], start[3], start[4] = x, y, inverse * dx, inverse * dy, inverse * dz
+        amount = unit * inverse * inverse * inverse
         first = rows[1]
-        front = _cross(
-            curvature, conic, first, z_vertex[first], x, y, 0.0, direction[0], direction[1], direction[2], 1.0, 1.0
-        )
+        front = _cross(curvature, conic, first, z_vertex[first], x, y, 0.0, start[2], start[3], start[4], 1.0, 1.0)
         if not front[12] or front[9] * inv_semi[first] * inv_semi[first] > 1.0:
             continue
         chance = pool[2]
@@ -149,15 +154,15 @@ def trace_batch(
             stream[0], stream[1] = np.uint64(0), np.uint64(point * heroes + hero)
             stream[2], stream[3] = np.uint64(batch), np.uint64(2 * light + 1)
             _trace_tree(
-                curvature, conic, z_vertex, inv_semi, n_gap[s], reflectance[s], sensor_z, rows[0], x, y, direction,
-                unit, luminances[s], rgbs[s], boost, stream, pool, stack, blades, mask, half, to_pixels, size,
+                curvature, conic, z_vertex, inv_semi, n_gap[s], reflectance[s], sensor_z, rows[0], start,
+                amount, luminances[s], rgbs[s], boost, stream, pool, stack, blades, mask, half, to_pixels, size,
                 planes, tallies, paths,
             )  # fmt: skip
 
 
 @inner
 def _trace_tree(
-    curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, stop_row, start_x, start_y, direction,
+    curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, stop_row, start,
     unit, luminance, rgb, boost, stream, pool, stack, blades, mask, half, to_pixels, size, planes, tallies, paths,
 ):  # fmt: skip
     """Follow one ray and everything that splits off it."""
@@ -166,7 +171,7 @@ def _trace_tree(
     bright = unit * luminance
     tallies[ENTERED] += bright
     drawn = 4
-    x, y, z, dx, dy, dz = start_x, start_y, 0.0, direction[0], direction[1], direction[2]
+    x, y, z, dx, dy, dz = start[0], start[1], 0.0, start[2], start[3], start[4]
     weight = 1.0
     row, heading, order, first, second = np.int64(0), np.int64(1), np.int64(0), np.int64(0), np.int64(0)
     waiting = 0

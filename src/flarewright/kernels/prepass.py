@@ -54,14 +54,14 @@ def rejected(data, nodes, crossings, iris_radius, slack):
 
 @compiled
 def find_box(
-    rows, actions, curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, tilt,
+    rows, actions, curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, tilt, nearness,
     crossings, iris_radius, view_radius, box, nx, ny,
 ):  # fmt: skip
     """Bound the part of the pupil that a path accepts, and estimate what it carries.
 
     Parameters
     ----------
-    rows ... tilt
+    rows ... nearness
         As in `trace_nodes`.
     crossings : int
         How often the path crosses the stop.
@@ -98,7 +98,9 @@ def find_box(
             px[a * width + b] = box[0] + a * hx
             py[a * width + b] = box[2] + b * hy
     data = np.empty((count, STOP_X + 2 * crossings))
-    trace_nodes(rows, actions, curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, tilt, px, py, data)
+    trace_nodes(
+        rows, actions, curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, tilt, nearness, px, py, data
+    )
     found = np.array([np.inf, -np.inf, np.inf, -np.inf])
     sums = np.zeros(6)
     nodes = np.empty(4, dtype=np.int64)
@@ -126,7 +128,7 @@ def find_box(
             corners[k, 0] = box[0] + (doubtful[k] // ny) * hx
             corners[k, 1] = box[2] + (doubtful[k] % ny) * hy
         _probe(
-            rows, actions, curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, tilt,
+            rows, actions, curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, tilt, nearness,
             crossings, iris_radius, corners, hx, hy, found, sums,
         )  # fmt: skip
     for k in range(count):
@@ -182,7 +184,7 @@ def _passes(data, k, crossings, iris_radius):
 
 @inner
 def _probe(
-    rows, actions, curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, tilt,
+    rows, actions, curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, tilt, nearness,
     crossings, iris_radius, corners, hx, hy, found, sums,
 ):  # fmt: skip
     """Look into doubtful cells with PROBES x PROBES rays each and widen the box by what passes."""
@@ -193,7 +195,9 @@ def _probe(
         px[k] = corners[cell, 0] + (m // PROBES + 0.5) * hx / PROBES
         py[k] = corners[cell, 1] + (m % PROBES + 0.5) * hy / PROBES
     data = np.empty((px.size, STOP_X + 2 * crossings))
-    trace_nodes(rows, actions, curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, tilt, px, py, data)
+    trace_nodes(
+        rows, actions, curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, tilt, nearness, px, py, data
+    )
     for k in range(px.size):
         if _passes(data, k, crossings, iris_radius):
             found[0], found[1] = min(found[0], px[k] - hx / PROBES), max(found[1], px[k] + hx / PROBES)

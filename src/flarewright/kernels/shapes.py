@@ -9,7 +9,7 @@ from math import sqrt
 import numpy as np
 
 from ._jit import compiled, inner
-from .bend import ALIVE, REFLECT, REL, STOP, STOP_X, WEIGHT, X, Y, bend_at
+from .bend import ALIVE, REFLECT, REL, STOP, STOP_X, WEIGHT, X, Y, bend_at, ray_from_near
 from .intersect import (
     AXES,
     CENTRED,
@@ -96,7 +96,9 @@ def _turn_back(shapes, row, x, y, z):
 
 
 @compiled
-def trace_shapes(rows, actions, shapes, z_vertex, inv_semi, n_gap, reflectance, sensor_z, tilt, px, py, out):
+def trace_shapes(
+    rows, actions, shapes, z_vertex, inv_semi, n_gap, reflectance, sensor_z, tilt, nearness, px, py, out,
+):  # fmt: skip
     """Trace rays as `kernels.trace.trace_nodes` does, through rows of any shape.
 
     Parameters
@@ -113,6 +115,8 @@ def trace_shapes(rows, actions, shapes, z_vertex, inv_semi, n_gap, reflectance, 
         x, y, z = px[k], py[k], 0.0
         dx, dy, dz = 0.0, np.sin(tilt), np.cos(tilt)
         weight, rel2, alive, heading = 1.0, 0.0, 1.0, 1.0
+        if nearness > 0.0:
+            dx, dy, dz, weight = ray_from_near(tilt, nearness, x, y)
         crossing = 0
         for step in range(rows.shape[0]):
             row = rows[step]

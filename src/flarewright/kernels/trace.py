@@ -5,7 +5,7 @@ from math import sqrt
 import numpy as np
 
 from ._jit import compiled
-from .bend import ALIVE, LANES, REFLECT, REFRACT, REL, STOP, STOP_X, WEIGHT, X, Y, bend
+from .bend import ALIVE, LANES, REFLECT, REFRACT, REL, STOP, STOP_X, WEIGHT, X, Y, bend, ray_from_near
 from .intersect import intersect_conic
 from .shapes import hit_shapes, trace_shapes
 
@@ -16,8 +16,10 @@ __all__ = [
 
 
 @compiled
-def trace_nodes(rows, actions, curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, tilt, px, py, out):
-    """Trace rays of one distant light along one path to the sensor plane.
+def trace_nodes(
+    rows, actions, curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, tilt, nearness, px, py, out,
+):  # fmt: skip
+    """Trace rays of one light along one path to the sensor plane.
 
     Parameters
     ----------
@@ -33,7 +35,9 @@ def trace_nodes(rows, actions, curvature, conic, z_vertex, inv_semi, n_gap, refl
     sensor_z : float
         Sensor plane, mm from the first vertex.
     tilt : float
-        The rays' direction is (0, sin tilt, cos tilt) in the meridional frame.
+        The ray through the first vertex runs along (0, sin tilt, cos tilt) in the meridional frame.
+    nearness : float
+        1 / distance from the light to the first vertex, 1/mm; 0 for a distant light, whose rays are parallel.
     px, py : ndarray, shape (N,)
         Where the rays cross the plane of the first vertex, mm.
     out : ndarray, shape (N, 5 + 2 C)
@@ -43,10 +47,13 @@ def trace_nodes(rows, actions, curvature, conic, z_vertex, inv_semi, n_gap, refl
     Notes
     -----
     Hullin 2011, section 4.1. A ray ends when it misses, is totally reflected where it should refract, or turns the
-    wrong way along its leg. A mirror beyond the critical angle has R = 1.
+    wrong way along its leg. A mirror beyond the critical angle has R = 1. The weight of a near light's ray begins with
+    the irradiance at its start over that at the first vertex (`kernels.bend.ray_from_near`).
     """
     if conic.ndim == 2:
-        trace_shapes(rows, actions, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, tilt, px, py, out)
+        trace_shapes(
+            rows, actions, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, tilt, nearness, px, py, out
+        )
         return
     n_rays = px.shape[0]
     samples = reflectance.shape[1]
@@ -74,6 +81,9 @@ def trace_nodes(rows, actions, curvature, conic, z_vertex, inv_semi, n_gap, refl
             weight[m] = 1.0
             rel2[m] = 0.0
             alive[m] = 1.0
+        if nearness > 0.0:
+            for m in range(LANES):
+                dx[m], dy[m], dz[m], weight[m] = ray_from_near(tilt, nearness, x[m], y[m])
         heading = 1.0
         crossing = 0
         for step in range(rows.shape[0]):

@@ -57,15 +57,19 @@ Spectrum = Annotated[EqualEnergy | D65 | BlackBody | Lines | Tabulated, Field(di
 
 
 class Light(Frozen):
-    """A distant light.
+    """A light, distant or near.
 
     Attributes
     ----------
     field_deg : tuple of float
         Field angles (X, Y) in degrees: the direct image lies near (+efl tan X right, +efl tan Y up) in the upright
-        picture.
+        picture. Those of a near light are seen from the middle of the entrance pupil.
+    distance : float or None
+        How far in front of the first vertex the light stands, mm along the axis, as the camera's focus distance; None:
+        so far away that its rays are parallel.
     intensity : float
-        Irradiance (luminous, so a white light of 1 is RGB 1, 1, 1) on a plane that faces the light.
+        Irradiance (luminous, so a white light of 1 is RGB 1, 1, 1) on a plane that faces the light; of a near light at
+        the middle of the entrance pupil.
     spectrum : Spectrum
     diameter_deg : float
         Angle across the light's round disc, 0.53 for the sun, 0 for a point; blurs the starburst and the rings in
@@ -77,6 +81,7 @@ class Light(Frozen):
         Annotated[float, Field(gt=-90.0, lt=90.0)],
         Annotated[float, Field(gt=-90.0, lt=90.0)],
     ]
+    distance: float | None = Field(None, gt=0.0, le=1e9)
     intensity: float = Field(1.0, ge=0.0)
     spectrum: Spectrum = D65()
     diameter_deg: float = Field(0.0, ge=0.0, le=60.0)

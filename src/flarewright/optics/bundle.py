@@ -32,42 +32,74 @@ MAX_LEVEL = 6
 
 @dataclass(frozen=True)
 class Incidence:
-    """A distant light's direction.
+    """Where a light stands.
 
     Attributes
     ----------
     tilt : float
-        Angle of the rays in the meridional frame, rad: direction (0, sin tilt, cos tilt); never positive.
+        Angle of the ray through the first vertex in the meridional frame, rad: it runs along (0, sin tilt, cos tilt);
+        never positive.
     axes : ndarray, shape (2, 2)
         Upright (x, y) of the meridional x axis (the mirror axis' normal) and y axis (towards the light).
+    nearness : float
+        1 / distance from the light to the first vertex, 1/mm; 0 for a distant light, whose rays are parallel.
+    falloff : float
+        Irradiance at the first vertex over that at the entrance pupil, both on planes that face the light; 1 for a
+        distant light.
     """
 
     tilt: float
     axes: Floats
+    nearness: float = 0.0
+    falloff: float = 1.0
+
+    @property
+    def tilt_cosine(self) -> float:
+        """Cosine of the tilt."""
+        return cos(self.tilt)
 
     @property
     def cosine(self) -> float:
-        """Cosine of the field angle."""
-        return cos(self.tilt)
+        """Irradiance at the first vertex on its plane, of a light of 1; of a distant light the cosine of its angle."""
+        return cos(self.tilt) * self.falloff
 
 
-def incidence(field_deg: tuple[float, float]) -> Incidence:
-    """Turn field angles into a direction.
+def incidence(field_deg: tuple[float, float], distance: float | None = None, pupil_z: float = 0.0) -> Incidence:
+    """Turn field angles, and the distance of a near light, into the rays' direction.
 
     Parameters
     ----------
     field_deg : tuple of float
         (X, Y): the rays run along (-tan X, -tan Y, 1), so the direct image lies near (+efl tan X, +efl tan Y) in the
-        upright picture.
+        upright picture. Those of a near light are seen from the middle of the entrance pupil, which is where a lens
+        looks from: near or far, the image stays about where it is.
+    distance : float, optional
+        How far in front of the first vertex the light stands, mm along the axis; None: a distant light.
+    pupil_z : float
+        The entrance pupil, mm from the first vertex; only a near light asks.
 
     Returns
     -------
     Incidence
+
+    Raises
+    ------
+    ValueError
+        When a near light stands at or behind the plane of the first vertex or the entrance pupil.
     """
     slope_x, slope_y = tan(radians(field_deg[0])), tan(radians(field_deg[1]))
     azimuth = atan2(slope_y, slope_x)
     axes = np.array([[-sin(azimuth), cos(azimuth)], [cos(azimuth), sin(azimuth)]])
-    return Incidence(-atan(hypot(slope_x, slope_y)), axes)
+    slope = hypot(slope_x, slope_y)
+    if distance is None:
+        return Incidence(-atan(slope), axes)
+    to_pupil = distance + pupil_z
+    if not (distance > 0.0 and to_pupil > 0.0):
+        raise ValueError(f"a light at {distance:g} mm is not in front of the lens and its entrance pupil")
+    # the height of the light is the pupil's to see, the slope the vertex'
+    height = to_pupil * slope
+    from_vertex, from_pupil = hypot(height, distance), hypot(height, to_pupil)
+    return Incidence(-atan(height / distance), axes, 1.0 / from_vertex, (from_pupil / from_vertex) ** 2)
 
 
 @dataclass(frozen=True)
@@ -96,7 +128,8 @@ class Bundle:
 def _arguments(packed: PackedLens, w: int | list[int], path: LightPath, tilt: float) -> Any:
     """List what every tracing kernel takes first."""
     geometry = (packed.curvature, packed.form, packed.z_vertex, packed.inv_semi)
-    return (path.rows, path.actions, *geometry, packed.n_gap[w], packed.reflectance[w], packed.sensor_z, tilt)
+    light = (tilt, packed.nearness)
+    return (path.rows, path.actions, *geometry, packed.n_gap[w], packed.reflectance[w], packed.sensor_z, *light)
 
 
 def front_box(packed: PackedLens, tilt: float) -> Floats:
@@ -107,12 +140,29 @@ def front_box(packed: PackedLens, tilt: float) -> Floats:
     first = packed.first_surface
     if packed.shapes is not None:
         return _shaped_box(packed, tilt, first)
+    if packed.nearness > 0.0:
+        return _near_box(packed, tilt, first)
     semi, c = packed.semi[first], packed.curvature[first]
     sag = c * semi**2 / (1.0 + sqrt(max(1.0 - (1.0 + packed.conic[first]) * (c * semi) ** 2, 0.0)))
     # a rim at z = sag is met by rays that cross z = 0 displaced by sag tan(tilt)
     low, high = -semi - max(0.0, sag * tan(tilt)), semi + max(0.0, -sag * tan(tilt))
     lead = abs(packed.z_vertex[first] * tan(tilt))
     return np.array([0.0, semi, low - lead, high + lead]) * (1.0 + 1e-9)
+
+
+def _near_box(packed: PackedLens, tilt: float, first: int) -> Floats:
+    """Bound the front of a lens of revolution as a near light sees it: circles of the first surface, projected."""
+    semi, c = float(packed.semi[first]), float(packed.curvature[first])
+    radius = semi * np.linspace(0.0, 1.0, 33)
+    root = np.sqrt(np.maximum(1.0 - (1.0 + packed.conic[first]) * (c * radius) ** 2, 0.0))
+    z = packed.z_vertex[first] + c * radius**2 / (1.0 + root)
+    distance, height = cos(tilt) / packed.nearness, -sin(tilt) / packed.nearness
+    # seen from the light, a circle across the axis is a circle on every plane across it
+    part = distance / np.maximum(distance + z, 1e-3 * distance)
+    centre, reach = height * (1.0 - part), radius * part
+    # between two circles the bound bulges a little
+    slack = 1e-3 * semi
+    return np.array([0.0, reach.max() + slack, (centre - reach).min() - slack, (centre + reach).max() + slack])
 
 
 def _shaped_box(packed: PackedLens, tilt: float, first: int) -> Floats:
@@ -124,9 +174,14 @@ def _shaped_box(packed: PackedLens, tilt: float, first: int) -> Floats:
     rim = np.stack([x, y, height], axis=1) @ shape[AXES : AXES + 9].reshape(3, 3) + shape[ORIGIN : ORIGIN + 3]
     # the rim's chords cut its arcs short, and the surface may bulge beyond its rim's height
     slack = 0.01 * semi + float(np.ptp(np.append(rim[:, 2], shape[ORIGIN + 2])) * abs(tan(tilt)))
-    at = rim[:, 1] - (packed.z_vertex[first] + rim[:, 2]) * tan(tilt)
-    left = 0.0 if packed.symmetric else float(rim[:, 0].min()) - slack
-    return np.array([left, float(rim[:, 0].max()) + slack, float(at.min()) - slack, float(at.max()) + slack])
+    z = packed.z_vertex[first] + rim[:, 2]
+    at, across = rim[:, 1] - z * tan(tilt), rim[:, 0]
+    if packed.nearness > 0.0:
+        distance, lift = cos(tilt) / packed.nearness, -sin(tilt) / packed.nearness
+        part = distance / np.maximum(distance + z, 1e-3 * distance)
+        at, across = lift + (rim[:, 1] - lift) * part, rim[:, 0] * part
+    left = 0.0 if packed.symmetric else float(across.min()) - slack
+    return np.array([left, float(across.max()) + slack, float(at.min()) - slack, float(at.max()) + slack])
 
 
 def _cells(packed: PackedLens, cells: tuple[int, int]) -> tuple[int, int]:

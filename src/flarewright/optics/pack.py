@@ -44,6 +44,8 @@ class PackedLens:
         Curvatures in the x-z plane; None when they are those in the y-z plane.
     faced : ndarray, shape (K, P), or None
         `shapes` in the meridional frame of one light (`facing`).
+    nearness : float
+        1 / distance from that light to the first vertex, 1/mm; 0 for a distant one.
     """
 
     curvature: NDArray[np.float64]
@@ -61,6 +63,7 @@ class PackedLens:
     symmetric: bool = True
     curvature_x: NDArray[np.float64] | None = None
     faced: NDArray[np.float64] | None = None
+    nearness: float = 0.0
 
     @property
     def halves(self) -> int:
@@ -223,22 +226,24 @@ def _with_sensor(packed: PackedLens, sensor: SensorMirror) -> PackedLens:
     )
 
 
-def facing(packed: PackedLens, axes: NDArray[np.float64]) -> PackedLens:
-    """Turn a lens towards a light: only for those that are not ones of revolution it makes a difference.
+def facing(packed: PackedLens, axes: NDArray[np.float64], nearness: float = 0.0) -> PackedLens:
+    """Turn a lens towards a light; a lens of revolution looks the same from everywhere.
 
     Parameters
     ----------
     packed : PackedLens
     axes : ndarray, shape (2, 2)
         The light's (`optics.bundle.Incidence.axes`).
+    nearness : float
+        The light's.
 
     Returns
     -------
     PackedLens
     """
     if packed.symmetric or packed.shapes is None:
-        return packed
-    return replace(packed, faced=seen_along(packed.shapes, axes))
+        return packed if packed.nearness == nearness else replace(packed, nearness=nearness)
+    return replace(packed, faced=seen_along(packed.shapes, axes), nearness=nearness)
 
 
 def _reflectance(

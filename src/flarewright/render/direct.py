@@ -12,6 +12,7 @@ from ..kernels.raster import blank_plane, to_pixels
 from ..kernels.trace import ALIVE, REL, WEIGHT, X, Y
 from ..model import Lens
 from ..optics.bundle import Bundle, find_region, trace_bundle, trace_grid, trace_points
+from ..optics.paraxial import D_LINE_NM, path_matrices
 from ..optics.paths import direct_path
 from .shot import Shot
 
@@ -92,6 +93,84 @@ def _through_mask(shot: Shot, bundle: Bundle, data: Floats, sums: Floats) -> flo
         bundle.halves,
     )  # fmt: skip
     return float(to_pixels(plane, side)[:, :, 0].sum(dtype=np.float64))
+
+
+def defocus_mm(lens: Lens, shot: Shot) -> float:
+    """Compute how wide the direct image of a point is on the sensor because it is out of focus, by matrices.
+
+    Parameters
+    ----------
+    lens : Lens
+    shot : Shot
+
+    Returns
+    -------
+    float
+        Diameter of the disc, mm; 0 in focus.
+    """
+    packed = shot.packed
+    order = packed.first_order
+    _, total = path_matrices(lens, direct_path(lens), D_LINE_NM, packed.sensor_z)
+    nearness = packed.nearness / shot.incidence.tilt_cosine
+    # the marginal ray of a near light is lower on the first vertex' plane than in the entrance pupil, or higher
+    height = 0.5 * order.entrance_pupil_diameter / (1.0 + nearness * order.entrance_pupil_z)
+    return 2.0 * height * abs(float(total[0, 0] + nearness * total[0, 1]))
+
+
+def traced_spot(lens: Lens, shot: Shot) -> Floats | None:
+    """Draw the direct image of a point as its rays land, without diffraction.
+
+    Parameters
+    ----------
+    lens : Lens
+    shot : Shot
+
+    Returns
+    -------
+    ndarray, shape (2 a + 1, 2 b + 1), or None
+        Part of the flux per pixel of the picture, at the middle wavelength; its centroid lies in the middle of the
+        middle pixel. None when no light passes.
+    """
+    path, packed, opening = direct_path(lens), shot.packed, shot.opening
+    region = find_region(packed, path, shot.incidence.tilt, opening.radius)
+    if region is None:
+        return None
+    scale = float(shot.to_pixels[2:].max())
+    tilt, axes, crossings = shot.incidence.tilt, shot.incidence.axes, path.stop_crossings
+    bundle = trace_grid(packed, path, tilt, (opening.radius, opening.inner), region, tolerance=0.25, scale=scale)
+    data = trace_bundle(packed, (len(packed.wavelengths_nm) - 1) // 2, bundle, tilt)
+    sums = measure_bundle(data, bundle.pupil, bundle.triangles, crossings, opening.blades, axes, bundle.halves)
+    if sums[0] <= 0.0:
+        return None
+    x, y = sums[1] / sums[0], sums[2] / sums[0]
+    # how far from the centroid a ray may land, and no farther than across two pictures
+    across, along = -(axes @ np.array([x, y]))
+    far = float(np.hypot(sums[5] + abs(across), max(sums[7] - along, along - sums[6])))
+    sides = zip(shot.to_pixels[2:], shot.size_px, strict=True)
+    reach = [int(min(np.ceil(far * zoom) + 1, 2 * side)) for zoom, side in sides]
+    plane = blank_plane(2 * reach[0] + 1, 2 * reach[1] + 1)
+    view = np.array([0.0, 0.0, *shot.to_pixels[2:]])
+    view[0], view[1] = reach[0] + 0.5 - x * view[2], reach[1] + 0.5 + y * view[3]
+    draw_bundle(
+        data, bundle.pupil, bundle.triangles, node_densities(data, bundle.pupil, bundle.triangles), crossings,
+        opening.blades, opening.mask, opening.half, axes, view, 1.0, np.array([1.0, 0.0, 0.0]), plane, bundle.halves,
+    )  # fmt: skip
+    drawn = to_pixels(plane, 2 * reach[0] + 1)[:, :, 0].astype(np.float64)
+    total = float(drawn.sum())
+    if any(r == 2 * side for r, side in zip(reach, shot.size_px, strict=True)):
+        # some of the light lies beyond
+        whole = float(sums[0]) if opening.mask is None else _through_mask(shot, bundle, data, sums)
+        total = whole if opening.mask is None else whole / shot.incidence.cosine
+    return _trimmed(drawn) / total if total > 0.0 else None
+
+
+def _trimmed(kernel: Floats) -> Floats:
+    """Cut dark borders off, as much on either side."""
+    (high, wide), cut = kernel.shape, []
+    for lit, side in ((kernel.any(axis=1), high), (kernel.any(axis=0), wide)):
+        at = np.flatnonzero(lit)
+        cut.append(0 if at.size == 0 else min(int(at[0]), side - 1 - int(at[-1])))
+    return kernel[cut[0] : high - cut[0], cut[1] : wide - cut[1]]
 
 
 def traced_pupil(lens: Lens, shot: Shot, f_number: float) -> Floats | None:

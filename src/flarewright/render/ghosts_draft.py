@@ -47,7 +47,7 @@ def draw_draft(
     starts = np.cumsum([0, *(len(path.rows) for path in paths)])
     first = packed.first_surface
     slope, axes = float(np.tan(shot.incidence.tilt)), shot.incidence.axes
-    slope_x = 0.0
+    slope_x, nearness = 0.0, packed.nearness / shot.incidence.tilt_cosine
     if packed.curvature_x is not None:
         # its two meridians are the lens' own, whatever the light's
         slope_x, slope = float(axes[1, 0]) * slope, float(axes[1, 1]) * slope
@@ -57,7 +57,7 @@ def draw_draft(
         np.array([path.stop_crossings for path in paths]), packed.curvature, packed.curvature_x,
         packed.z_vertex, packed.n_gap,
         packed.reflectance, packed.sensor_z, float(packed.semi[first]), slope, slope_x,
-        opening.edges, opening.radius, opening.mask, opening.half, axes, shot.to_pixels, shot.gain,
+        nearness, opening.edges, opening.radius, opening.mask, opening.half, axes, shot.to_pixels, shot.gain,
         shot.weights(packed.wavelengths_nm) * rgb, differences,
     )  # fmt: skip
 
@@ -129,6 +129,10 @@ def _meridian(shot: Shot, path: LightPath, curvature: Floats, slope: float) -> t
     a, b, _, _ = path_matrices(
         path.rows, path.actions, curvature, packed.z_vertex, packed.n_gap[middle], packed.sensor_z, to_stop
     )
+    # the rays of a near light spread: their slope grows with their height
+    nearness = packed.nearness / shot.incidence.tilt_cosine
+    a += nearness * b
+    to_stop[:, :, 0] += nearness * to_stop[:, :, 1]
     # the entrance, or the iris as seen from the front, whichever is smaller
     centre, radius = 0.0, float(packed.semi[packed.first_surface])
     for ma, mb in to_stop[:, 0]:

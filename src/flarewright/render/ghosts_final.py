@@ -69,7 +69,7 @@ class FinalPass:
     @property
     def gain(self) -> float:
         """What makes the path brighter than its region says: the light, and a person's wish."""
-        return self.shot.light.intensity * self.art.visible_gain
+        return self.shot.light.intensity * self.shot.incidence.falloff * self.art.visible_gain
 
 
 def find_final(shot: Shot, path: LightPath, art: PathArt = PLAIN) -> FinalPass | None:

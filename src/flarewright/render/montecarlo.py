@@ -67,7 +67,7 @@ def ray_source(shot: Shot, seed: int, *, side: int, light: int) -> RaySource:
     box = front_box(packed, tilt)
     if packed.symmetric:
         box[0] = -box[1]
-    direction = np.array([np.sin(tilt) * axes[1, 0], np.sin(tilt) * axes[1, 1], np.cos(tilt)])
+    direction = np.array([np.sin(tilt) * axes[1, 0], np.sin(tilt) * axes[1, 1], np.cos(tilt), packed.nearness])
     rgb = shot.weights(packed.wavelengths_nm)
     # a sample is drawn as often as it colours the picture
     chance = np.abs(rgb).sum(axis=1)

@@ -18,11 +18,11 @@ from ..optics.paths import ghost_paths
 from ..optics.shape import ideal
 from .art import ResolvedArt, directed, graded, resolve_art
 from .compose import beauty
-from .direct import DirectImage, direct_image
+from .direct import DirectImage, defocus_mm, direct_image
 from .ghosts import render_ghosts
 from .prepare import Settled, settle
 from .shot import Shot, make_opening, make_shots, soiled_opening
-from .starburst_pass import read_soil, starburst_of
+from .starburst_pass import OUT_OF_FOCUS_PX, read_soil, starburst_of
 
 if TYPE_CHECKING:
     from .ledger import Ledger
@@ -120,7 +120,7 @@ def render(
         settled.project,
         layers,
         {**summary, "ledger": account.as_data()} if ledger and account is not None else summary,
-        (*settled.remarks, *drawn.remarks, *_remarks(settled, shots[0])),
+        (*settled.remarks, *drawn.remarks, *_remarks(settled, shots)),
         account if ledger else None,
     )
 
@@ -180,14 +180,12 @@ def _reference(
     return _Drawn(found.layers, found.variances, {"reference": found.facts}, tuple(told), found.ledger)
 
 
-def _remarks(settled: Settled, shot: Shot) -> tuple[str, ...]:
+def _remarks(settled: Settled, shots: tuple[Shot, ...]) -> tuple[str, ...]:
     told = []
-    order = settled.order
-    blur_px = abs(order.sensor_distance - order.bfl) / order.f_number * float(shot.to_pixels[2])
-    if settled.project.output.starburst and blur_px > 1.0:
-        told.append(
-            f"a distant light is out of focus by {blur_px:.1f} pixels; the starburst is drawn as if it were in focus"
-        )
+    blur_px = max(defocus_mm(settled.lens, shot) * float(shot.to_pixels[2]) for shot in shots)
+    if settled.project.output.starburst and blur_px > OUT_OF_FOCUS_PX:
+        of = f"the direct image of {'the light' if len(shots) == 1 else 'a light'} is out of focus"
+        told.append(f"{of}: a disc {blur_px:.1f} pixels wide")
     if settled.project.quality.mode == "draft" and ideal(settled.lens) != settled.lens:
         told.append("draft quality draws the lens as designed, without decentre, tilt and figure errors")
     return tuple(told)
@@ -231,6 +229,7 @@ def _summary(settled: Settled, shots: tuple[Shot, ...], images: list[DirectImage
             {
                 "name": shot.light.name,
                 "field_deg": list(shot.light.field_deg),
+                **({} if shot.light.distance is None else {"distance_mm": shot.light.distance}),
                 "direct_position_mm": list(image.position_mm),
                 "direct_throughput_mm2": [float(flux) for flux in image.throughput_mm2],
                 "transmittance": image.transmittance,

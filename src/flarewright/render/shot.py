@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from math import sqrt
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import ProjectError
 from ..model import Iris, Light, Project
 from ..model.camera import Colorspace
 from ..optics.bundle import Incidence, incidence
@@ -199,13 +201,31 @@ def make_shots(settled: Settled, opening: Opening) -> tuple[Shot, ...]:
     coatings = resolve_coatings(settled.lens, settled.coating)
     packs: dict[tuple[float, ...], PackedLens] = {}
     shots = []
-    for light in project.lights:
+    for number, light in enumerate(project.lights):
         wavelengths_nm = traced_wavelengths(project.quality.wavelengths, light.spectrum)
         key = tuple(wavelengths_nm)
         if key not in packs:
             packs[key] = pack_lens(settled.lens, settled.order, coatings, wavelengths_nm, sensor=settled.sensor)
         colorspace = project.output.colorspace
-        seen = incidence(light.field_deg)
-        packed = facing(packs[key], seen.axes)
+        seen = _seen(settled, packs[key], number, light)
+        packed = facing(packs[key], seen.axes, seen.nearness)
         shots.append(Shot(light, seen, packed, opening, to_pixels, (width, height), colorspace))
     return tuple(shots)
+
+
+def _seen(settled: Settled, packed: PackedLens, number: int, light: Light) -> Incidence:
+    """Find where a light stands, and refuse one that stands in the lens."""
+    if light.distance is None:
+        return incidence(light.field_deg)
+    pupil_z = settled.order.entrance_pupil_z
+    # the rim of a concave front stands before its vertex
+    first = packed.first_surface
+    semi, c = float(packed.semi[first]), float(packed.curvature[first])
+    sag = c * semi**2 / (1.0 + sqrt(max(1.0 - (c * semi) ** 2, 0.0)))
+    least = max(0.0, -pupil_z, -float(packed.z_vertex[first]) - min(sag, 0.0))
+    if light.distance <= least:
+        raise ProjectError(
+            f"lights[{number}].distance: a light at {light.distance:g} mm stands in the lens {settled.lens.name} or "
+            f"behind its entrance pupil; give more than {least:.4g} mm"
+        )
+    return incidence(light.field_deg, light.distance, pupil_z)

@@ -13,9 +13,10 @@ from ..errors import ProjectError
 from ..io.mask_image import read_mask
 from ..model import Dirt, Iris, Layer, Lines, Starburst
 from ..optics.diffraction import BladeWings, Pattern, Soil, pupil_pattern
-from .direct import PUPIL_SPAN, DirectImage, traced_pupil
+from .direct import PUPIL_SPAN, DirectImage, defocus_mm, traced_pupil, traced_spot
 from .prepare import Settled
 from .shot import Shot
+from .spread import disc_kernel, joined, spread
 from .starburst import NEAR_SPLIT, starburst_layer
 
 Floats = NDArray[np.float64]
@@ -24,8 +25,10 @@ Floats = NDArray[np.float64]
 DIFFRACTION_STEP_NM = 5.0
 # turned and grown copies that stand for the artist's smear
 SPIRAL_COPIES = 9
+# a direct image whose disc of defocus is wider than this is drawn out of focus
+OUT_OF_FOCUS_PX = 1.0
 
-__all__ = ["disc_blur", "read_soil", "starburst_of"]
+__all__ = ["read_soil", "starburst_of"]
 
 
 @dataclass(frozen=True)
@@ -113,9 +116,8 @@ def _one_light(scene: _Scene, shot: Shot, image: DirectImage) -> NDArray[np.floa
     column = float(shot.to_pixels[0] + image.position_mm[0] * shot.to_pixels[2])
     row = float(shot.to_pixels[1] - image.position_mm[1] * shot.to_pixels[3])
     order = scene.settled.order
-    # the sun's image is efl times its angle across
-    radius = order.efl * math.tan(0.5 * math.radians(shot.light.diameter_deg))
-    margin = (math.ceil(radius / pixel[0]) + 1, math.ceil(radius / pixel[1]) + 1) if radius > 0.0 else (0, 0)
+    kernel = _kernel(scene, shot, pixel)
+    margin = (0, 0) if kernel is None else (kernel.shape[1] // 2, kernel.shape[0] // 2)
     width, height = shot.size_px
     size = (width + 2 * margin[0], height + 2 * margin[1])
     picture: NDArray[np.floating] | None = None
@@ -141,10 +143,23 @@ def _one_light(scene: _Scene, shot: Shot, image: DirectImage) -> NDArray[np.floa
             split=NEAR_SPLIT if scene.settled.project.quality.mode != "draft" else 1,
         )
         picture = drawn if picture is None else picture + drawn
-    if picture is None or radius == 0.0:
+    if picture is None or kernel is None:
         return picture
-    blurred = disc_blur(picture, (radius / pixel[0], radius / pixel[1]))
-    return blurred[margin[1] : margin[1] + height, margin[0] : margin[0] + width]
+    return spread(picture, kernel)[margin[1] : margin[1] + height, margin[0] : margin[0] + width]
+
+
+def _kernel(scene: _Scene, shot: Shot, pixel: tuple[float, float]) -> Floats | None:
+    """Return what the direct image of a point is spread over besides diffraction: defocus, and the light's disc."""
+    settled = scene.settled
+    # the sun's image is efl times its angle across
+    radius = settled.order.efl * math.tan(0.5 * math.radians(shot.light.diameter_deg))
+    disc = disc_kernel((radius / pixel[0], radius / pixel[1])) if radius > 0.0 else None
+    if defocus_mm(settled.lens, shot) < OUT_OF_FOCUS_PX * min(pixel):
+        return disc
+    spot = traced_spot(settled.lens, shot)
+    if spot is None or disc is None:
+        return disc if spot is None else spot
+    return joined(spot, disc)
 
 
 def _patterns(scene: _Scene, shot: Shot, turns: Floats) -> list[Pattern | None]:
@@ -164,53 +179,6 @@ def _patterns(scene: _Scene, shot: Shot, turns: Floats) -> list[Pattern | None]:
         ]
     except ValueError as error:
         raise ProjectError(str(error)) from error
-
-
-def disc_blur(picture: NDArray[np.floating], radius_px: tuple[float, float]) -> Floats:
-    """Spread every pixel's light evenly over a disc.
-
-    Parameters
-    ----------
-    picture : ndarray, shape (H, W, C)
-    radius_px : tuple of float
-        Radius of the disc across and down, pixels.
-
-    Returns
-    -------
-    ndarray, shape (H, W, C)
-        What lands outside is lost to the picture; the disc's weights sum to 1.
-    """
-    height, width = picture.shape[:2]
-    reach = [math.ceil(r) + 1 for r in radius_px]
-    parts = 8
-    fine = [(np.arange((2 * k + 1) * parts) + 0.5) / parts - k - 0.5 for k in reach]
-    inside = (fine[0] / radius_px[0]) ** 2 + (fine[1][:, None] / radius_px[1]) ** 2 <= 1.0
-    disc = inside.reshape(2 * reach[1] + 1, parts, 2 * reach[0] + 1, parts).mean(axis=(1, 3))
-    if disc.sum() == 0.0:
-        disc[reach[1], reach[0]] = 1.0
-    disc /= disc.sum()
-    rows, columns = _smooth_size(height + 2 * reach[1]), _smooth_size(width + 2 * reach[0])
-    transfer = np.fft.rfft2(disc, (rows, columns))
-    out = np.empty(picture.shape)
-    for c in range(picture.shape[2]):
-        wide = np.fft.irfft2(
-            np.fft.rfft2(picture[..., c].astype(np.float64), (rows, columns)) * transfer, (rows, columns)
-        )
-        out[..., c] = wide[reach[1] : reach[1] + height, reach[0] : reach[0] + width]
-    return out
-
-
-def _smooth_size(least: int) -> int:
-    """Return the next length whose transform is fast."""
-    found = least
-    while True:
-        rest = found
-        for prime in (2, 3, 5):
-            while rest % prime == 0:
-                rest //= prime
-        if rest == 1:
-            return found
-        found += 1
 
 
 def _diffracted_wavelengths(shot: Shot) -> Floats:
