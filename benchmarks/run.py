@@ -29,18 +29,18 @@ import numpy as np
 
 import flarewright
 from flarewright.kernels.raster import blank_plane, fill_polygon
-from flarewright.model import Art, Camera, Iris, Lens, Light, Output, Project, Quality, Rule
+from flarewright.model import Art, Camera, Imperfection, Iris, Lens, Light, Output, Plate, Project, Quality, Rule
 from flarewright.optics.bundle import find_region, front_box, trace_points
 from flarewright.optics.pack import pack_lens
 from flarewright.optics.paraxial import first_order
 from flarewright.optics.paths import direct_path, ghost_paths
 from flarewright.render.montecarlo import HEROES, ray_source, run_batch
-from flarewright.render.prepare import load_lens, settle
+from flarewright.render.prepare import build, load_lens, settle
 from flarewright.render.reference import spectral_shots
 from flarewright.render.render import render
 from flarewright.render.shot import make_opening, make_shots
 
-PARTS = ("yardsticks", "trace", "raster", "frame", "art", "reference", "startup", "memory")
+PARTS = ("yardsticks", "trace", "raster", "frame", "art", "built", "reference", "startup", "memory")
 
 LIGHT = (10.0, 5.0)
 """Field angles of the frames' light, degrees."""
@@ -250,6 +250,34 @@ def art(repeat: int) -> Rows:
     return found
 
 
+def built(repeat: int) -> Rows:
+    """The Heliar's frame with what can stand around it, as a ratio to the frame without; and the setting of a zoom."""
+    plain = heliar_frame("final", starburst=False)
+    glass = Plate(thickness=2.0, gap=1.0, glass="N-BK7")
+    mirror = plain.camera.replace(cover_glass=glass, sensor_reflectance=0.05)
+    changes: dict[str, dict[str, Any]] = {
+        "as it is": {},
+        "behind a filter": {"filter": glass},
+        "before cover glass and mirror": {"camera": mirror},
+        "one sample of it": {"imperfection": Imperfection(seed=1)},
+        "ghosts moved by chance": {
+            "imperfection": Imperfection(seed=1, decentre_um=0.0, tilt_arcmin=0.0, ghost_offset_mm=0.2)
+        },
+        "behind the anamorphic adapter": {"lens": "anamorphic-heliar-2x"},
+    }
+    found: Rows = []
+    for name, change in changes.items():
+        project = plain.replace(**change)
+        seconds = median_seconds(lambda project=project: render(project), repeat)  # type: ignore[misc]
+        ratio = 1e3 * seconds / found[0]["value"] if found else None
+        found.append(row("built", f"Heliar final 1280x720, {name}", 1e3 * seconds, "ms", ratio, "as it is"))
+    zoom = load_lens("canon-70-200")
+    for name, wish in (("a position", "wide"), ("between two", 110.0)):
+        seconds = median_seconds(lambda wish=wish: build(zoom, zoom=wish), repeat)  # type: ignore[misc]
+        found.append(row("built", f"zoom of 33 surfaces set to {name}", 1e3 * seconds, "ms"))
+    return found
+
+
 def reference(repeat: int) -> Rows:
     """Random rays through the whole lens on one thread: what one batch traces, with and without a picture."""
     found = []
@@ -380,6 +408,7 @@ def main(arguments: list[str] | None = None) -> None:
         "raster": lambda: raster(asked.repeat, bandwidth),
         "frame": lambda: frame(asked.repeat),
         "art": lambda: art(asked.repeat),
+        "built": lambda: built(asked.repeat),
         "reference": lambda: reference(asked.repeat),
         "startup": lambda: startup(asked.repeat),
         "memory": memory,
