@@ -31,7 +31,8 @@ def test_a_polygon_covers_its_area(seed, count, size, turned):
     canvas = blank(40, 31)
     fill(polygon[::-1] if turned else polygon, canvas, density=3.0)
     drawn, meant = channels(canvas, 40)[0].sum(dtype=float), 3.0 * area(polygon)
-    assert drawn == pytest.approx(meant, rel=1e-5, abs=1e-6)
+    # a sliver has hardly any area beside the length of its edges
+    assert drawn == pytest.approx(meant, rel=1e-5, abs=1e-6 + 3.0 * 5e-7 * 2.0 * size)
     assert channels(canvas, 40).min() >= -1e-6
     assert channels(canvas, 40).max() <= 3.0 * (1.0 + 1e-5)
 

@@ -47,11 +47,12 @@ def complaints(row, e: Estimate, ask_again: Callable[[int], Estimate]) -> list[s
 
     The tolerance is on the true error, so where the standard error leaves that open the oracle counts more rays.
     """
-    for samples in (16_000, 64_000):
+    for count, samples in enumerate((16_000, 64_000)):
         seen = errors(row, e)
         if all(abs(error) + 4 * sigma < limit for _, error, sigma, limit in seen):
             return []
-        if any(abs(error) - 4 * sigma > limit for _, error, sigma, limit in seen):
+        # a first count has too few rays and replicas to know its own doubt: it may clear a row, not condemn it
+        if count > 0 and any(abs(error) - 4 * sigma > limit for _, error, sigma, limit in seen):
             break
         e = ask_again(samples)
     out = []
@@ -137,20 +138,9 @@ def test_more_shipped_lenses(name):
     compare_systems(from_lens(a_lens), a_lens, (6.0, 4.0), samples=2000)
 
 
-# the zoom, widest angle: light of path 25-22 leaves at grazing angles, and interpolating such rays over a triangle
-# makes its size 60 % too large; flux and every other ghost agree
-GRAZING = pytest.mark.xfail(strict=True, reason="the size of Canon 25-22 at (15, 8) degrees is 60 % too large")
-
-
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("name", "field"),
-    [
-        pytest.param(name, field, marks=GRAZING if (name, field) == ("canon", ANGLES[2]) else ())
-        for name in FIVE
-        for field in ANGLES
-    ],
-)
+@pytest.mark.parametrize("name", list(FIVE))
+@pytest.mark.parametrize("field", ANGLES)
 def test_five_lenses(name, field):
     prescription, f_number = FIVE[name]
     few = {"samples": 2000, "replicas": 4} if name == "canon" else {}

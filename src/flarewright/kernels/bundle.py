@@ -113,7 +113,8 @@ def draw_bundle(
     for half in range(halves):
         mirror = 1.0 - 2.0 * half
         _place_nodes(data, mirror, crossings, blades, axes, to_pixels, spots, blocked)
-        start = 0
+        # a bare 0 would be a type of its own and compile what it is given to twice
+        start = np.int64(0)
         while start < triangles.shape[0]:
             # a cell is a fan of triangles around its middle; most are smooth enough to be drawn as one polygon
             end = start + 1

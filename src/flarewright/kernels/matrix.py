@@ -247,4 +247,5 @@ def _project_entrance(polygon, entrance, slope, slope_x, a, b, ax, bx, to_stop, 
             u, v = across[m, 0, 0] * x + across[m, 0, 1] * slope_x, to_stop[m, 0, 0] * y + to_stop[m, 0, 1] * slope
             polygon[k, PSTOP + 2 * c] = u * axes[0, 0] + v * axes[1, 0]
             polygon[k, PSTOP + 2 * c + 1] = u * axes[0, 1] + v * axes[1, 1]
-    return RIM
+    # a bare constant would be a type of its own and compile what it is given to twice
+    return np.int64(RIM)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ._jit import compiled, inner
+from ._jit import compiled, inlined, inner
 from .prepass import rejected
 from .trace import ALIVE, REL, STOP_X, WEIGHT, X, Y, trace_nodes
 
@@ -12,6 +12,8 @@ UNKNOWN, LEAF, SPLIT, EMPTY, FLAT = 0, 1, 2, 3, 4
 INNER_BEND = 0.02
 # cells that the rim crosses are halved at least this often
 RIM_LEVEL = 2
+# cells whose rays all end, but not at one surface, are halved so often
+SLIVER_LEVEL = 3
 
 
 @inner
@@ -23,7 +25,8 @@ def _judge(
     The fan of a LEAF uses the middles of its edges, which leaves a quarter of the measured error.
     """
     if rejected(data, nodes, crossings, iris_radius, 0.25):
-        return EMPTY
+        # between rays that end at different surfaces a sliver may pass
+        return SPLIT if level < SLIVER_LEVEL and _ends_differ(data, nodes) else EMPTY
     if level >= max_level:
         return LEAF
     x_low, x_high, y_low, y_high = np.inf, -np.inf, np.inf, -np.inf
@@ -71,6 +74,17 @@ def _judge(
 
 
 @inner
+def _ends_differ(data, nodes):
+    """Tell whether all rays of a cell end, and not all at the same surface."""
+    low, high = np.inf, -np.inf
+    for k in nodes:
+        if data[k, ALIVE] > 0.0:
+            return False
+        low, high = min(low, data[k, X]), max(high, data[k, X])
+    return low < high
+
+
+@inner
 def _limit_range(data, nodes, limit, iris_radius):
     """Return a limit's least and largest value over a cell and how much it bends: 0 the rims, then each crossing."""
     values = np.empty(9)
@@ -100,14 +114,20 @@ def _bend(data, nodes, column):
     return max(bend, abs(data[nodes[4], column] - 0.25 * (a + b + c + d)))
 
 
+@inlined
+def _around(m):
+    """Walk around the middle of 3 x 3 nodes, counter-clockwise from the first: 0 3 6 7 8 5 2 1 and 0 again."""
+    # a tuple of these digits takes longer to compile than all that uses it
+    return (0x012587630 >> (4 * m)) & 15
+
+
 @inner
 def _fan_areas(data, nodes):
     """Return the least and largest signed area on the sensor of the eight triangles around a cell's centre."""
-    ring = (0, 3, 6, 7, 8, 5, 2, 1, 0)
     cx, cy = data[nodes[4], X], data[nodes[4], Y]
     low, high = np.inf, -np.inf
     for m in range(8):
-        a, b = nodes[ring[m]], nodes[ring[m + 1]]
+        a, b = nodes[_around(m)], nodes[_around(m + 1)]
         area = (data[a, X] - cx) * (data[b, Y] - cy) - (data[a, Y] - cy) * (data[b, X] - cx)
         low, high = min(low, area), max(high, area)
     return low, high
@@ -348,8 +368,6 @@ def _triangulate(state, offsets, lattice, nx, ny, depth):
     triangles = np.empty((total, 3), dtype=np.int64)
     count = 0
     nodes = np.empty(9, dtype=np.int64)
-    # corner, middle, corner of each edge, counter-clockwise, and where its neighbour lies
-    edges = ((0, 3, 6, 0, -1), (6, 7, 8, 1, 0), (8, 5, 2, 0, 1), (2, 1, 0, -1, 0))
     for level in range(depth + 1):
         width, height = nx << level, ny << level
         for cell in range(width * height):
@@ -358,32 +376,21 @@ def _triangulate(state, offsets, lattice, nx, ny, depth):
                 continue
             a, b = cell // height, cell % height
             _cell_nodes(lattice, a, b, level, depth, nodes)
-            for edge in edges:
-                i, j = a + edge[3], b + edge[4]
+            for edge in range(4):
+                # counter-clockwise from the edge towards lower b
+                i = a + (1 if edge == 1 else (-1 if edge == 3 else 0))
+                j = b + (1 if edge == 2 else (-1 if edge == 0 else 0))
                 halved = kind == LEAF
                 if 0 <= i < width and 0 <= j < height:
                     beyond = state[offsets[level] + i * height + j]
                     # both sides of an edge come to the same answer
                     halved = beyond != UNKNOWN if kind == LEAF else beyond in (LEAF, SPLIT)
-                if halved:
-                    triangles[count, 0], triangles[count, 1], triangles[count, 2] = (
-                        nodes[4],
-                        nodes[edge[0]],
-                        nodes[edge[1]],
-                    )
+                step = 1 if halved else 2
+                for m in range(2 * edge, 2 * edge + 2, step):
+                    triangles[count, 0] = nodes[4]
+                    triangles[count, 1] = nodes[_around(m)]
+                    triangles[count, 2] = nodes[_around(m + step)]
                     count += 1
-                    triangles[count, 0], triangles[count, 1], triangles[count, 2] = (
-                        nodes[4],
-                        nodes[edge[1]],
-                        nodes[edge[2]],
-                    )
-                else:
-                    triangles[count, 0], triangles[count, 1], triangles[count, 2] = (
-                        nodes[4],
-                        nodes[edge[0]],
-                        nodes[edge[2]],
-                    )
-                count += 1
     kept = np.empty((count, 3), dtype=np.int64)
     for t in range(count):
         kept[t, 0], kept[t, 1], kept[t, 2] = triangles[t, 0], triangles[t, 1], triangles[t, 2]

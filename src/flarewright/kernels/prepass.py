@@ -7,11 +7,13 @@ symmetric in x and only x >= 0 is traced (Hullin 2011, section 4.2, "Symmetries"
 import numpy as np
 
 from ._jit import compiled, inner
-from .trace import ALIVE, REL, STOP_X, WEIGHT, X, Y, trace_nodes
+from .trace import ALIVE, REL, STOP, STOP_X, WEIGHT, X, Y, trace_nodes
 
 # paths seen by fewer cells of the pre-pass than this are searched for spots between its samples
 FEW_CELLS = 12
 PROBES = 8
+# how often the gap between two rays that end at different surfaces is halved
+HALVINGS = 5
 
 
 @inner
@@ -82,12 +84,15 @@ def find_box(
         Rough estimates from the cells that may pass, both halves, per unit irradiance: flux; flux that lands within
         `view_radius`; the integral of flux times irradiance; cells that may touch the view; cells that may pass; pupil
         area whose samples pass, mm^2.
+    spots : ndarray, shape (4,)
+        The box of what was found between the samples; x1 < x0 when there is nothing.
 
     Notes
     -----
     Hullin 2011, section 4.2, "Ray Bounding". A cell is kept unless one of its limits is exceeded at every corner by
     more than half its variation over the cell. Where few cells are kept, cells whose limits change fast are searched
-    with a finer grid, so that spots between the samples are found too.
+    with a finer grid, and the gaps between neighbours that end at different surfaces are halved again and again: one
+    surface takes the rays on one side, another those on the other, and a sliver in between may pass both.
     """
     width = ny + 1
     count = (nx + 1) * width
@@ -121,7 +126,8 @@ def find_box(
             elif _doubtful(data, nodes, nx, ny, crossings, iris_radius):
                 doubtful[n_doubtful] = a * ny + b
                 n_doubtful += 1
-    if accepted < FEW_CELLS and n_doubtful > 0:
+    spots = np.array([np.inf, -np.inf, np.inf, -np.inf])
+    if accepted < FEW_CELLS:
         # a spot smaller than a cell may hide between the samples
         corners = np.empty((n_doubtful, 2))
         for k in range(n_doubtful):
@@ -129,8 +135,17 @@ def find_box(
             corners[k, 1] = box[2] + (doubtful[k] % ny) * hy
         _probe(
             rows, actions, curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, tilt, nearness,
-            crossings, iris_radius, corners, hx, hy, found, sums,
+            crossings, iris_radius, corners, hx, hy, spots, sums,
         )  # fmt: skip
+        _halve(
+            rows, actions, curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, tilt, nearness,
+            crossings, iris_radius, px, py, data, width, hx, hy, spots, sums,
+        )  # fmt: skip
+        for m in range(2):
+            spots[2 * m] = max(spots[2 * m], box[2 * m])
+            spots[2 * m + 1] = min(spots[2 * m + 1], box[2 * m + 1])
+            found[2 * m] = min(found[2 * m], spots[2 * m])
+            found[2 * m + 1] = max(found[2 * m + 1], spots[2 * m + 1])
     for k in range(count):
         if _passes(data, k, crossings, iris_radius):
             sums[5] += hx * hy
@@ -139,7 +154,7 @@ def find_box(
         step = hx if m == 0 else hy
         found[2 * m] = max(found[2 * m] - step, box[2 * m])
         found[2 * m + 1] = min(found[2 * m + 1] + step, box[2 * m + 1])
-    return found, sums
+    return found, sums, spots
 
 
 @inner
@@ -183,11 +198,20 @@ def _passes(data, k, crossings, iris_radius):
 
 
 @inner
+def _widen(spots, sums, data, k, x, y, hx, hy, share):
+    """Note a passing ray found between the samples: it stands for `share` of both halves of the pupil, mm^2."""
+    spots[0], spots[1] = min(spots[0], x - hx), max(spots[1], x + hx)
+    spots[2], spots[3] = min(spots[2], y - hy), max(spots[3], y + hy)
+    sums[0] += 2.0 * data[k, WEIGHT] * share
+    sums[3] += 1.0
+
+
+@inner
 def _probe(
     rows, actions, curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, tilt, nearness,
-    crossings, iris_radius, corners, hx, hy, found, sums,
+    crossings, iris_radius, corners, hx, hy, spots, sums,
 ):  # fmt: skip
-    """Look into doubtful cells with PROBES x PROBES rays each and widen the box by what passes."""
+    """Look into doubtful cells with PROBES x PROBES rays each and note what passes."""
     each = PROBES * PROBES
     px, py = np.empty(corners.shape[0] * each), np.empty(corners.shape[0] * each)
     for k in range(px.size):
@@ -200,10 +224,84 @@ def _probe(
     )
     for k in range(px.size):
         if _passes(data, k, crossings, iris_radius):
-            found[0], found[1] = min(found[0], px[k] - hx / PROBES), max(found[1], px[k] + hx / PROBES)
-            found[2], found[3] = min(found[2], py[k] - hy / PROBES), max(found[3], py[k] + hy / PROBES)
-            sums[0] += 2.0 * data[k, WEIGHT] * hx * hy / each * np.cos(tilt)
-            sums[3] += 1.0
+            _widen(spots, sums, data, k, px[k], py[k], hx / PROBES, hy / PROBES, hx * hy / each * np.cos(tilt))
+
+
+@inner
+def _halve(
+    rows, actions, curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, tilt, nearness,
+    crossings, iris_radius, px, py, data, width, hx, hy, spots, sums,
+):  # fmt: skip
+    """Look between neighbours of the grid that end at different surfaces by halving the gap HALVINGS times."""
+    # surfaces before the first crossing of the stop
+    before = 0
+    while before < actions.size and actions[before] != STOP:
+        before += 1
+    gaps = np.empty((2 * px.size, 6))
+    n_gaps = 0
+    for k in range(px.size):
+        for along in range(2):
+            other = k + 1 if along == 0 else k + width
+            if other >= px.size or (along == 0 and other % width == 0):
+                continue
+            if not _apart(data, k, other, before, iris_radius):
+                continue
+            gaps[n_gaps, 0], gaps[n_gaps, 1], gaps[n_gaps, 2] = px[k], py[k], data[k, X]
+            gaps[n_gaps, 3], gaps[n_gaps, 4], gaps[n_gaps, 5] = px[other], py[other], data[other, X]
+            n_gaps += 1
+    share = hx * hy * np.cos(tilt)
+    for _ in range(HALVINGS):
+        share *= 0.5
+        mx, my = np.empty(n_gaps), np.empty(n_gaps)
+        for k in range(n_gaps):
+            mx[k], my[k] = 0.5 * (gaps[k, 0] + gaps[k, 3]), 0.5 * (gaps[k, 1] + gaps[k, 4])
+        middle = np.empty((n_gaps, STOP_X + 2 * crossings))
+        trace_nodes(
+            rows,
+            actions,
+            curvature,
+            conic,
+            z_vertex,
+            inv_semi,
+            n_gap,
+            reflectance,
+            sensor_z,
+            tilt,
+            nearness,
+            mx,
+            my,
+            middle,
+        )
+        narrower = np.empty((2 * n_gaps, 6))
+        count = 0
+        for k in range(n_gaps):
+            if middle[k, ALIVE] > 0.0:
+                if _passes(middle, k, crossings, iris_radius):
+                    _widen(spots, sums, middle, k, mx[k], my[k], hx / PROBES, hy / PROBES, share)
+                continue
+            for side in range(2):
+                # the part whose ends still differ
+                if middle[k, X] != gaps[k, 3 * side + 2]:
+                    for m in range(3):
+                        narrower[count, m] = gaps[k, 3 * side + m]
+                    narrower[count, 3], narrower[count, 4], narrower[count, 5] = mx[k], my[k], middle[k, X]
+                    count += 1
+        gaps = narrower
+        n_gaps = count
+
+
+@inner
+def _apart(data, a, b, before, iris_radius):
+    """Tell whether two rays end at different surfaces, and not both far beyond a rim or beside the iris."""
+    if data[a, ALIVE] > 0.0 or data[b, ALIVE] > 0.0 or data[a, X] == data[b, X]:
+        return False
+    if _outside(min(data[a, REL], data[b, REL]), max(data[a, REL], data[b, REL]), 0.5):
+        return False
+    if min(data[a, X], data[b, X]) < before:
+        return True
+    ua, va, ub, vb = data[a, STOP_X], data[a, STOP_X + 1], data[b, STOP_X], data[b, STOP_X + 1]
+    ra, rb = np.sqrt(ua * ua + va * va) / iris_radius, np.sqrt(ub * ub + vb * vb) / iris_radius
+    return not _outside(min(ra, rb), max(ra, rb), 0.5)
 
 
 @inner

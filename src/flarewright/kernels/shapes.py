@@ -114,7 +114,7 @@ def trace_shapes(
     for k in range(px.shape[0]):
         x, y, z = px[k], py[k], 0.0
         dx, dy, dz = 0.0, np.sin(tilt), np.cos(tilt)
-        weight, rel2, alive, heading = 1.0, 0.0, 1.0, 1.0
+        weight, rel2, alive, heading, passed = 1.0, 0.0, 1.0, 1.0, 0.0
         if nearness > 0.0:
             dx, dy, dz, weight = ray_from_near(tilt, nearness, x, y)
         crossing = 0
@@ -132,16 +132,21 @@ def trace_shapes(
             x, y, z, dx, dy, dz, radius2, cos_in, cos_out, ok = cross_shape(
                 shapes, row, vertex, x, y, z, dx, dy, dz, heading, n_in / n_out, mirror
             )
-            alive = alive if ok else 0.0
             rel2 = max(rel2, radius2 * inv_semi[row] * inv_semi[row])
+            if not ok:
+                alive = 0.0
+                break
+            passed += 1.0
             place = min(cos_in if n_in <= n_out else cos_out, 1.0) * (samples - 1)
             cell = min(np.int64(place), samples - 2)
             r = reflectance[row, cell] + (place - cell) * (reflectance[row, cell + 1] - reflectance[row, cell])
             weight *= r if mirror > 0.0 else 1.0 - r
             if mirror > 0.0:
                 heading = -heading
+        for m in range(STOP_X + 2 * crossing, out.shape[1]):
+            out[k, m] = 0.0
         t = (sensor_z - z) / dz
-        out[k, X], out[k, Y] = x + t * dx, y + t * dy
+        out[k, X], out[k, Y] = x + t * dx if alive > 0.0 else passed, y + t * dy
         out[k, WEIGHT], out[k, REL], out[k, ALIVE] = weight, sqrt(rel2), alive
 
 

@@ -42,7 +42,8 @@ def trace_nodes(
         Where the rays cross the plane of the first vertex, mm.
     out : ndarray, shape (N, 5 + 2 C)
         Filled with x, y on the sensor, weight (product of R and T), the largest r / semi-diameter met, alive (1 or 0),
-        and x, y at each of the C crossings of the stop.
+        and x, y at each of the C crossings of the stop. Of a ray that ended, the first is the number of surfaces it
+        passed; all else but "alive" means nothing.
 
     Notes
     -----
@@ -67,6 +68,7 @@ def trace_nodes(
     weight = np.empty(LANES)
     rel2 = np.empty(LANES)
     alive = np.empty(LANES)
+    passed = np.empty(LANES)
     cos_low = np.empty(LANES)
     for start in range(0, n_rays, LANES):
         count = min(LANES, n_rays - start)
@@ -81,6 +83,7 @@ def trace_nodes(
             weight[m] = 1.0
             rel2[m] = 0.0
             alive[m] = 1.0
+            passed[m] = 0.0
         if nearness > 0.0:
             for m in range(LANES):
                 dx[m], dy[m], dz[m], weight[m] = ray_from_near(tilt, nearness, x[m], y[m])
@@ -128,6 +131,7 @@ def trace_nodes(
                 ok = ok if nz * heading * (1.0 - 2.0 * mirror) > 0.0 else 0.0
                 r2 = (hx * hx + hy * hy) * inv2
                 alive[m] = ok
+                passed[m] += ok
                 rel2[m] = max(rel2[m], r2)
                 cos_low[m] = cos_in if low_in > 0.0 else cos_out
                 x[m] = hx
@@ -136,6 +140,11 @@ def trace_nodes(
                 dx[m] = nx
                 dy[m] = ny
                 dz[m] = nz
+            living = 0.0
+            for m in range(LANES):
+                living += alive[m]
+            if living == 0.0:
+                break
             table = reflectance[row]
             for m in range(LANES):
                 place = min(cos_low[m], 1.0) * (samples - 1)
@@ -145,9 +154,12 @@ def trace_nodes(
                 weight[m] *= r if mirror > 0.0 else 1.0 - r
             if mirror > 0.0:
                 heading = -heading
+        for k in range(start, start + count):
+            for m in range(STOP_X + 2 * crossing, out.shape[1]):
+                out[k, m] = 0.0
         for m in range(count):
             t = (sensor_z - z[m]) / dz[m]
-            out[start + m, X] = x[m] + t * dx[m]
+            out[start + m, X] = x[m] + t * dx[m] if alive[m] > 0.0 else passed[m]
             out[start + m, Y] = y[m] + t * dy[m]
             out[start + m, WEIGHT] = weight[m]
             out[start + m, REL] = sqrt(rel2[m])

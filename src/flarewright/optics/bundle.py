@@ -21,9 +21,11 @@ Floats = NDArray[np.float64]
 # cells of the pre-pass over half the pupil: 64 across the whole
 PREPASS = (32, 64)
 # and of the scans of a part of it
-FINER = (16, 32)
-# regions of fewer cells than this are looked for at every colour
-SMALL_REGION = 64
+FINER = (12, 24)
+# and of its scans at other wavelengths, once the middle one has shown that no small spot is looked for: so many cells
+# of the whole front or of a part
+COARSE = (8, 16)
+SPECK, SMALL_REGION = 16, 64
 # coarsest cells of a bundle's grid over half its region, and how often each may be halved; of a whole region twice as
 # many stand side by side
 GRID = (4, 8)
@@ -240,21 +242,26 @@ def find_region(
     """
     middle, *others = _fitted(packed)
     box, cells = front_box(packed, tilt), _cells(packed, PREPASS)
-    small, whole = False, True
+    whole = True
+    held = np.array([np.inf, -np.inf, np.inf, -np.inf])
     for _ in range(4):
-        found, sums = _scan(packed, middle, path, tilt, iris_radius, view_radius, box, cells)
-        # a large region leaves a cell of room for other colours; a small one may lie elsewhere for them
-        small = small or sums[4] < SMALL_REGION
-        if small:
+        found, sums, spots = _scan(packed, middle, path, tilt, iris_radius, view_radius, box, cells)
+        plenty = sums[4] >= (SPECK if whole else SMALL_REGION)
+        near, few = box, _cells(packed, COARSE) if plenty else cells
+        if whole and sums[4] > 0.0:
             # the whole front is too much to scan thrice where one colour has shown the place
-            near, few = (_around(found, box, cells), _cells(packed, FINER)) if whole and sums[4] > 0.0 else (box, cells)
-            for w in others:
-                elsewhere, more = _scan(packed, w, path, tilt, iris_radius, view_radius, near, few)
-                found[0::2] = np.minimum(found[0::2], elsewhere[0::2])
-                found[1::2] = np.maximum(found[1::2], elsewhere[1::2])
+            near, few = _around(found, box, cells), _cells(packed, COARSE if plenty else FINER)
+        for w in others:
+            elsewhere, more, _ = _scan(packed, w, path, tilt, iris_radius, view_radius, near, few)
+            found = _joined(found, elsewhere)
+            if not plenty:
                 sums = np.maximum(sums, more)
         if found[1] <= found[0] or sums[0] <= 0.0:
             return None
+        if sums[4] > 0.0 and spots[1] > spots[0]:
+            # the next scan need not see again what hid between the samples beside the main region
+            held = _joined(held, spots)
+        found = _joined(found, held)
         area = float((found[1] - found[0]) * (found[3] - found[2]))
         shrunk = area < 0.3 * (box[1] - box[0]) * (box[3] - box[2])
         box, cells, whole = found, _cells(packed, FINER), False
@@ -262,6 +269,12 @@ def find_region(
             break
     seen = float(sums[1]) if sums[3] > 0.0 else 0.0
     return Region(box, float(sums[0]), seen, float(sums[2] / sums[0]), float(np.clip(sums[5] / area, 1e-3, 1.0)))
+
+
+def _joined(a: Floats, b: Floats) -> Floats:
+    """Return the box around two."""
+    low, high = np.minimum(a[0::2], b[0::2]), np.maximum(a[1::2], b[1::2])
+    return np.array([low[0], high[0], low[1], high[1]])
 
 
 def _around(found: Floats, box: Floats, cells: tuple[int, int]) -> Floats:
@@ -287,14 +300,14 @@ def _scan(
     view_radius: float,
     box: Floats,
     cells: tuple[int, int],
-) -> tuple[Floats, Floats]:
+) -> tuple[Floats, Floats, Floats]:
     """Run the pre-pass over a box at one wavelength."""
     arguments = (*_arguments(packed, w, path, tilt), path.stop_crossings, iris_radius, view_radius)
-    found, sums = find_box(*arguments, box, *cells)
+    found, sums, spots = find_box(*arguments, box, *cells)
     if packed.halves == 1:
         # the kernel counts every ray for its mirror image too
         sums[:3] *= 0.5
-    return found, sums
+    return found, sums, spots
 
 
 def trace_grid(

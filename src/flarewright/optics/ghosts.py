@@ -16,7 +16,7 @@ from ..kernels.bundle import draw_bundle, measure_bundle, node_densities
 from ..kernels.raster import blank_plane, to_pixels
 from ..kernels.trace import ALIVE, REL, STOP_X, WEIGHT, X, Y
 from ..model import AsLens, CoatingChoice, Iris, Lens
-from .bundle import Bundle, Incidence, find_region, incidence, trace_bundle, trace_grid, trace_points
+from .bundle import Bundle, Incidence, Region, find_region, incidence, trace_bundle, trace_grid, trace_points
 from .iris import blade_edges
 from .pack import PackedLens, SensorMirror, facing, pack_lens, resolve_coatings
 from .paraxial import D_LINE_NM, FirstOrder, first_order, path_matrices
@@ -27,8 +27,12 @@ Floats = NDArray[np.float64]
 # pixels per rms radius for tracing, and the side of the grid on which a peak is looked for
 RESOLUTION = 100.0
 PEAK_GRID = 256
-# rays spent on the torn edge of a bundle
-MOST_FRAYED = 300_000
+# largest part of a ghost's flux, first and second moment that interpolation may get wrong
+MOMENT_ERROR = 5e-3
+# triangles integrated ray by ray: rays at most, how often they are halved, and the change that asks for more
+MOST_RAYS = 300_000
+LEAST_HALVINGS, MOST_HALVINGS = 2, 10
+RAY_SHARE = 1e-5
 # part of a ghost's flux whose place is not asked for
 FARTHEST = 1e-5
 
@@ -178,22 +182,16 @@ def _measure(lens: Lens, packed: PackedLens, path: LightPath, light: Incidence) 
     nothing = GhostRow(j, i, 0.0, (0.0, 0.0), 0.0, 0.0, 0.0, bounded_by, focus)
     if region is None:
         return nothing
-    scale = 1e-6
+    bundle = _grid(packed, path, light, region, 1e-6)
     # first only the rim, to learn the size; then fine enough for that size
-    for _ in range(2):
-        bundle = trace_grid(
-            packed, path, light.tilt, (packed.stop_semi, packed.stop_semi), region, tolerance=0.25, scale=scale
-        )
-        data = trace_bundle(packed, 0, bundle, light.tilt)
-        sums = measure_bundle(
-            data, bundle.pupil, bundle.triangles, path.stop_crossings, blades, light.axes, bundle.halves
-        )
-        sums[:4] += _frayed(packed, bundle, data, light, float(sums[0]))
-        if sums[0] <= 0.0:
-            return nothing
-        x, y = sums[1] / sums[0], sums[2] / sums[0]
-        rms = sqrt(max(sums[3] / sums[0] - x * x - y * y, 0.0))
-        scale = RESOLUTION / max(rms, 1e-4)
+    rms = _rough_size(_sample(packed, bundle, light, bundle.pupil[bundle.triangles]), bundle.halves)
+    bundle = _grid(packed, path, light, region, RESOLUTION / max(rms, 1e-4))
+    data = trace_bundle(packed, 0, bundle, light.tilt)
+    sums = _integrate(packed, bundle, data, light, blades)
+    if sums[0] <= 0.0:
+        return nothing
+    x, y = sums[1] / sums[0], sums[2] / sums[0]
+    rms = sqrt(max(sums[3] / sums[0] - x * x - y * y, 0.0))
     # the whole ghost if it is compact, else the part around its centroid
     middle, reach = -0.5 * (sums[6] + sums[7]) * light.axes[1], _extent(sums)
     if reach > 4.0 * rms:
@@ -203,41 +201,187 @@ def _measure(lens: Lens, packed: PackedLens, path: LightPath, light: Incidence) 
     return GhostRow(j, i, flux, (float(x), float(y)), rms, peak, patch, bounded_by, focus)
 
 
-def _frayed(packed: PackedLens, bundle: Bundle, data: Floats, light: Incidence, flux: float) -> Floats:
-    """Integrate over the triangles in which some rays end, ray by ray: weight times 1, x, y, x^2 + y^2.
+def _grid(packed: PackedLens, path: LightPath, light: Incidence, region: Region, scale: float) -> Bundle:
+    """Build the grid of a path for so many pixels a mm, behind the round stop."""
+    stop = (packed.stop_semi, packed.stop_semi)
+    return trace_grid(packed, path, light.tilt, stop, region, tolerance=0.25, scale=scale)
 
-    They carry little light, but where rays leave the last surface at a grazing angle it lands so far out that it
-    decides the ghost's size.
+
+def _rough_size(rays: Floats, halves: int) -> float:
+    """Root mean square radius by a few rays (`_passing`), the farthest left out; 0 when none passes."""
+    flux = float(rays[:, 0].sum())
+    if flux <= 0.0:
+        return 0.0
+    middle = _middle(rays, halves)
+    return sqrt(float(_second(rays, middle, _far(rays, middle, 0.0)).sum()) / flux)
+
+
+def _integrate(packed: PackedLens, bundle: Bundle, data: Floats, light: Incidence, blades: Floats) -> Floats:
+    """Integrate a bundle like `measure_bundle`, but ray by ray where a triangle's rays are no plane's.
+
+    Near the edge where rays leave the last surface at a grazing angle, positions on the unbounded plane go like the
+    inverse of the direction's z: between such rays, and beside rays that end, nothing can be interpolated. Those
+    triangles carry little light, but they may decide the ghost's size.
     """
+    crossings = bundle.path.stop_crossings
+    rest = (crossings, blades, light.axes, bundle.halves)
+    sums: Floats = measure_bundle(data, bundle.pupil, bundle.triangles, *rest)
+    torn, bent = _torn(bundle, data), _bent(packed, bundle, data, light)
+    if bent.any():
+        sums[:4] = measure_bundle(data, bundle.pupil, bundle.triangles[~bent], *rest)[:4]
+    if torn.any() or bent.any():
+        sums[:4] += _ray_by_ray(packed, bundle, bundle.triangles[torn | bent], light, sums)
+    return sums
+
+
+def _torn(bundle: Bundle, data: Floats) -> NDArray[np.bool_]:
+    """Mark the triangles in which some rays end."""
     alive = data[bundle.triangles, ALIVE]
-    torn = bundle.triangles[(alive.min(axis=1) == 0.0) & (alive.max(axis=1) > 0.0)]
-    if len(torn) == 0:
-        return np.zeros(4)
-    n = int(np.clip(sqrt(MOST_FRAYED / len(torn)), 2, 16))
-    # the centres of the n^2 parts of each triangle, in barycentric coordinates
-    a, b = (grid.ravel() for grid in np.meshgrid(np.arange(n), np.arange(n)))
-    up, down = a + b < n, a + b < n - 1
-    s = np.concatenate([a[up] + 1.0 / 3.0, a[down] + 2.0 / 3.0]) / n
-    t = np.concatenate([b[up] + 1.0 / 3.0, b[down] + 2.0 / 3.0]) / n
-    p0, p1, p2 = (bundle.pupil[torn[:, m], None, :] for m in range(3))
-    points = p0 + s[:, None] * (p1 - p0) + t[:, None] * (p2 - p0)
-    e1, e2 = p1[:, 0] - p0[:, 0], p2[:, 0] - p0[:, 0]
-    area = 0.5 * np.abs(e1[:, 0] * e2[:, 1] - e1[:, 1] * e2[:, 0]) / len(s)
-    rays = trace_points(packed, 0, bundle.path, light.tilt, points.reshape(-1, 2))
+    return np.asarray((alive.min(axis=1) == 0.0) & (alive.max(axis=1) > 0.0))
+
+
+def _bent(packed: PackedLens, bundle: Bundle, data: Floats, light: Incidence) -> NDArray[np.bool_]:
+    """Mark the triangles whose rays would spoil the ghost's flux or size if they were interpolated.
+
+    A ray through each centre tells by how much the triangle's part of the flux and its moments is wrong, and all these
+    rays together, without the farthest, tell the moments roughly: no triangle excuses itself by a size that
+    interpolation alone makes. The best are kept as long as their errors add up to less than MOMENT_ERROR.
+    """
+    a, b, c = bundle.triangles.T
+    clear = (data[:, ALIVE] > 0.0) & (data[:, REL] <= 1.0)
+    whole = (data[a, ALIVE] > 0.0) & (data[b, ALIVE] > 0.0) & (data[c, ALIVE] > 0.0)
+    seen = np.flatnonzero(whole & (clear[a] | clear[b] | clear[c]))
+    bent = np.zeros(len(bundle.triangles), dtype=np.bool_)
+    places = bundle.pupil[bundle.triangles[seen]]
+    rays = trace_points(packed, 0, bundle.path, light.tilt, _centres(places))
+    passing = _passing(packed, bundle, rays, places)
+    total = float(passing[:, 0].sum())
+    if total <= 0.0:
+        return bent
+    middle = _middle(passing, bundle.halves)
+    second = max(float(_second(passing, middle, _far(passing, middle, 0.0)).sum()), 1e-300)
+    weight, x, y = ((data[a[seen], m] + data[b[seen], m] + data[c[seen], m]) / 3.0 for m in (WEIGHT, X, Y))
+    wrong = np.abs(_squares(rays[:, X], rays[:, Y], middle) - _squares(x, y, middle)) / second
+    # across the meridional plane two halves cancel
+    off = np.abs(rays[:, Y] - y) if bundle.halves == 2 else np.hypot(rays[:, X] - x, rays[:, Y] - y)
+    wrong += off / sqrt(second * total)
+    # R and T may change fast beside a critical angle
+    wrong = wrong * weight + np.abs(rays[:, WEIGHT] - weight) / total
+    wrong *= bundle.halves * _areas(places)
+    wrong[rays[:, ALIVE] == 0.0] = np.inf
+    # most often all are good enough
+    if float(wrong.sum()) > MOMENT_ERROR:
+        order = np.argsort(wrong, kind="stable")
+        bent[seen[order[np.cumsum(wrong[order]) > MOMENT_ERROR]]] = True
+    return bent
+
+
+def _centres(places: Floats) -> Floats:
+    """Centres of triangles, (N, 3, 2) -> (N, 2)."""
+    return np.asarray((places[:, 0] + places[:, 1] + places[:, 2]) / 3.0)
+
+
+def _areas(places: Floats) -> Floats:
+    """Areas of triangles in the pupil, (N, 3, 2) -> (N,)."""
+    e1, e2 = places[:, 1] - places[:, 0], places[:, 2] - places[:, 0]
+    return np.asarray(0.5 * np.abs(e1[:, 0] * e2[:, 1] - e1[:, 1] * e2[:, 0]))
+
+
+def _quarters(places: Floats) -> Floats:
+    """Cut triangles at the middles of their edges, (N, 3, 2) -> (4 N, 3, 2); the four parts stand side by side."""
+    a, b, c = places[:, 0], places[:, 1], places[:, 2]
+    ab, bc, ca = 0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a)
+    parts = [np.stack(part, axis=1) for part in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (bc, ca, ab))]
+    return np.stack(parts, axis=1).reshape(-1, 3, 2)
+
+
+def _sample(packed: PackedLens, bundle: Bundle, light: Incidence, places: Floats) -> Floats:
+    """Send a ray through the centre of each triangle of the pupil; as `_passing`."""
+    return _passing(packed, bundle, trace_points(packed, 0, bundle.path, light.tilt, _centres(places)), places)
+
+
+def _passing(packed: PackedLens, bundle: Bundle, rays: Floats, places: Floats) -> Floats:
+    """Let rays stand for their triangles: flux of all halves of the pupil, x, y; zeros where one is cut; (N, 3)."""
     passes = (rays[:, ALIVE] > 0.0) & (rays[:, REL] <= 1.0)
     for crossing in range(bundle.path.stop_crossings):
         at = STOP_X + 2 * crossing
         passes &= np.hypot(rays[:, at], rays[:, at + 1]) <= packed.stop_semi
+    found = np.stack([bundle.halves * rays[:, WEIGHT] * _areas(places), rays[:, X], rays[:, Y]], axis=1)
+    return np.where(passes[:, None], found, 0.0)
+
+
+def _ray_by_ray(
+    packed: PackedLens, bundle: Bundle, triangles: NDArray[np.int64], light: Incidence, sums: Floats
+) -> Floats:
+    """Integrate over triangles by rays through their parts: flux times 1, x, y, x^2 + y^2 (upright).
+
+    Each is quartered until its four rays and their parent's agree about flux and second moment to RAY_SHARE of the
+    whole, which is `sums` and what is found here, or MOST_RAYS are spent. The second moment need not exist: the
+    farthest rays are left out, as long as they carry no more than FARTHEST of the ghost's light.
+    """
+    flux = float(sums[0])
+    # the upright picture is the sensor turned by 180 degrees
+    middle = -(light.axes @ sums[1:3]) / flux if flux > 0.0 else np.zeros(2)
+    known = max(float(sums[3]) - flux * float(middle @ middle), 0.0)
+    places = bundle.pupil[triangles]
+    samples = _sample(packed, bundle, light, places)
+    done: list[Floats] = []
+    spent = len(samples)
+    for level in range(MOST_HALVINGS):
+        if len(places) == 0 or spent + 4 * len(places) > MOST_RAYS:
+            break
+        places = _quarters(places)
+        found = _sample(packed, bundle, light, places)
+        spent += len(found)
+        rays = np.concatenate([*done, found])
+        limit = _far(rays, middle, flux)
+        total = max(flux + float(rays[:, 0].sum()), 1e-300)
+        moments = max(known + float(_second(rays, middle, limit).sum()), 1e-300)
+        doubt = np.abs(found[:, 0].reshape(-1, 4).sum(axis=1) - samples[:, 0]) / total
+        change = _second(found, middle, limit).reshape(-1, 4).sum(axis=1) - _second(samples, middle, limit)
+        doubt = np.maximum(doubt, np.abs(change) / moments)
+        unsettled = np.repeat((doubt > RAY_SHARE) | (level < LEAST_HALVINGS), 4)
+        done.append(found[~unsettled])
+        places, samples = places[unsettled], found[unsettled]
+    rays = np.concatenate([*done, samples])
+    weight, x, y = rays[_away(rays, middle) <= _far(rays, middle, flux)].T
     # both halves of the pupil: across the meridional plane they cancel
-    weight = np.where(passes, bundle.halves * rays[:, WEIGHT], 0.0) * np.repeat(area, len(s))
-    x, y = np.where(passes, rays[:, X], 0.0), np.where(passes, rays[:, Y], 0.0)
-    # the second moment need not exist: the farthest rays are left out, as long as they carry next to nothing
-    far = np.argsort(-np.hypot(x, y), kind="stable")
-    weight[far[np.cumsum(weight[far]) <= FARTHEST * (flux + weight.sum())]] = 0.0
     along, across = float((weight * y).sum()), 0.0 if bundle.halves == 2 else float((weight * x).sum())
     moment = float((weight * (x * x + y * y)).sum())
     upright = -(across * light.axes[0] + along * light.axes[1])
     return np.array([weight.sum(), upright[0], upright[1], moment])
+
+
+def _middle(rays: Floats, halves: int) -> Floats:
+    """Return the centroid of rays in the meridional frame, (2,); on the mirror plane where two halves count."""
+    x, y = rays[:, 0] @ rays[:, 1:] / rays[:, 0].sum()
+    return np.array([0.0 if halves == 2 else x, y])
+
+
+def _squares(x: Floats, y: Floats, middle: Floats) -> Floats:
+    """Squared distance from a ghost's middle."""
+    return np.asarray((x - middle[0]) ** 2 + (y - middle[1]) ** 2)
+
+
+def _away(rays: Floats, middle: Floats) -> Floats:
+    """Distance of rays from a ghost's middle."""
+    return np.asarray(np.sqrt(_squares(rays[:, 1], rays[:, 2], middle)))
+
+
+def _second(rays: Floats, middle: Floats, limit: float) -> Floats:
+    """Flux times squared distance from a ghost's middle; 0 for rays that are left out."""
+    away = _away(rays, middle)
+    return np.asarray(np.where(away <= limit, rays[:, 0] * away**2, 0.0))
+
+
+def _far(rays: Floats, middle: Floats, flux: float) -> float:
+    """Return the distance from a ghost's middle beyond which rays carry FARTHEST of all light at most."""
+    lit = rays[rays[:, 0] > 0.0]
+    away = _away(lit, middle)
+    order = np.argsort(-away, kind="stable")
+    carried = np.cumsum(lit[order, 0])
+    kept = np.flatnonzero(carried > FARTHEST * (flux + carried[-1])) if len(carried) else carried
+    return float(away[order[kept[0]]]) if len(kept) else float("inf")
 
 
 def _extent(sums: Floats) -> float:
