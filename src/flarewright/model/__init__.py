@@ -12,6 +12,7 @@ from .lens import Element, Lens, Position, Row, Stop, Surface
 from .light import D65, BlackBody, EqualEnergy, Light, Lines, Spectrum, Tabulated
 from .plate import Plate
 from .project import AsLens, CoatingChoice, Everywhere, Output, PerRow, Preset, Project, Quality
+from .scatter import RowScatter, Scatter
 from .starburst import Dirt, Starburst
 
 __all__ = [
@@ -46,6 +47,8 @@ __all__ = [
     "Quality",
     "QuarterWave",
     "Row",
+    "RowScatter",
+    "Scatter",
     "Rule",
     "Spectrum",
     "Stack",

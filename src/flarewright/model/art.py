@@ -18,7 +18,7 @@ SELECTOR = re.compile(
 """How ghosts are chosen; what each form means stands at `Rule`."""
 
 
-PASSES = ("starburst", "ghosts")
+PASSES = ("starburst", "ghosts", "scatter")
 """Layers whose light may be graded as a whole."""
 
 

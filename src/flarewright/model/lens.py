@@ -11,6 +11,7 @@ from .coating import Coating
 from .figure import Figure
 from .glass import Medium
 from .iris import Iris
+from .scatter import Scatter
 
 SCHEMA_VERSION = 1
 
@@ -170,6 +171,8 @@ class Lens(Frozen):
         Settings of a zoom, or of the focus where gaps inside the lens change with it.
     coating_presets : dict of str to tuple of Coating or None
         Named sets, one entry per row (the stop's is ignored).
+    scatter : Scatter or None
+        What its surfaces scatter; None: nothing.
     """
 
     schema_version: Literal[1] = 1
@@ -187,6 +190,7 @@ class Lens(Frozen):
     elements: tuple[Element, ...] = ()
     positions: tuple[Position, ...] = ()
     coating_presets: dict[str, tuple[Coating | None, ...]] = Field(default_factory=dict)
+    scatter: Scatter | None = None
 
     @property
     def stop_row(self) -> int:

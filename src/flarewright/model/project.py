@@ -15,6 +15,7 @@ from .iris import Iris
 from .lens import Lens
 from .light import Light
 from .plate import Plate
+from .scatter import Scatter
 from .starburst import Dirt, Starburst
 
 
@@ -131,6 +132,8 @@ class Project(Frozen):
         A plane plate in front of the lens.
     imperfection : Imperfection or None
         One sample of the lens within tolerances; None: as designed.
+    scatter : Scatter or None
+        What the surfaces scatter; None: as the lens file says, which is nothing for the lenses of the library.
     art : Art
         What is changed by hand; nothing by default.
     """
@@ -149,6 +152,7 @@ class Project(Frozen):
     zoom: str | Annotated[float, Field(gt=0.0)] | None = None
     filter: Plate | None = None
     imperfection: Imperfection | None = None
+    scatter: Scatter | None = None
     art: Art = Art()
 
     @model_validator(mode="after")

@@ -1,0 +1,95 @@
+"""How surfaces scatter: polish, a measured function, dust, or Chaumond's phase function."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from .base import Frozen
+
+ScatterModel = Literal["none", "chaumond", "harvey-shack", "abg"]
+
+Roughness = Annotated[float, Field(ge=0.0, le=50.0)]
+Correlation = Annotated[float, Field(ge=0.5, le=10000.0)]
+Slope = Annotated[float, Field(ge=2.05, le=8.0)]
+Level = Annotated[float, Field(ge=10.0, le=2000.0)]
+Share = Annotated[float, Field(ge=0.0, le=0.2)]
+Abg = tuple[
+    Annotated[float, Field(ge=0.0, le=10.0)],
+    Annotated[float, Field(ge=1e-9, le=10.0)],
+    Annotated[float, Field(ge=0.5, le=5.0)],
+]
+
+
+class RowScatter(Frozen):
+    """What differs at one row of the lens; None: as everywhere.
+
+    Attributes
+    ----------
+    row : int
+        Row of the lens, counted from 0.
+    roughness_nm, correlation_um, slope, cleanliness_level, abg, share
+        As in `Scatter`.
+    """
+
+    row: int = Field(ge=0, le=499)
+    roughness_nm: Roughness | None = None
+    correlation_um: Correlation | None = None
+    slope: Slope | None = None
+    cleanliness_level: Level | None = None
+    abg: Abg | None = None
+    share: Share | None = None
+
+
+class Scatter(Frozen):
+    """What the surfaces of a lens scatter.
+
+    Attributes
+    ----------
+    model : {"none", "chaumond", "harvey-shack", "abg"}
+        none: nothing. chaumond: a fixed share of the light at every surface, by Chaumond's phase function.
+        harvey-shack: what polish leaves, by roughness and correlation length. abg: a measured function. The last two
+        also scatter from dust.
+    roughness_nm : float
+        Root mean square of the surface's height, nm.
+    correlation_um : float
+        Correlation length of the roughness, micrometres.
+    slope : float
+        Power by which scatter of roughness falls at large angles.
+    cleanliness_level : float or None
+        Dust on surfaces in air, by IEST-STD-CC1246 (MIL-STD-1246): level L has one speck of L micrometres or more on
+        0.1 m^2. None: no dust.
+    abg : tuple of float
+        A, B, g of the scatter function A / (B + |beta - beta0|^g), 1/sr, on surfaces in air.
+    share : float
+        Part of the light that Chaumond's model scatters at every surface.
+    rows : tuple of RowScatter
+        Exceptions.
+    """
+
+    model: ScatterModel = "none"
+    roughness_nm: Roughness = 1.0
+    correlation_um: Correlation = 10.0
+    slope: Slope = 2.5
+    cleanliness_level: Level | None = None
+    abg: Abg = (2e-5, 1e-3, 2.0)
+    share: Share = 0.001
+    rows: tuple[RowScatter, ...] = ()
+
+    @model_validator(mode="after")
+    def _rows_differ(self) -> Scatter:
+        rows = [exception.row for exception in self.rows]
+        for row in rows:
+            if rows.count(row) > 1:
+                raise ValueError(f"rows: row {row} is told {rows.count(row)} times; keep one")
+        return self
+
+    def at(self, row: int) -> Scatter:
+        """Return what holds at one row of the lens, without exceptions."""
+        for exception in self.rows:
+            if exception.row == row:
+                told = {key: value for key, value in exception if value is not None and key != "row"}
+                found: Scatter = self.replace(rows=(), **told)
+                return found
+        return self

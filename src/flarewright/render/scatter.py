@@ -1,0 +1,279 @@
+"""The scatter pass: light that every surface scatters once, straight on to the sensor, as a smooth layer."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from math import ceil, log, pi
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..kernels.scatter import gather_scatter, spread_polar
+from ..model import Layer, Lens
+from ..model.scatter import Scatter
+from ..optics.beams import Beams, trace_beams
+from ..optics.pack import PackedLens
+from ..optics.paths import direct_path
+from ..optics.scatter import ScatterTables, scatter_tables
+from .direct import DirectImage
+from .prepare import Settled
+from .shot import Shot
+
+Floats = NDArray[np.float64]
+
+# wavelengths at which light is gathered; it changes slowly with them
+MOST_WAVELENGTHS = 3
+# rays from each point of the sensor: so many squared over what a surface, or the iris, lets through
+RAYS = 16
+# nodes: circles around the direct image and directions on them, all round or over a picture beside it
+RINGS, SPOKES, FAN = 52, 32, 24
+# part of a pixel at which circles begin
+FIRST_RING = 0.25
+# share of the light from which a person is told that ghosts do not lose it
+TOLD = 2e-3
+
+__all__ = ["ScatterPass", "chosen_scatter", "render_scatter"]
+
+
+@dataclass(frozen=True)
+class ScatterPass:
+    """What the pass made.
+
+    Attributes
+    ----------
+    layer : Layer
+        Named "scatter".
+    kept : tuple of ndarray
+        Per light, part of the direct light that no surface scatters, at its packed wavelengths.
+    facts : dict
+        For the summary.
+    remarks : tuple of str
+    """
+
+    layer: Layer
+    kept: tuple[Floats, ...]
+    facts: dict[str, Any]
+    remarks: tuple[str, ...]
+
+
+def chosen_scatter(settled: Settled) -> Scatter | None:
+    """Return what scatters: as the project says, else as the lens file does; None when nothing does."""
+    told = settled.project.scatter
+    chosen = settled.lens.scatter if told is None else told
+    return None if chosen is None or chosen.model == "none" else chosen
+
+
+def render_scatter(
+    settled: Settled, shots: Sequence[Shot], images: Sequence[DirectImage], *, threads: int | None = None
+) -> ScatterPass | None:
+    """Draw what the surfaces scatter of every light.
+
+    Parameters
+    ----------
+    settled : Settled
+    shots, images : sequence
+        One a light.
+    threads : int, optional
+        None: all cores. The pixels do not depend on it.
+
+    Returns
+    -------
+    ScatterPass or None
+        None where nothing scatters.
+
+    Raises
+    ------
+    ProjectError
+        As `optics.scatter.scatter_tables`.
+
+    Notes
+    -----
+    Each surface scatters the direct beam once, on through the surfaces behind it. Light that was reflected before or
+    after, that scatters from a reflection or twice, is left out; the reference has the first of these.
+    """
+    scatter = chosen_scatter(settled)
+    if scatter is None:
+        return None
+    width, height = shots[0].size_px
+    total = np.zeros((height, width, 3), dtype=np.float32)
+    shares, kept = [], []
+    packs: dict[tuple[float, ...], ScatterTables] = {}
+    with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
+        for shot, image in zip(shots, images, strict=True):
+            key = tuple(shot.packed.wavelengths_nm)
+            if key not in packs:
+                packs[key] = scatter_tables(settled.lens, shot.packed, scatter)
+            tables = packs[key]
+            kept.append(tables.kept)
+            shares.append(tables.shares[(len(key) - 1) // 2])
+            total += _one_light(settled.lens, shot, image, tables, pool)
+    lost = 1.0 - float(min(part.min() for part in kept))
+    facts = {
+        "model": scatter.model,
+        "share_by_row": [float(share) for share in shares[0]],
+        "direct_kept": float(kept[0][(len(kept[0]) - 1) // 2]),
+    }
+    told = (f"surfaces scatter up to {lost:.2%} of the light; ghosts are drawn as if they lost nothing by it",)
+    return ScatterPass(Layer("scatter", total, (0, 0, width, height)), tuple(kept), facts, told if lost > TOLD else ())
+
+
+def _one_light(
+    lens: Lens, shot: Shot, image: DirectImage, tables: ScatterTables, pool: ThreadPoolExecutor
+) -> NDArray[np.float32]:
+    """Gather at nodes on circles around the direct image, and fill the picture from them."""
+    centre = np.array(image.position_mm)
+    radii, angles, round_about = _nodes(shot, centre)
+    first = log(radii[0]), (len(radii) - 1) / log(radii[-1] / radii[0])
+    place = centre + radii[:, None, None] * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    # the upright picture is the lens' frame turned round
+    axes = shot.incidence.axes
+    points = np.ascontiguousarray(-place.reshape(-1, 2) @ axes.T)
+    count = len(shot.packed.wavelengths_nm)
+    chosen = np.unique(np.linspace(0, count - 1, min(count, MOST_WAVELENGTHS)).round().astype(int))
+    found = gather(lens, shot, tables, [int(w) for w in chosen], points, pool)
+    light = _at_all(shot.packed.wavelengths_nm, chosen, found).reshape(count, *place.shape[:2])
+    rgb = shot.weights(shot.packed.wavelengths_nm)
+    level = light.mean(axis=0)
+    brightest = float(level.max())
+    if brightest <= 0.0:
+        return np.zeros((shot.size_px[1], shot.size_px[0], 3), dtype=np.float32)
+    level = np.maximum(level, 1e-12 * brightest)
+    colour = np.einsum("wab,wc->abc", light, rgb) / level[..., None] * shot.gain
+    pixels = np.empty((shot.size_px[1], shot.size_px[0], 3), dtype=np.float32)
+    step = len(angles) / (2.0 * pi) if round_about else (len(angles) - 1) / float(angles[-1] - angles[0])
+    spread_polar(
+        centre, round_about, first, (float(angles[0]), step), np.log(level), colour, shot.to_pixels, pixels
+    )
+    return pixels
+
+
+def _at_all(wavelengths_nm: Floats, chosen: NDArray[np.intp], light: Floats) -> Floats:
+    """Pass a parabola through the logarithms: scatter goes with a power of the wavelength that itself changes slowly."""
+    if len(chosen) == len(wavelengths_nm):
+        return light
+    t = np.log(wavelengths_nm)
+    weights = np.array(
+        [[np.prod([(at - t[m]) / (t[k] - t[m]) for m in chosen if m != k]) for k in chosen] for at in t]
+    )
+    lit = (light > 0.0).all(axis=0)
+    found: Floats = np.where(lit, np.exp(weights @ np.log(np.where(lit, light, 1.0))), 0.0)
+    return found
+
+
+def _nodes(shot: Shot, centre: Floats) -> tuple[Floats, Floats, bool]:
+    """Choose radii and angles of nodes that cover the picture as seen from the direct image."""
+    width, height = shot.size_px
+    corners = np.array([[x, y] for x in (0.0, width) for y in (0.0, height)])
+    seen = (corners - shot.to_pixels[:2]) / shot.to_pixels[2:] * np.array([1.0, -1.0]) - centre
+    far = float(np.hypot(seen[:, 0], seen[:, 1]).max()) * 1.001
+    low, high = seen.min(axis=0), seen.max(axis=0)
+    pixel = 1.0 / float(shot.to_pixels[2:].max())
+    if (low < 0.0).all() and (high > 0.0).all():
+        return (
+            np.geomspace(FIRST_RING * pixel, far, RINGS),
+            2.0 * pi * np.arange(SPOKES) / SPOKES,
+            True,
+        )
+    near = float(np.hypot(*np.clip(0.0, low, high)))
+    towards = np.arctan2(*(0.5 * (low + high))[::-1])
+    turned = np.angle(np.exp(1j * (np.arctan2(seen[:, 1], seen[:, 0]) - towards)))
+    angles = towards + np.linspace(turned.min() - 1e-3, turned.max() + 1e-3, FAN)
+    return np.geomspace(max(0.999 * near, FIRST_RING * pixel), far, RINGS), angles, False
+
+
+def gather(
+    lens: Lens, shot: Shot, tables: ScatterTables, wavelengths: list[int], points: Floats, pool: ThreadPoolExecutor,
+    *, rays: int = RAYS,
+) -> Floats:  # fmt: skip
+    """Gather the scattered light of a shot at points of the sensor.
+
+    Parameters
+    ----------
+    lens : Lens
+    shot : Shot
+    tables : ScatterTables
+        At the shot's packed wavelengths.
+    wavelengths : list of int
+        Which of them.
+    points : ndarray, shape (P, 2)
+        In the light's meridional frame, mm.
+    pool : ThreadPoolExecutor
+    rays : int
+        Rays from each point: so many squared for the surfaces in front of the stop together and for each behind it.
+
+    Returns
+    -------
+    ndarray, shape (len(wavelengths), P)
+        Irradiance per irradiance on the plane of the first vertex.
+    """
+    beams = list(pool.map(lambda w: _beams(lens, shot, tables, w), wavelengths))
+    groups = _groups(lens, tables)
+    # points are dealt out in fixed parts, so that two threads have work and sums do not depend on them
+    parts = np.array_split(np.arange(len(points)), max(1, ceil(len(points) / 256)))
+    work = [(m, w, group, part) for m, w in enumerate(wavelengths) for group in groups for part in parts]
+
+    def one(task: tuple[int, int, tuple[int, int, int], NDArray[np.intp]]) -> Floats:
+        m, w, group, part = task
+        return _gather_group(lens, shot, tables, w, beams[m], group, np.ascontiguousarray(points[part]), rays)
+
+    light = np.zeros((len(wavelengths), len(points)))
+    for (m, _, _, part), found in zip(work, pool.map(one, work), strict=True):
+        light[m, part] += found
+    return light
+
+
+def _groups(lens: Lens, tables: ScatterTables) -> list[tuple[int, int, int]]:
+    """Rows that share their rays: target of the rays, first and last row that scatters."""
+    rows = [int(k) for k in np.flatnonzero(tables.shares.any(axis=0))]
+    stop = lens.stop_row
+    front = [k for k in rows if k < stop]
+    return ([(stop, front[0], front[-1])] if front else []) + [(k, k, k) for k in rows if k > stop]
+
+
+def _beams(lens: Lens, shot: Shot, tables: ScatterTables, w: int) -> Beams:
+    rows = [int(k) for k in np.flatnonzero(tables.shares.any(axis=0))]
+    radius = shot.opening.radius
+    return trace_beams(shot.packed, w, direct_path(lens), shot.incidence.tilt, lens.stop_row, radius, rows)
+
+
+def _gather_group(
+    lens: Lens,
+    shot: Shot,
+    tables: ScatterTables,
+    w: int,
+    beams: Beams,
+    group: tuple[int, int, int],
+    points: Floats,
+    rays: int,
+) -> Floats:
+    packed, opening = shot.packed, shot.opening
+    target, first, last = group
+    # what surfaces in front have scattered away does not arrive
+    left = np.concatenate([[1.0], np.cumprod(1.0 - tables.shares[w])[:-1]])
+    nodes = beams.nodes.copy()
+    nodes[..., 2] *= left[:, None, None]
+    out = np.zeros(len(points))
+    gather_scatter(
+        packed.curvature, packed.form, packed.z_vertex, packed.inv_semi, packed.n_gap[w], packed.reflectance[w],
+        packed.sensor_z, (lens.stop_row, target, first, last), tables.tables[w], tables.amounts[w], nodes, beams.boxes,
+        _start(packed, w, target), beams.domains[target], opening.blades, opening.mask, opening.half,
+        shot.incidence.axes, rays, points, out,
+    )  # fmt: skip
+    return out
+
+
+def _start(packed: PackedLens, w: int, target: int) -> tuple[float, float]:
+    """Slope of a ray on the sensor per its place there and per its place on a row, by matrices."""
+    total = np.eye(2)
+    n = packed.n_gap[w]
+    for k in range(target, len(packed.curvature)):
+        bend = np.array([[1.0, 0.0], [(n[k] - n[k + 1]) * packed.curvature[k] / n[k + 1], n[k] / n[k + 1]]])
+        following = packed.z_vertex[k + 1] if k + 1 < len(packed.curvature) else packed.sensor_z
+        total = np.array([[1.0, following - packed.z_vertex[k]], [0.0, 1.0]]) @ bend @ total
+    back = np.linalg.inv(total)
+    reach = back[0, 1] if abs(back[0, 1]) > 1e-9 else 1e-9
+    return float(-back[0, 0] / reach), float(1.0 / reach)
