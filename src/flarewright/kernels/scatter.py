@@ -294,9 +294,9 @@ def gather_scatter(
 
     Notes
     -----
-    Rays run backward from the sensor, so every point is an integral of its own and no chance is in it. The radiance that
-    a surface sends on is E T rho(v) n^2, with E the irradiance of the direct beam there; radiance over the squared index
-    does not change along a ray but for T. The irradiance is its integral over slopes, dw / (1 + w^2)^2.
+    Rays run backward from the sensor, so every point is an integral of its own and no chance is in it. The radiance
+    that a surface sends on is E T rho(v) n^2, with E the irradiance of the direct beam there; radiance over the squared
+    index does not change along a ray but for T. The irradiance is its integral over slopes, dw / (1 + w^2)^2.
     """
     stop_row, target, first, last = rows
     samples = reflectance.shape[1]
@@ -351,16 +351,13 @@ def gather_scatter(
                         lit *= _covered(blades, mask, half, ramp * _opening(blades), u, v)
                     if lit > 0.0 and cos_spec > 0.0:
                         between = -(dx * bx + dy * by + dz * bz)
-                        total += weight * lit * scattered_density(
-                            tables[row], amounts[row], n_out, n_in, cos_spec, cos_in, v2, between
-                        )
+                        lit *= scattered_density(tables[row], amounts[row], n_out, n_in, cos_spec, cos_in, v2, between)
+                        total += weight * lit
                 if not on:
                     break
                 place = min(cos_in if n_in <= n_out else cos_out, 1.0) * (samples - 1)
                 k = min(np.int64(place), samples - 2)
-                weight *= 1.0 - (
-                    reflectance[row, k] + (place - k) * (reflectance[row, k + 1] - reflectance[row, k])
-                )
+                weight *= 1.0 - (reflectance[row, k] + (place - k) * (reflectance[row, k + 1] - reflectance[row, k]))
                 x, y, z, dx, dy, dz = hx, hy, hz, tx, ty, tz
                 row -= 1
         out[p] += total

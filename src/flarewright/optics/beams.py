@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from ..kernels.intersect import ORIGIN
 from ..kernels.scatter import FLUX, REL, STOP_X, STOP_Y, TX, TY
+from ..kernels.trace import REL as NODE_REL
 from ..kernels.trace import STOP_X as NODE_STOP_X
 from ..kernels.trace import WEIGHT, trace_hits, trace_nodes
-from ..kernels.trace import REL as NODE_REL
 from .bundle import front_box
 from .pack import PackedLens
 from .paths import LightPath
@@ -114,9 +114,7 @@ def _scouts(packed: PackedLens, tilt: float) -> Floats:
     return np.stack([x.ravel(), y.ravel()], axis=1)
 
 
-def _trace(
-    packed: PackedLens, w: int, path: LightPath, k: int, tilt: float, front: Floats
-) -> tuple[Floats, Floats]:
+def _trace(packed: PackedLens, w: int, path: LightPath, k: int, tilt: float, front: Floats) -> tuple[Floats, Floats]:
     """Hits on row k, shape (N, 2), and directions behind it, shape (N, 3); NaN where a ray ends before."""
     hits = np.empty((len(front), k + 3, 3))
     beyond = float(packed.z_vertex[k]) + 1e3

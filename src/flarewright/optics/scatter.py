@@ -20,6 +20,7 @@ Floats = NDArray[np.float64]
 NODES = 256
 # below this there is no light to tell of, and a logarithm stays finite
 DARK = 1e-280
+LEAST = 1e-30
 # steps of the sum over all directions
 RINGS, SPOKES = 160, 32
 # indices that differ by less are those of one glass
@@ -104,8 +105,8 @@ def roughness_density(v: ArrayLike, wavelength_nm: float, correlation_um: float,
     Notes
     -----
     The power spectrum of heights is the K-correlation or ABC model, 1 / (1 + (2 pi l f)^2)^(slope / 2) with f = v /
-    lambda (E. L. Church and P. Z. Takacs, SPIE 1165, 136, 1989), which is Harvey's three-parameter scatter function with
-    its shoulder at lambda / (2 pi l) and the slope -slope.
+    lambda (E. L. Church and P. Z. Takacs, SPIE 1165, 136, 1989), which is Harvey's three-parameter scatter function
+    with its shoulder at lambda / (2 pi l) and the slope -slope.
     """
     shoulder = 1e-3 * wavelength_nm / (2.0 * np.pi * correlation_um)
     m = 0.5 * slope
@@ -214,7 +215,10 @@ def scatter_tables(lens: Lens, packed: PackedLens, scatter: Scatter) -> ScatterT
             if isinstance(row, Stop) or abs(n_out - n_in) < SAME_INDEX:
                 continue
             _fill(scatter.at(k), float(wavelength_nm), min(n_in, n_out) == 1.0, tables[w, k], amounts[w, k])
-            shares[w, k] = scattered_total(tables[w, k], amounts[w, k], n_in, n_out, 1.0, RINGS, SPOKES)
+            # all of Chaumond's share leaves the direct light, a fifth of it backward
+            rough = amounts[w, k] * np.array([1.0, 0.0])
+            found = scattered_total(tables[w, k], rough, n_in, n_out, 1.0, RINGS, SPOKES) + amounts[w, k, SHARE]
+            shares[w, k] = found if found > LEAST else 0.0
             if shares[w, k] >= 0.5:
                 raise ProjectError(
                     f"scatter: row {k} of {lens.name} would scatter {shares[w, k]:.0%} of its light; scatter once per "

@@ -21,6 +21,7 @@ from .compose import beauty
 from .direct import DirectImage, defocus_mm, direct_image
 from .ghosts import render_ghosts
 from .prepare import Settled, settle
+from .scatter import dimmed, render_scatter, scatter_facts, scatter_of
 from .shot import Shot, make_opening, make_shots, soiled_opening
 from .starburst_pass import OUT_OF_FOCUS_PX, read_soil, starburst_of
 
@@ -94,6 +95,7 @@ def render(
     art = ResolvedArt() if project.quality.mode == "reference" else resolve_art(settled)
     opening = make_opening(settled, mask)
     shots = seen = make_shots(settled, opening)
+    tables = scatter_of(settled, shots)
     soil = read_soil(project.dirt)
     if soil is not None and project.dirt.in_ghosts:
         dirty = soiled_opening(opening, settled.iris, settled.order.stop_semi_diameter, soil)
@@ -104,6 +106,14 @@ def render(
         drawn = _ghosts(settled, seen, art, threads, progress)
     images = [direct_image(settled.lens, shot) for shot in shots]
     passes = list(drawn.passes)
+    scattered: dict[str, Any] = {}
+    told: tuple[str, ...] = ()
+    if tables is not None:
+        if project.quality.mode != "reference":
+            passes.append(render_scatter(settled, shots, images, tables, threads=threads))
+        images = dimmed(images, tables)
+        facts, told = scatter_facts(settled, tables)
+        scattered = {"scatter": facts}
     if project.output.starburst:
         passes.insert(0, starburst_of(settled, shots, images, mask, soil))
     passes = [graded(layer, art.gain.get(layer.name, 1.0)) for layer in passes]
@@ -115,12 +125,12 @@ def render(
         from .ledger import trace_ledger
 
         account = trace_ledger(shots, project.quality.seed, threads=threads)
-    summary = {**_summary(settled, shots, images, art), **drawn.facts}
+    summary = {**_summary(settled, shots, images, art), **drawn.facts, **scattered}
     return Rendering(
         settled.project,
         layers,
         {**summary, "ledger": account.as_data()} if ledger and account is not None else summary,
-        (*settled.remarks, *drawn.remarks, *_remarks(settled, shots)),
+        (*settled.remarks, *drawn.remarks, *told, *_remarks(settled, shots)),
         account if ledger else None,
     )
 

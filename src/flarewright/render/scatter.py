@@ -5,14 +5,14 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import replace
 from math import ceil, log, pi
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernels.scatter import gather_scatter, spread_polar
+from ..kernels.scatter import FLUX, gather_scatter, spread_polar
 from ..model import Layer, Lens
 from ..model.scatter import Scatter
 from ..optics.beams import Beams, trace_beams
@@ -35,90 +35,132 @@ RINGS, SPOKES, FAN = 52, 32, 24
 FIRST_RING = 0.25
 # share of the light from which a person is told that ghosts do not lose it
 TOLD = 2e-3
+# rows that a filter puts in front of the lens' own
+FILTER_ROWS = 2
 
-__all__ = ["ScatterPass", "chosen_scatter", "render_scatter"]
-
-
-@dataclass(frozen=True)
-class ScatterPass:
-    """What the pass made.
-
-    Attributes
-    ----------
-    layer : Layer
-        Named "scatter".
-    kept : tuple of ndarray
-        Per light, part of the direct light that no surface scatters, at its packed wavelengths.
-    facts : dict
-        For the summary.
-    remarks : tuple of str
-    """
-
-    layer: Layer
-    kept: tuple[Floats, ...]
-    facts: dict[str, Any]
-    remarks: tuple[str, ...]
+__all__ = ["chosen_scatter", "dimmed", "render_scatter", "scatter_facts", "scatter_of"]
 
 
 def chosen_scatter(settled: Settled) -> Scatter | None:
     """Return what scatters: as the project says, else as the lens file does; None when nothing does."""
     told = settled.project.scatter
     chosen = settled.lens.scatter if told is None else told
-    return None if chosen is None or chosen.model == "none" else chosen
+    if chosen is None or chosen.model == "none":
+        return None
+    if told is None and settled.project.filter is not None and chosen.rows:
+        # the lens file counts its own rows, which begin behind those of the filter
+        moved = tuple(exception.replace(row=exception.row + FILTER_ROWS) for exception in chosen.rows)
+        return chosen.replace(rows=moved)  # type: ignore[no-any-return]
+    return chosen
+
+
+def scatter_of(settled: Settled, shots: Sequence[Shot]) -> tuple[ScatterTables, ...] | None:
+    """Tabulate what scatters, for every light.
+
+    Parameters
+    ----------
+    settled : Settled
+    shots : sequence of Shot
+
+    Returns
+    -------
+    tuple of ScatterTables or None
+        At the shots' packed wavelengths; None where nothing scatters.
+
+    Raises
+    ------
+    ProjectError
+        As `optics.scatter.scatter_tables`.
+    """
+    scatter = chosen_scatter(settled)
+    if scatter is None:
+        return None
+    made: dict[tuple[float, ...], ScatterTables] = {}
+    for shot in shots:
+        key = tuple(shot.packed.wavelengths_nm)
+        if key not in made:
+            made[key] = scatter_tables(settled.lens, shot.packed, scatter)
+    return tuple(made[tuple(shot.packed.wavelengths_nm)] for shot in shots)
+
+
+def dimmed(images: Sequence[DirectImage], tables: Sequence[ScatterTables]) -> list[DirectImage]:
+    """Take from direct images what surfaces scatter.
+
+    Parameters
+    ----------
+    images, tables : sequence
+        One a light.
+
+    Returns
+    -------
+    list of DirectImage
+    """
+    return [
+        replace(
+            image,
+            throughput_mm2=image.throughput_mm2 * table.kept,
+            transmittance=image.transmittance * float(table.kept[(len(table.kept) - 1) // 2]),
+        )
+        for image, table in zip(images, tables, strict=True)
+    ]
+
+
+def scatter_facts(settled: Settled, tables: Sequence[ScatterTables]) -> tuple[dict[str, Any], tuple[str, ...]]:
+    """Return what the summary says of scatter, and remarks.
+
+    Parameters
+    ----------
+    settled : Settled
+    tables : sequence of ScatterTables
+    """
+    scatter = chosen_scatter(settled)
+    assert scatter is not None, "there are tables only where something scatters"
+    lost = 1.0 - float(min(table.kept.min() for table in tables))
+    middle = (len(tables[0].kept) - 1) // 2
+    facts = {
+        "model": scatter.model,
+        "share_by_row": [float(share) for share in tables[0].shares[middle]],
+        "direct_kept": float(tables[0].kept[middle]),
+    }
+    told = f"surfaces scatter up to {lost:.2%} of the direct light; ghosts are drawn as if they lost nothing by it"
+    final = settled.project.quality.mode != "reference"
+    return facts, (told,) if final and lost > TOLD else ()
 
 
 def render_scatter(
-    settled: Settled, shots: Sequence[Shot], images: Sequence[DirectImage], *, threads: int | None = None
-) -> ScatterPass | None:
+    settled: Settled,
+    shots: Sequence[Shot],
+    images: Sequence[DirectImage],
+    tables: Sequence[ScatterTables],
+    *,
+    threads: int | None = None,
+) -> Layer:
     """Draw what the surfaces scatter of every light.
 
     Parameters
     ----------
     settled : Settled
-    shots, images : sequence
+    shots, images, tables : sequence
         One a light.
     threads : int, optional
         None: all cores. The pixels do not depend on it.
 
     Returns
     -------
-    ScatterPass or None
-        None where nothing scatters.
-
-    Raises
-    ------
-    ProjectError
-        As `optics.scatter.scatter_tables`.
+    Layer
+        Named "scatter".
 
     Notes
     -----
     Each surface scatters the direct beam once, on through the surfaces behind it. Light that was reflected before or
-    after, that scatters from a reflection or twice, is left out; the reference has the first of these.
+    after, that scatters from a reflection or twice, is left out; the reference has the first two of these.
     """
-    scatter = chosen_scatter(settled)
-    if scatter is None:
-        return None
     width, height = shots[0].size_px
     total = np.zeros((height, width, 3), dtype=np.float32)
-    shares, kept = [], []
-    packs: dict[tuple[float, ...], ScatterTables] = {}
     with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
-        for shot, image in zip(shots, images, strict=True):
-            key = tuple(shot.packed.wavelengths_nm)
-            if key not in packs:
-                packs[key] = scatter_tables(settled.lens, shot.packed, scatter)
-            tables = packs[key]
-            kept.append(tables.kept)
-            shares.append(tables.shares[(len(key) - 1) // 2])
-            total += _one_light(settled.lens, shot, image, tables, pool)
-    lost = 1.0 - float(min(part.min() for part in kept))
-    facts = {
-        "model": scatter.model,
-        "share_by_row": [float(share) for share in shares[0]],
-        "direct_kept": float(kept[0][(len(kept[0]) - 1) // 2]),
-    }
-    told = (f"surfaces scatter up to {lost:.2%} of the light; ghosts are drawn as if they lost nothing by it",)
-    return ScatterPass(Layer("scatter", total, (0, 0, width, height)), tuple(kept), facts, told if lost > TOLD else ())
+        for shot, image, table in zip(shots, images, tables, strict=True):
+            total += _one_light(settled.lens, shot, image, table, pool)
+    return Layer("scatter", total, (0, 0, width, height))
 
 
 def _one_light(
@@ -145,20 +187,16 @@ def _one_light(
     colour = np.einsum("wab,wc->abc", light, rgb) / level[..., None] * shot.gain
     pixels = np.empty((shot.size_px[1], shot.size_px[0], 3), dtype=np.float32)
     step = len(angles) / (2.0 * pi) if round_about else (len(angles) - 1) / float(angles[-1] - angles[0])
-    spread_polar(
-        centre, round_about, first, (float(angles[0]), step), np.log(level), colour, shot.to_pixels, pixels
-    )
+    spread_polar(centre, round_about, first, (float(angles[0]), step), np.log(level), colour, shot.to_pixels, pixels)
     return pixels
 
 
 def _at_all(wavelengths_nm: Floats, chosen: NDArray[np.intp], light: Floats) -> Floats:
-    """Pass a parabola through the logarithms: scatter goes with a power of the wavelength that itself changes slowly."""
+    """Pass a parabola through the logarithms: light goes with a power of the wavelength that changes slowly."""
     if len(chosen) == len(wavelengths_nm):
         return light
     t = np.log(wavelengths_nm)
-    weights = np.array(
-        [[np.prod([(at - t[m]) / (t[k] - t[m]) for m in chosen if m != k]) for k in chosen] for at in t]
-    )
+    weights = np.array([[np.prod([(at - t[m]) / (t[k] - t[m]) for m in chosen if m != k]) for k in chosen] for at in t])
     lit = (light > 0.0).all(axis=0)
     found: Floats = np.where(lit, np.exp(weights @ np.log(np.where(lit, light, 1.0))), 0.0)
     return found
@@ -254,12 +292,15 @@ def _gather_group(
     target, first, last = group
     # what surfaces in front have scattered away does not arrive
     left = np.concatenate([[1.0], np.cumprod(1.0 - tables.shares[w])[:-1]])
-    nodes = beams.nodes.copy()
-    nodes[..., 2] *= left[:, None, None]
+    # a sensor that reflects is one row more, and nothing that scattered light meets on its way there
+    own = len(lens.rows)
+    nodes = beams.nodes[:own].copy()
+    nodes[..., FLUX] *= left[:, None, None]
     out = np.zeros(len(points))
     gather_scatter(
-        packed.curvature, packed.form, packed.z_vertex, packed.inv_semi, packed.n_gap[w], packed.reflectance[w],
-        packed.sensor_z, (lens.stop_row, target, first, last), tables.tables[w], tables.amounts[w], nodes, beams.boxes,
+        packed.curvature[:own], packed.form[:own], packed.z_vertex[:own], packed.inv_semi[:own],
+        packed.n_gap[w][: own + 1], packed.reflectance[w][:own], packed.sensor_z,
+        (lens.stop_row, target, first, last), tables.tables[w], tables.amounts[w], nodes, beams.boxes[:own],
         _start(packed, w, target), beams.domains[target], opening.blades, opening.mask, opening.half,
         shot.incidence.axes, rays, points, out,
     )  # fmt: skip
