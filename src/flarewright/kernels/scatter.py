@@ -128,15 +128,12 @@ def scattered_total(table, amount, n_in, n_out, cos_spec, rings, spokes):
 
 
 @inner
-def _covered(blades, mask, half, ramp, x, y):
+def _covered(blades, ramp, x, y):
     """How much of the iris is open around a place, its edge softened over `ramp` mm."""
     high = -np.inf
     for b in range(blades.shape[0]):
         high = max(high, blade_value(blades, b, x, y))
-    open_part = min(max(0.5 - high / ramp, 0.0), 1.0)
-    if mask is not None:
-        open_part *= mask_value(mask, half, x, y)
-    return open_part
+    return min(max(0.5 - high / ramp, 0.0), 1.0)
 
 
 @inner
@@ -318,13 +315,17 @@ def gather_scatter(
             scale = -1.0 / sqrt(square)
             x, y, z, dx, dy, dz = px, py, sensor_z, wx * scale, wy * scale, scale
             weight = cell / (square * square)
+            # edges that coincide must not soften each other: the least cover counts
+            cover = 1.0
             row = np.int64(curvature.shape[0] - 1)
-            while row >= first and weight > 0.0:
+            while row >= first and weight * cover > 0.0:
                 if row == stop_row:
                     t = (z_vertex[row] - z) / dz
                     x, y, z = x + t * dx, y + t * dy, z_vertex[row]
                     u, v = x * axes[0, 0] + y * axes[1, 0], x * axes[0, 1] + y * axes[1, 1]
-                    weight *= _covered(blades, mask, half, ramp * min(domain[2], domain[3]), u, v)
+                    cover = min(cover, _covered(blades, ramp * min(domain[2], domain[3]), u, v))
+                    if mask is not None:
+                        weight *= mask_value(mask, half, u, v)
                     row -= 1
                     continue
                 n_in, n_out = n_gap[row + 1], n_gap[row]
@@ -333,8 +334,8 @@ def gather_scatter(
                 )
                 if not met:
                     break
-                weight *= _within(sqrt(radius2) * inv_semi[row], side)
-                if weight <= 0.0:
+                cover = min(cover, _within(sqrt(radius2) * inv_semi[row], side))
+                if cover <= 0.0:
                     break
                 if row <= last and _beam_at(beams[row], boxes[row], hx, hy, node):
                     nx, ny, nz = _normal(curvature, conic, row, z_vertex[row], hx, hy, hz, dx, dy, dz)
@@ -344,15 +345,18 @@ def gather_scatter(
                     qx, qy, qz = -dx - bx, -dy - by, -dz - bz
                     along = qx * nx + qy * ny + qz * nz
                     v2 = n_in * n_in * max(qx * qx + qy * qy + qz * qz - along * along, 0.0)
-                    lit = node[FLUX] * abs(nz) * _within(node[REL], side)
+                    lit = node[FLUX] * abs(nz)
+                    beam_cover = min(cover, _within(node[REL], side))
                     if row > stop_row:
                         u = node[STOP_X] * axes[0, 0] + node[STOP_Y] * axes[1, 0]
                         v = node[STOP_X] * axes[0, 1] + node[STOP_Y] * axes[1, 1]
-                        lit *= _covered(blades, mask, half, ramp * _opening(blades), u, v)
-                    if lit > 0.0 and cos_spec > 0.0:
+                        beam_cover = min(beam_cover, _covered(blades, ramp * _opening(blades), u, v))
+                        if mask is not None:
+                            lit *= mask_value(mask, half, u, v)
+                    if lit * beam_cover > 0.0 and cos_spec > 0.0:
                         between = -(dx * bx + dy * by + dz * bz)
                         lit *= scattered_density(tables[row], amounts[row], n_out, n_in, cos_spec, cos_in, v2, between)
-                        total += weight * lit
+                        total += weight * beam_cover * lit
                 if not on:
                     break
                 place = min(cos_in if n_in <= n_out else cos_out, 1.0) * (samples - 1)

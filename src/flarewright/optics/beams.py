@@ -19,11 +19,11 @@ from .paths import LightPath
 Floats = NDArray[np.float64]
 
 # nodes a side of the table of a surface; rays a side that show where the beam runs
-NODES, SCOUTS = 33, 41
+NODES, SCOUTS = 33, 21
 # steps of Newton's method, the step of its derivative and what it may miss by, mm
 STEPS, NUDGE, MISSED = 6, 1e-3, 1e-5
 # powers of the polynomial from which it starts
-DEGREE = 5
+DEGREE = 4
 # how far beyond what it passes a surface is looked at
 ROOM = 1.06
 
