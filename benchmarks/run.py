@@ -29,7 +29,20 @@ import numpy as np
 
 import flarewright
 from flarewright.kernels.raster import blank_plane, fill_polygon
-from flarewright.model import Art, Camera, Imperfection, Iris, Lens, Light, Output, Plate, Project, Quality, Rule
+from flarewright.model import (
+    Art,
+    Camera,
+    Imperfection,
+    Iris,
+    Lens,
+    Light,
+    Output,
+    Plate,
+    Project,
+    Quality,
+    Rule,
+    Scatter,
+)
 from flarewright.optics.bundle import find_region, front_box, trace_points
 from flarewright.optics.pack import pack_lens
 from flarewright.optics.paraxial import first_order
@@ -40,7 +53,7 @@ from flarewright.render.reference import spectral_shots
 from flarewright.render.render import render
 from flarewright.render.shot import make_opening, make_shots
 
-PARTS = ("yardsticks", "trace", "raster", "frame", "art", "built", "reference", "startup", "memory")
+PARTS = ("yardsticks", "trace", "raster", "frame", "art", "built", "scatter", "reference", "startup", "memory")
 
 LIGHT = (10.0, 5.0)
 """Field angles of the frames' light, degrees."""
@@ -278,6 +291,18 @@ def built(repeat: int) -> Rows:
     return found
 
 
+def scatter(repeat: int) -> Rows:
+    """Drafts with and without the scatter layer, and that layer's part of it by model."""
+    found: Rows = []
+    for name in ("heliar-tronnier", "canon-28-80"):
+        plain = heliar_frame("draft", starburst=False).replace(lens=name)
+        for model in ("none", "harvey-shack", "abg", "chaumond"):
+            project = plain.replace(scatter=Scatter(model=model))
+            seconds = median_seconds(lambda project=project: render(project), repeat)  # type: ignore[misc]
+            found.append(row("scatter", f"{name} draft 1280x720, {model}", 1e3 * seconds, "ms"))
+    return found
+
+
 def reference(repeat: int) -> Rows:
     """Random rays through the whole lens on one thread: what one batch traces, with and without a picture."""
     found = []
@@ -409,6 +434,7 @@ def main(arguments: list[str] | None = None) -> None:
         "frame": lambda: frame(asked.repeat),
         "art": lambda: art(asked.repeat),
         "built": lambda: built(asked.repeat),
+        "scatter": lambda: scatter(asked.repeat),
         "reference": lambda: reference(asked.repeat),
         "startup": lambda: startup(asked.repeat),
         "memory": memory,

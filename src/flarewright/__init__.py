@@ -44,7 +44,9 @@ if TYPE_CHECKING:
     from .model import Project as Project
     from .model import Quality as Quality
     from .model import QuarterWave as QuarterWave
+    from .model import RowScatter as RowScatter
     from .model import Rule as Rule
+    from .model import Scatter as Scatter
     from .model import Stack as Stack
     from .model import Standard as Standard
     from .model import Stop as Stop
@@ -60,8 +62,8 @@ _HOMES = {
     ".errors": ("FlarewrightError", "GlassError", "LensError", "OutputError", "ProjectError"),
     ".model": (
         "D65", "Art", "AsLens", "Bare", "BlackBody", "Camera", "EqualEnergy", "Everywhere", "Film", "Iris", "Layer",
-        "Lens", "Light", "Lines", "Medium", "Output", "PerRow", "Preset", "Project", "Quality", "QuarterWave", "Rule",
-        "Stack", "Standard", "Stop", "Surface", "Tabulated",
+        "Lens", "Light", "Lines", "Medium", "Output", "PerRow", "Preset", "Project", "Quality", "QuarterWave",
+        "RowScatter", "Rule", "Scatter", "Stack", "Standard", "Stop", "Surface", "Tabulated",
     ),
     ".io.exr": ("write_exr",),
     ".io.project_file": ("read_project",),

@@ -31,6 +31,8 @@ from flarewright.model import (
     PerRow,
     Position,
     QuarterWave,
+    RowScatter,
+    Scatter,
     Stack,
     Standard,
     Stop,
@@ -467,6 +469,16 @@ def lenses(draw):
         )
         if not isinstance(rows[-1], Stop)
         else (),
+        scatter=draw(
+            st.none()
+            | st.builds(
+                Scatter,
+                model=st.sampled_from(["none", "chaumond", "harvey-shack", "abg"]),
+                roughness_nm=st.floats(0.0, 50.0),
+                cleanliness_level=st.none() | st.floats(10.0, 2000.0),
+                rows=st.just(()) | st.just((RowScatter(row=1, abg=(1e-4, 1e-3, 2.0), share=0.01),)),
+            )
+        ),
         squeeze=draw(st.none() | st.floats(0.25, 4.0)),
         coating_presets=draw(st.dictionaries(texts, preset, max_size=2)),
     )

@@ -31,7 +31,9 @@ from flarewright.model import (
     Project,
     Quality,
     QuarterWave,
+    RowScatter,
     Rule,
+    Scatter,
     Stack,
     Standard,
     Stop,
@@ -97,6 +99,17 @@ PROJECTS = [
         ),
     ),
     Project(lens="x", lights=(Light(field_deg=(0, 0)),), art=Art(physical=True)),
+    Project(
+        lens="x",
+        lights=(Light(field_deg=(0, 0)),),
+        scatter=Scatter(
+            model="abg",
+            abg=(1e-5, 1e-4, 1.5),
+            cleanliness_level=300,
+            rows=(RowScatter(row=0, abg=(1e-4, 1e-4, 2.0)), RowScatter(row=3, cleanliness_level=500)),
+        ),
+    ),
+    Project(lens="x", lights=(Light(field_deg=(0, 0)),), scatter=Scatter()),
 ]
 
 

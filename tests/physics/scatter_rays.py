@@ -1,4 +1,4 @@
-"""Plain Monte Carlo of single scatter in NumPy: spherical surfaces, bare glass, a round stop. Shares no code with the pass."""
+"""Plain Monte Carlo of single scatter in NumPy: spheres, bare glass, a round stop. It shares no code with the pass."""
 
 from __future__ import annotations
 

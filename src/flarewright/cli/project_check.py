@@ -19,10 +19,12 @@ def check(
     from ..optics.pack import resolve_coatings
     from ..render.art import resolve_art
     from ..render.prepare import settle
+    from ..render.scatter import check_scatter
 
     settled = settle(read_project(file))
     resolve_coatings(settled.lens, settled.coating)
     resolve_art(settled)
+    check_scatter(settled)
     if as_json:
         print_json(
             {

@@ -113,6 +113,20 @@ def render(
     starburst_size: Annotated[
         float | None, typer.Option(help="Stretches the starburst by hand; 1 is physics.", rich_help_panel=_ART)
     ] = None,
+    scatter: Annotated[
+        str | None,
+        typer.Option(
+            metavar="MODEL", help="What surfaces scatter: none, harvey-shack, abg, chaumond.", rich_help_panel=_LENS
+        ),
+    ] = None,
+    surface_roughness: Annotated[
+        float | None,
+        typer.Option(help="Rms roughness of the surfaces, nm (1); scatters.", rich_help_panel=_LENS),
+    ] = None,
+    cleanliness: Annotated[
+        float | None,
+        typer.Option(help="Dust on the surfaces: level of IEST-STD-CC1246, 300 say.", rich_help_panel=_LENS),
+    ] = None,
     zoom: Annotated[
         str | None,
         typer.Option(metavar="MM|NAME", help="Focal length, or a position of the lens file.", rich_help_panel=_LENS),
@@ -282,6 +296,7 @@ def render(
         wavelengths=wavelengths, paths=paths, layers=layers, brightest=brightest, no_starburst=no_starburst,
         colorspace=colorspace, half=half, mute=mute or [], solo=solo or [], gain=gain or [], physical=physical,
         seed=seed, error=error, error_of=error_of, samples=samples, resumed=None if state is None else state.project,
+        scatter=scatter, surface_roughness=surface_roughness, cleanliness=cleanliness,
         zoom=zoom, filter_plate=filter_plate, imperfection=imperfection, ghost_offset=ghost_offset,
         cover_glass=cover_glass, sensor_reflectance=sensor_reflectance, squeeze=squeeze, desqueeze=desqueeze,
     )  # fmt: skip

@@ -30,6 +30,9 @@ _FLAG_OF = {
     "dirt.image": "--dirt-image",
     "dirt.seed": "--seed",
     "starburst.size": "--starburst-size",
+    "scatter.model": "--scatter",
+    "scatter.roughness_nm": "--surface-roughness",
+    "scatter.cleanliness_level": "--cleanliness",
     "diameter_deg": "--light-diameter",
     "distance": "--distance",
     "quality.ringing": "--ringing",
@@ -102,6 +105,9 @@ class Flags:
     sensor_reflectance: float | None = None
     squeeze: float | None = None
     desqueeze: bool = False
+    scatter: str | None = None
+    surface_roughness: float | None = None
+    cleanliness: float | None = None
     seed: int | None = None
     error: float | None = None
     error_of: str | None = None
@@ -157,6 +163,8 @@ def build_project(flags: Flags) -> Project:
         given = {key: value for key, value in changes.items() if value is not None}
         if given:
             fields[section] = {**(dict(getattr(base, section)) if base else {}), **given}
+    if (scatter := _scatter(flags, base)) is not None:
+        fields["scatter"] = scatter
     if (art := _art(flags, base.art if base else Art())) is not None:
         fields["art"] = art
     try:
@@ -271,6 +279,21 @@ def _iris(flags: Flags, lens: Any, base: Project | None) -> dict[str, Any] | Non
     else:
         iris = lens.iris if lens is not None else Iris()
     return {**dict(iris), **given}
+
+
+def _scatter(flags: Flags, base: Project | None) -> dict[str, Any] | None:
+    """Return what scatters with the flags' changes, or None when no flag changes it."""
+    changes = {
+        "model": flags.scatter,
+        "roughness_nm": flags.surface_roughness,
+        "cleanliness_level": flags.cleanliness,
+    }
+    given = {key: value for key, value in changes.items() if value is not None}
+    if not given:
+        return None
+    known = dict(base.scatter) if base is not None and base.scatter is not None else {}
+    # polish and dust say by themselves that something scatters
+    return {"model": "harvey-shack", **known, **given}
 
 
 def _art(flags: Flags, base: Art) -> dict[str, Any] | None:

@@ -85,7 +85,17 @@ TOP_TEXTS = {
     "notes": "what was noticed",
 }
 
-TOP_KEYS = ("schema_version", *TOP_TEXTS, *TOP_NUMBERS, "iris", "rows", "elements", "positions", "coating_presets")
+TOP_KEYS = (
+    "schema_version",
+    *TOP_TEXTS,
+    *TOP_NUMBERS,
+    "iris",
+    "rows",
+    "elements",
+    "positions",
+    "scatter",
+    "coating_presets",
+)
 STOP_KEYS = ("stop", "thickness")
 SHAPE_KEYS = ("radius_x", "curvature_x", "conic_x", "asphere", "decentre", "tilt_deg", "figure")
 SURFACE_KEYS = ("radius", "curvature", "glass", "semi_diameter_estimated", "coating", *ROW_NUMBERS, *SHAPE_KEYS)

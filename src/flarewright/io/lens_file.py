@@ -37,6 +37,7 @@ from .lens_fields import (
     TOP_TEXTS,
     NumberField,
 )
+from .scatter_text import read_scatter
 from .sentences import count, did_you_mean, shorten, summary, validation_sentences
 from .shape_fields import read_elements, read_positions, read_shape
 from .text_file import read_toml
@@ -120,12 +121,15 @@ def lens_from_table(table: dict[str, Any], where: str, *, folder: Path | None = 
     rows = _rows(table.get("rows"), problems, findings, folder)
     elements = read_elements(table.get("elements", []), problems)
     positions = read_positions(table.get("positions", []), problems)
+    scatter = read_scatter(table.get("scatter"), problems)
     presets = _presets(table.get("coating_presets", {}), len(rows), problems)
     lens: Lens | None = None
     if not problems:
         try:
             whole = tuple(row for row in rows if row is not None)
-            lens = Lens(**fields, rows=whole, elements=elements, positions=positions, coating_presets=presets)
+            lens = Lens(
+                **fields, rows=whole, elements=elements, positions=positions, scatter=scatter, coating_presets=presets
+            )
         except ValidationError as error:
             problems += validation_sentences(error)
     if lens is None:

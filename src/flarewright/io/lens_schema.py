@@ -8,6 +8,7 @@ from flarewright.model import Iris
 
 from .coating_text import HELP, STANDARD_NAMES
 from .lens_fields import CURVATURE, RADIUS, ROW_NUMBERS, TOP_NUMBERS, TOP_TEXTS
+from .scatter_text import scatter_schema
 from .shape_fields import elements_schema, positions_schema, shape_schema
 
 _NUMBER = r"([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?"
@@ -46,6 +47,7 @@ def lens_json_schema() -> dict[str, Any]:
         },
         "elements": elements_schema(),
         "positions": positions_schema(),
+        "scatter": scatter_schema(),
         "coating_presets": {
             "type": "object",
             "additionalProperties": {"type": "array", "items": {"$ref": "#/$defs/coating"}},

@@ -11,6 +11,7 @@ from flarewright.model.iris import Iris
 from .atomic import write_atomically
 from .coating_text import UNCOATED, format_coating
 from .lens_fields import TOP_NUMBERS, TOP_TEXTS
+from .scatter_text import scatter_lines
 from .shape_fields import POSITION_NUMBERS, shape_parts
 
 
@@ -59,6 +60,7 @@ def format_lens(lens: Lens) -> str:
             if getattr(position, key) is not None
         ]
         lines.append(f"gaps = {{ {gaps} }}")
+    lines += scatter_lines(lens.scatter)
     if lens.iris != Iris():
         lines += ["", "[iris]", *(f"{key} = {_value(value)}" for key, value in lens.iris if value is not None)]
     if lens.coating_presets:

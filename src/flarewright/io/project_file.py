@@ -26,6 +26,7 @@ from ..model import art as arts
 from ..model import coating as coatings
 from ..model import light as lights
 from ..model import project as choices
+from ..model import scatter as scatters
 from ..model import starburst as starbursts
 from ..model.camera import Camera
 from ..model.imperfection import Imperfection
@@ -342,10 +343,11 @@ _SECTIONS: dict[str, tuple[type[BaseModel], ...]] = {
     ),
     "dirt": (starbursts.Dirt,),
     "starburst": (starbursts.Starburst,),
+    "scatter": (scatters.Scatter,),
     "art": (arts.Art,),
     "rules": (arts.Rule,),
     "lens": (Lens,),
-    "rows": (Surface,),
+    "rows": (Surface, scatters.RowScatter),
 }  # fmt: skip
 
 

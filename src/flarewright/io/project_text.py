@@ -68,6 +68,19 @@ _TEACH_DIRT = """
 # size = 1.0   # by hand, as are intensity and spiral_deg
 """
 
+_TEACH_SCATTER = """
+# What the surfaces scatter; docs/scatter.md. Left out: as the lens file says, which is nothing for shipped lenses.
+# [scatter]
+# model = "harvey-shack"   # or "abg", "chaumond", "none"
+# roughness_nm = 1.0   # also: correlation_um, slope
+# cleanliness_level = 300.0   # dust by IEST-STD-CC1246
+# abg = [2e-5, 1e-3, 2.0]   # for "abg": A, B, g
+# share = 0.001   # for "chaumond": of the light, at every surface
+# [[scatter.rows]]   # exceptions
+# row = 0
+# roughness_nm = 5.0
+"""
+
 _TEACH_ART = """
 # Changes by hand, on top of the physics; docs/art-direction.md. art.physical = true ignores them.
 # [art.gain]
@@ -112,6 +125,8 @@ def project_text(project: Project, *, folder: Path | None = None, comments: bool
     out: list[str] = []
     _emit_table(out, data, (), nothing, ABOUT if comments else {})
     teach = _TEACH_ART if comments and project.art == Art() else ""
+    if comments and project.scatter is None:
+        teach = _TEACH_SCATTER + teach
     if comments and "dirt" not in data and "starburst" not in data:
         teach = _TEACH_DIRT + teach
     return "\n".join(out).strip() + "\n" + teach

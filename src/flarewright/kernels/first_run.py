@@ -55,6 +55,23 @@ ROOTS = {
     ),
     "fan wings": ("resample.blend_fan_wings", f"{_WINGS}, f8[::1], f8, f8, f4[:,:,::1]", 0.5),
     "pixels": ("collect.collect", "f4[:,:,:,::1], f4[:,:,::1]", 0.1),
+    "hits": (
+        "trace.trace_hits",
+        "i8[::1], i8[::1], f8[::1], f8[::1], f8[::1], f8[::1], f8, f8, f8, f8[::1], f8[::1], f8[:,:,::1]",
+        0.6,
+    ),
+    "scatter": (
+        "scatter.gather_scatter",
+        "f8[::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[:,::1], f8, UniTuple(i8, 4), f8[:,:,::1], f8[:,::1], "
+        "f8[:,:,:,::1], f8[:,::1], UniTuple(f8, 2), f8[::1], f8[:,::1], none, f8, f8[:,::1], i8, f8[:,::1], f8[::1]",
+        2.0,
+    ),
+    "scatter picture": (
+        "scatter.spread_polar",
+        "f8[::1], b1, UniTuple(f8, 2), UniTuple(f8, 2), f8[:,::1], f8[:,:,::1], f8[::1], f4[:,:,::1]",
+        0.5,
+    ),
+    "scatter share": ("scatter.scattered_total", "f8[:,::1], f8[::1], f8, f8, f8, i8, i8", 0.5),
     "double": ("collect.add_doubled", "f4[:,:,::1], f4[:,:,::1]", 0.2),
 }
 # what a helper loses to its own start

@@ -110,9 +110,9 @@ def scattered_total(table, amount, n_in, n_out, cos_spec, rings, spokes):
     -------
     float
     """
-    low, high = log(0.1 * CORE), log(2.0 * n_out)
-    step = (high - low) / rings
     ahead = n_out * sqrt(max(1.0 - cos_spec * cos_spec, 0.0))
+    low, high = log(0.1 * CORE), log(n_out + ahead)
+    step = (high - low) / rings
     total = 0.0
     for ring in range(rings):
         v = exp(low + (ring + 0.5) * step)

@@ -151,7 +151,7 @@ def trace_shapes(
 
 
 @compiled
-def hit_shapes(rows, actions, shapes, z_vertex, n_gap, sensor_z, tilt, px, py, hits):
+def hit_shapes(rows, actions, shapes, z_vertex, n_gap, sensor_z, tilt, nearness, px, py, hits):
     """Keep every hit, as `kernels.trace.trace_hits` does, through rows of any shape.
 
     Parameters
@@ -161,7 +161,7 @@ def hit_shapes(rows, actions, shapes, z_vertex, n_gap, sensor_z, tilt, px, py, h
     """
     for k in range(px.shape[0]):
         x, y, z = px[k], py[k], 0.0
-        dx, dy, dz = 0.0, np.sin(tilt), np.cos(tilt)
+        dx, dy, dz, _ = ray_from_near(tilt, nearness, x, y)
         for step in range(hits.shape[1]):
             hits[k, step, 0], hits[k, step, 1], hits[k, step, 2] = np.nan, np.nan, np.nan
         hits[k, 0, 0], hits[k, 0, 1], hits[k, 0, 2] = x, y, z

@@ -167,24 +167,24 @@ def trace_nodes(
 
 
 @compiled
-def trace_hits(rows, actions, curvature, conic, z_vertex, n_gap, sensor_z, tilt, px, py, hits):
+def trace_hits(rows, actions, curvature, conic, z_vertex, n_gap, sensor_z, tilt, nearness, px, py, hits):
     """Trace rays like `trace_nodes` and keep every hit: for drawings and for the size of surfaces.
 
     Parameters
     ----------
     rows ... n_gap
         As in `trace_nodes`.
-    sensor_z, tilt : float
+    sensor_z, tilt, nearness : float
     px, py : ndarray, shape (N,)
     hits : ndarray, shape (N, S + 2, 3)
         Filled with the start, the hit at every step, and the point on the sensor; NaN from where a ray ends.
     """
     if conic.ndim == 2:
-        hit_shapes(rows, actions, conic, z_vertex, n_gap, sensor_z, tilt, px, py, hits)
+        hit_shapes(rows, actions, conic, z_vertex, n_gap, sensor_z, tilt, nearness, px, py, hits)
         return
     for k in range(px.shape[0]):
         x, y, z = px[k], py[k], 0.0
-        dx, dy, dz = 0.0, np.sin(tilt), np.cos(tilt)
+        dx, dy, dz, _ = ray_from_near(tilt, nearness, x, y)
         hits[k] = np.nan
         hits[k, 0, 0], hits[k, 0, 1], hits[k, 0, 2] = x, y, z
         heading = 1.0

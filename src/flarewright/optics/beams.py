@@ -22,8 +22,8 @@ Floats = NDArray[np.float64]
 NODES, SCOUTS = 33, 21
 # steps of Newton's method, the step of its derivative and what it may miss by, mm
 STEPS, NUDGE, MISSED = 6, 1e-3, 1e-5
-# powers of the polynomial from which it starts
-DEGREE = 4
+# powers of the polynomial from which it starts, and the fewest rays that shape it
+DEGREE, FEWEST = 4, 40
 # how far beyond what it passes a surface is looked at
 ROOM = 1.06
 
@@ -121,7 +121,7 @@ def _trace(packed: PackedLens, w: int, path: LightPath, k: int, tilt: float, fro
     x, y = np.ascontiguousarray(front[:, 0]), np.ascontiguousarray(front[:, 1])
     trace_hits(
         path.rows[: k + 1], path.actions[: k + 1], packed.curvature, packed.form, packed.z_vertex, packed.n_gap[w],
-        beyond, tilt, x, y, hits,
+        beyond, tilt, packed.nearness, x, y, hits,
     )  # fmt: skip
     leg = hits[:, k + 2] - hits[:, k + 1]
     with np.errstate(invalid="ignore"):
@@ -137,14 +137,17 @@ def _front_of(
     """
     nothing = np.full(places.shape, np.nan), np.full(len(places), np.nan)
     hits, _ = _trace(packed, w, path, k, tilt, scouts)
-    reach = 1.5 * (np.abs(places).max() + 1e-9)
-    with np.errstate(invalid="ignore"):
-        useful = np.isfinite(hits).all(axis=1) & (np.abs(hits) <= max(reach, packed.semi[k])).all(axis=1)
-    if useful.sum() < 30:
+    arrived = np.isfinite(hits).all(axis=1)
+    if arrived.sum() < FEWEST:
         return nothing
-    unit = float(np.abs(hits[useful]).max())
-    weights, *_ = np.linalg.lstsq(_powers(hits[useful] / unit), scouts[useful], rcond=1e-10)
-    front = _powers(places / unit) @ weights
+    hits, scouts = hits[arrived], scouts[arrived]
+    # the scouts around the places, and however far away the next ones are where these are few
+    middle, half = 0.5 * (places.max(axis=0) + places.min(axis=0)), 0.5 * float(np.ptp(places, axis=0).max())
+    away = np.abs(hits - middle).max(axis=1)
+    reach = max(1.5 * half, float(np.partition(away, FEWEST - 1)[FEWEST - 1]))
+    useful = away <= reach
+    weights, *_ = np.linalg.lstsq(_powers((hits[useful] - middle) / reach), scouts[useful], rcond=1e-10)
+    front = _powers((places - middle) / reach) @ weights
     area = np.full(len(places), np.nan)
     steps = np.array([[0.0, 0.0], [NUDGE, 0.0], [0.0, NUDGE]])
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -192,7 +195,7 @@ def _tabulate(
     steps = slice(0, k + 1)
     trace_nodes(
         path.rows[steps], path.actions[steps], packed.curvature, packed.form, packed.z_vertex, packed.inv_semi,
-        packed.n_gap[w], packed.reflectance[w], float(packed.z_vertex[k]) + 1e3, tilt,
+        packed.n_gap[w], packed.reflectance[w], float(packed.z_vertex[k]) + 1e3, tilt, packed.nearness,
         np.ascontiguousarray(front[:, 0]), np.ascontiguousarray(front[:, 1]), rays,
     )  # fmt: skip
     good &= np.isfinite(direction).all(axis=1) & (direction[:, 2] > 0.0) & (rays[:, WEIGHT] > 0.0)

@@ -113,7 +113,7 @@ def _mie_spread() -> tuple[Floats, Floats]:
 
 
 def _smoothed(t: Floats, values: Floats) -> Floats:
-    """Fit a polynomial of the seventh degree: what is left of single spheres' rings is no feature of dust."""
+    """Fit a polynomial of the seventh degree that never rises: what is left of spheres' rings is no feature of dust."""
     u = 2.0 * (t - t[0]) / (t[-1] - t[0]) - 1.0
     fit = np.polynomial.chebyshev.Chebyshev.fit(u, values, 7)
-    return np.asarray(fit(u), dtype=np.float64)
+    return np.asarray(np.minimum.accumulate(fit(u)), dtype=np.float64)

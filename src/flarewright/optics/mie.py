@@ -74,7 +74,7 @@ def mie(x: Floats, index: complex, cosine: Floats) -> tuple[Floats, Floats, Floa
 def _logarithmic_derivative(z: NDArray[np.complexfloating], most: int) -> NDArray[np.complexfloating]:
     """Return D_n(z) = d ln psi_n / dz for n = 0 to `most`, shape (most + 1, N)."""
     last = max(most, ceil(np.abs(z).max())) + 16
-    D = np.zeros(len(z), dtype=np.complex128)
+    D: NDArray[np.complexfloating] = np.zeros(len(z), dtype=np.complex128)
     found = np.empty((most + 1, len(z)), dtype=np.complex128)
     for n in range(last, 0, -1):
         D = n / z - 1.0 / (D + n / z)

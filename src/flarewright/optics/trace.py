@@ -96,5 +96,7 @@ def trace_polylines(
     hits = np.empty((len(x), len(path.rows) + 2, 3))
     n = gap_indices(lens, wavelength_nm)
     start_x, start_y = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
-    trace_hits(path.rows, path.actions, curvature, conic, z, n, float(z[-1] + distance), tilt, start_x, start_y, hits)
+    trace_hits(
+        path.rows, path.actions, curvature, conic, z, n, float(z[-1] + distance), tilt, 0.0, start_x, start_y, hits
+    )
     return hits

@@ -8,6 +8,8 @@ from .prepare import settle
 
 # what every command calls that traces rays
 _TRACING = ("mesh", "prepass", "measure")
+# what a render with scatter calls besides; that of a lens file compiles when it is called
+_SCATTERING = ("hits", "scatter", "scatter picture", "scatter share")
 
 
 def compile_for_render(project: Project, threads: int | None = None) -> None:
@@ -24,10 +26,11 @@ def compile_for_render(project: Project, threads: int | None = None) -> None:
     FlarewrightError
         When the project cannot be rendered: nobody waits for a compiler to hear that.
     """
-    if not absent(_TRACING):
+    scattering = _SCATTERING if project.scatter is not None and project.scatter.model != "none" else ()
+    if not absent((*_TRACING, *scattering)):
         return
     iris = settle(project).iris
-    names = [*_TRACING]
+    names = [*_TRACING, *scattering]
     if project.quality.mode == "final":
         names += ["draw" if iris.mask is None else "draw masked", "densities", "pixels", "double"]
     elif project.quality.mode == "draft" and iris.mask is None:

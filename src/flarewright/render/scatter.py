@@ -16,7 +16,7 @@ from ..kernels.scatter import FLUX, gather_scatter, spread_polar
 from ..model import Layer, Lens
 from ..model.scatter import Scatter
 from ..optics.beams import Beams, trace_beams
-from ..optics.pack import PackedLens
+from ..optics.pack import PackedLens, pack_lens
 from ..optics.paths import direct_path
 from ..optics.scatter import ScatterTables, scatter_tables
 from .direct import DirectImage
@@ -37,8 +37,10 @@ FIRST_RING = 0.25
 TOLD = 2e-3
 # rows that a filter puts in front of the lens' own
 FILTER_ROWS = 2
+# where surfaces scatter most
+SHORTEST_NM = 400.0
 
-__all__ = ["chosen_scatter", "dimmed", "render_scatter", "scatter_facts", "scatter_of"]
+__all__ = ["check_scatter", "chosen_scatter", "dimmed", "render_scatter", "scatter_facts", "scatter_of"]
 
 
 def chosen_scatter(settled: Settled) -> Scatter | None:
@@ -81,6 +83,24 @@ def scatter_of(settled: Settled, shots: Sequence[Shot]) -> tuple[ScatterTables, 
         if key not in made:
             made[key] = scatter_tables(settled.lens, shot.packed, scatter)
     return tuple(made[tuple(shot.packed.wavelengths_nm)] for shot in shots)
+
+
+def check_scatter(settled: Settled) -> None:
+    """Refuse what cannot scatter without drawing it.
+
+    Parameters
+    ----------
+    settled : Settled
+
+    Raises
+    ------
+    ProjectError
+        As `optics.scatter.scatter_tables`.
+    """
+    scatter = chosen_scatter(settled)
+    if scatter is not None:
+        bare = (None,) * len(settled.lens.rows)
+        scatter_tables(settled.lens, pack_lens(settled.lens, settled.order, bare, np.array([SHORTEST_NM])), scatter)
 
 
 def dimmed(images: Sequence[DirectImage], tables: Sequence[ScatterTables]) -> list[DirectImage]:

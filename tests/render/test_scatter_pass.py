@@ -1,0 +1,205 @@
+"""The scatter layer: what it holds, that it is smooth, and that nothing else changes but by what it takes."""
+
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+
+from flarewright.model import (
+    Art,
+    Camera,
+    Light,
+    Lines,
+    Output,
+    Project,
+    Quality,
+    RowScatter,
+    Scatter,
+    Surface,
+)
+from flarewright.optics.color import luminance_weights
+from flarewright.render.direct import direct_image
+from flarewright.render.prepare import load_lens, settle
+from flarewright.render.render import render
+from flarewright.render.scatter import chosen_scatter, gather, render_scatter, scatter_of
+from flarewright.render.shot import make_opening, make_shots
+
+GREEN = Lines(lines=((550.0, 1.0),))
+POLISH = Scatter(model="harvey-shack", roughness_nm=2.0)
+
+
+def project(**changes):
+    fields = {
+        "lens": "triplet-pestrecov",
+        "f_number": 5.6,
+        "lights": (Light(field_deg=(8.0, 4.0), spectrum=GREEN),),
+        "camera": Camera(size_px=(96, 64)),
+        "quality": Quality(mode="draft", wavelengths=3),
+        "scatter": POLISH,
+    }
+    return Project(**{**fields, **changes})
+
+
+def drawn(told):
+    """The scatter layer alone, and what made it."""
+    settled = settle(told)
+    shots = make_shots(settled, make_opening(settled, None))
+    images = [direct_image(settled.lens, shot) for shot in shots]
+    tables = scatter_of(settled, shots)
+    return render_scatter(settled, shots, images, tables).pixels.astype(np.float64), settled, shots, images, tables
+
+
+def layer(rendering, name):
+    return next(found for found in rendering.layers if found.name == name).pixels
+
+
+def luminance(pixels):
+    return pixels @ luminance_weights("rec709")
+
+
+@pytest.fixture(scope="module")
+def plain():
+    return render(project(scatter=None)), render(project())
+
+
+def test_nothing_scatters_by_default(plain):
+    without, _ = plain
+    assert [found.name for found in without.layers] == ["beauty", "starburst", "ghosts"]
+    assert "scatter" not in without.summary
+    off = render(project(scatter=Scatter()))
+    for one, other in zip(without.layers, off.layers, strict=True):
+        np.testing.assert_array_equal(one.pixels, other.pixels)
+
+
+def test_it_is_a_layer_of_its_own(plain):
+    without, scattered = plain
+    assert [found.name for found in scattered.layers] == ["beauty", "starburst", "ghosts", "scatter"]
+    np.testing.assert_array_equal(layer(without, "ghosts"), layer(scattered, "ghosts"))
+    parts = [layer(scattered, name).astype(np.float64) for name in ("starburst", "scatter")]
+    ghosts = next(found for found in scattered.layers if found.name == "ghosts")
+    x, y, w, h = ghosts.window
+    parts[0][y : y + h, x : x + w] += ghosts.pixels
+    assert layer(scattered, "beauty") == pytest.approx(sum(parts), rel=1e-5)
+    # the direct image loses what is scattered
+    kept = scattered.summary["scatter"]["direct_kept"]
+    assert 0.99 < kept < 1.0
+    assert layer(scattered, "starburst").sum() / layer(without, "starburst").sum() == pytest.approx(kept, rel=1e-6)
+
+
+def test_a_lens_file_may_say_it():
+    lens = load_lens("triplet-pestrecov").replace(scatter=POLISH)
+    assert chosen_scatter(settle(project(lens=lens, scatter=None))) == POLISH
+    assert chosen_scatter(settle(project(lens=lens, scatter=Scatter(model="abg")))).model == "abg"
+    assert chosen_scatter(settle(project(lens=lens, scatter=Scatter(model="none")))) is None
+    # its exceptions count its own rows, with a filter before them or without
+    rows = lens.replace(scatter=POLISH.replace(rows=(RowScatter(row=1, roughness_nm=9.0),)))
+    told = project(lens=rows, scatter=None, filter={"glass": "N-BK7", "thickness": 2.0, "gap": 5.0})
+    assert chosen_scatter(settle(told)).rows[0].row == 3
+
+
+def test_pixels_do_not_depend_on_threads():
+    one, three = (render(project(), threads=threads) for threads in (1, 3))
+    np.testing.assert_array_equal(layer(one, "scatter"), layer(three, "scatter"))
+
+
+def test_light_is_kept():
+    """Scatter of long ripples stays near the image, so all of it lands in the picture: the total of every surface."""
+    ripples = Scatter(model="harvey-shack", roughness_nm=2.0, correlation_um=50.0, slope=6.0)
+    # near the axis, where rays meet the surfaces nearly as the totals are told: at normal incidence
+    light = Light(field_deg=(1.0, 0.5), spectrum=GREEN)
+    told = project(scatter=ripples, camera=Camera(size_px=(960, 640)), f_number=16.0, lights=(light,))
+    pixels, _, shots, images, tables = drawn(told)
+    area = 1.0 / float(shots[0].to_pixels[2] * shots[0].to_pixels[3])
+    flux = luminance(pixels).sum() * area
+    shares = tables[0].shares[0]
+    left = np.concatenate([[1.0], np.cumprod(1.0 - shares)[:-1]])
+    assert flux / images[0].throughput_mm2[0] == pytest.approx((shares * left).sum(), rel=5e-3)
+
+
+def test_twice_the_roughness_scatters_four_times():
+    rough, fine = (drawn(project(scatter=POLISH.replace(roughness_nm=nm)))[0] for nm in (1.0, 0.5))
+    assert luminance(rough).sum() / luminance(fine).sum() == pytest.approx(4.0, rel=2e-3)
+
+
+def test_blue_scatters_more():
+    sums, shares = {}, {}
+    for nm in (450.0, 650.0):
+        light = Light(field_deg=(8.0, 4.0), spectrum=Lines(lines=((nm, 1.0),)))
+        pixels, _, _, _, tables = drawn(project(lights=(light,)))
+        sums[nm], shares[nm] = luminance(pixels)[:, :24].sum(), tables[0].shares.sum()
+    # totals fall as lambda^-2, a little faster by dispersion; far from the shoulder they spread as lambda^(slope - 2)
+    assert shares[450.0] / shares[650.0] == pytest.approx((650.0 / 450.0) ** 2, rel=0.1)
+    told = shares[450.0] / shares[650.0] * (450.0 / 650.0) ** 0.5
+    assert sums[450.0] / sums[650.0] == pytest.approx(told, rel=0.02)
+
+
+def test_it_is_smooth():
+    pixels, _, shots, images, _ = drawn(project(camera=Camera(size_px=(240, 160))))
+    level = np.log(luminance(pixels))
+    x, y = images[0].position_mm
+    column, row = shots[0].to_pixels[0] + x * shots[0].to_pixels[2], shots[0].to_pixels[1] - y * shots[0].to_pixels[3]
+    away = np.hypot(np.arange(240) + 0.5 - column, (np.arange(160) + 0.5 - row)[:, None])[1:-1, 1:-1]
+    bend = np.abs(level[2:, 1:-1] + level[:-2, 1:-1] + level[1:-1, 2:] + level[1:-1, :-2] - 4.0 * level[1:-1, 1:-1])
+    # a power of the distance r bends by about (slope / r)^2
+    assert (bend[away > 5.0] < 12.0 / away[away > 5.0] ** 2 + 2e-3).all()
+    assert (pixels > 0.0).any(axis=2).all()
+
+
+@pytest.mark.parametrize(
+    ("field", "close"),
+    # far outside the field only a sliver of the front surfaces is lit, which takes more rays to measure
+    [((8.0, 4.0), 0.02), ((0.0, 0.0), 0.02), ((35.0, -10.0), 0.08)],
+)
+def test_pixels_are_what_their_points_gather(field, close):
+    told = project(lights=(Light(field_deg=field, spectrum=GREEN),))
+    pixels, settled, shots, _, tables = drawn(told)
+    shot = shots[0]
+    rng = np.random.default_rng(3)
+    rows, columns = rng.integers(0, 64, 40), rng.integers(0, 96, 40)
+    place = np.stack(
+        [(columns + 0.5 - shot.to_pixels[0]) / shot.to_pixels[2], (shot.to_pixels[1] - rows - 0.5) / shot.to_pixels[3]],
+        axis=1,
+    )
+    points = np.ascontiguousarray(-place @ shot.incidence.axes.T)
+    with ThreadPoolExecutor(1) as pool:
+        fine = gather(settled.lens, shot, tables[0], [0], points, pool, rays=40)[0] * shot.gain
+    assert luminance(pixels)[rows, columns] == pytest.approx(fine, rel=close)
+
+
+def test_general_surfaces_scatter_alike():
+    """An asphere too weak to matter sends every ray through the code for surfaces of any shape."""
+    lens = load_lens("triplet-pestrecov")
+    first = next(k for k, row in enumerate(lens.rows) if isinstance(row, Surface))
+    rows = list(lens.rows)
+    rows[first] = rows[first].replace(asphere=(1e-15,))
+    near = Light(field_deg=(8.0, 4.0), spectrum=GREEN, distance=800.0)
+    for lights in ((Light(field_deg=(8.0, 4.0), spectrum=GREEN),), (near,)):
+        plain = drawn(project(lens=lens, lights=lights))[0]
+        general = drawn(project(lens=lens.replace(rows=tuple(rows)), lights=lights))[0]
+        assert general == pytest.approx(plain, rel=1e-4)
+
+
+def test_a_far_near_light_is_a_distant_one():
+    far = Light(field_deg=(8.0, 4.0), spectrum=GREEN, distance=1e7)
+    assert drawn(project(lights=(far,)))[0] == pytest.approx(drawn(project())[0], rel=1e-3)
+
+
+def test_lights_add():
+    lights = (Light(field_deg=(8.0, 4.0), spectrum=GREEN), Light(field_deg=(-5.0, 0.0), intensity=0.3))
+    both = drawn(project(lights=lights))[0]
+    assert both == pytest.approx(sum(drawn(project(lights=(light,)))[0] for light in lights), rel=1e-5)
+
+
+def test_the_artist_may_grade_it(plain):
+    graded = render(project(art=Art(gain={"scatter": 3.0})))
+    assert layer(graded, "scatter") == pytest.approx(3.0 * layer(plain[1], "scatter"), rel=1e-6)
+
+
+def test_a_sensor_that_reflects_changes_nothing_here():
+    mirror = project(camera=Camera(size_px=(96, 64), sensor_reflectance=0.1))
+    np.testing.assert_array_equal(drawn(mirror)[0], drawn(project())[0])
+
+
+def test_single_layers_keep_it():
+    found = render(project(output=Output(layers="beauty")))
+    assert [kept.name for kept in found.layers] == ["beauty"]
