@@ -109,10 +109,11 @@ def render(
     scattered: dict[str, Any] = {}
     told: tuple[str, ...] = ()
     if tables is not None:
-        if project.quality.mode != "reference":
-            passes.append(render_scatter(settled, shots, images, tables, threads=threads))
+        passes.append(render_scatter(settled, shots, images, tables, threads=threads))
         images = dimmed(images, tables)
         facts, told = scatter_facts(settled, tables)
+        if ledger or project.quality.mode == "reference":
+            told = (*told, "random rays do not scatter: the ledger is that of surfaces without scatter")
         scattered = {"scatter": facts}
     if project.output.starburst:
         passes.insert(0, starburst_of(settled, shots, images, mask, soil))

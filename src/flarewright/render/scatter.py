@@ -143,8 +143,7 @@ def scatter_facts(settled: Settled, tables: Sequence[ScatterTables]) -> tuple[di
         "direct_kept": float(tables[0].kept[middle]),
     }
     told = f"surfaces scatter up to {lost:.2%} of the direct light; ghosts are drawn as if they lost nothing by it"
-    final = settled.project.quality.mode != "reference"
-    return facts, (told,) if final and lost > TOLD else ()
+    return facts, (told,) if lost > TOLD else ()
 
 
 def render_scatter(
@@ -173,7 +172,7 @@ def render_scatter(
     Notes
     -----
     Each surface scatters the direct beam once, on through the surfaces behind it. Light that was reflected before or
-    after, that scatters from a reflection or twice, is left out; the reference has the first two of these.
+    after, that scatters from a reflection or twice, is left out.
     """
     width, height = shots[0].size_px
     total = np.zeros((height, width, 3), dtype=np.float32)
