@@ -1,0 +1,1 @@
+"""Design: a lens for the flare that is wanted (Van Acoleyen 2025, and beyond)."""
