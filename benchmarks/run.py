@@ -26,6 +26,7 @@ from typing import Any
 
 import numba
 import numpy as np
+from benchmarks.design import design
 
 import flarewright
 from flarewright.kernels.raster import blank_plane, fill_polygon
@@ -53,7 +54,7 @@ from flarewright.render.reference import spectral_shots
 from flarewright.render.render import render
 from flarewright.render.shot import make_opening, make_shots
 
-PARTS = ("yardsticks", "trace", "raster", "frame", "art", "built", "scatter", "reference", "startup", "memory")
+PARTS = ("yardsticks", "trace", "raster", "frame", "art", "built", "scatter", "reference", "design", "startup", "memory")
 
 LIGHT = (10.0, 5.0)
 """Field angles of the frames' light, degrees."""
@@ -436,6 +437,7 @@ def main(arguments: list[str] | None = None) -> None:
         "built": lambda: built(asked.repeat),
         "scatter": lambda: scatter(asked.repeat),
         "reference": lambda: reference(asked.repeat),
+        "design": lambda: design(lambda work: median_seconds(work, asked.repeat, 0.2), row),
         "startup": lambda: startup(asked.repeat),
         "memory": memory,
     }

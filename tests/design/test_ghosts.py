@@ -95,7 +95,8 @@ def test_any_prescription_has_derivatives_of_differences(seed, rows, stop):
     way[[1 + rows + stop, 1 + 2 * rows + stop]] = 0.0
     there, here = differentiate(structure, q + way, 100.0), differentiate(structure, q - way, 100.0)
     for column, exact in ((dg.PLACE, found.place), (dg.RADIUS, found.radius), (dg.SCALE, found.scale)):
-        same = (there.values[:, dg.BOUND] == found.values[:, dg.BOUND]) & (here.values[:, dg.BOUND] == found.values[:, dg.BOUND])
+        bound = found.values[:, dg.BOUND]
+        same = (there.values[:, dg.BOUND] == bound) & (here.values[:, dg.BOUND] == bound)
         measured, told = (there.values[:, column] - here.values[:, column]) / 2.0, exact @ way
         least = 1e-9 * np.abs(exact * way).max() + 1e-12 * np.abs(found.values[:, column]).max()
         assert np.all(np.abs(measured - told)[same] <= 1e-4 * np.abs(exact * way).max(axis=1)[same] + least)
@@ -104,8 +105,9 @@ def test_any_prescription_has_derivatives_of_differences(seed, rows, stop):
 def test_a_ghost_lands_where_the_draft_draws_it_and_is_as_bright():
     lens = load_lens("heliar-tronnier")
     field, size = 4.0, (400, 400)
+    light = fw.Light(field_deg=(field, 0.0), spectrum=Lines(lines=((587.56, 1.0),)))
     project = fw.Project(
-        lens="heliar-tronnier", f_number=16.0, lights=[fw.Light(field_deg=(field, 0.0), spectrum=Lines(lines=((587.56, 1.0),)))],
+        lens="heliar-tronnier", f_number=16.0, lights=[light],
         coating=fw.Everywhere(coating=fw.Bare()), camera=fw.Camera(size_px=size, sensor_mm=(40.0, 40.0)),
         quality=fw.Quality(mode="draft", wavelengths=1, paths="same-side"), iris=fw.Iris(blades=0),
         output=fw.Output(layers="ghosts", starburst=False),

@@ -15,6 +15,9 @@ from ..errors import FlarewrightError
 from . import (
     coating_list,
     coating_plot,
+    design_benchmark,
+    design_identify,
+    design_solve,
     ghosts,
     lens_check,
     lens_convert,
@@ -39,6 +42,7 @@ app = typer.Typer(
 lens_app = typer.Typer(help="Look at, check and convert lens files.")
 coating_app = typer.Typer(help="Look at coatings: the standard ones, and what any coating reflects.")
 project_app = typer.Typer(help="Project files: everything a render needs, in one TOML file.")
+design_app = typer.Typer(help="Search a lens for the flare you want.")
 
 app.command("render", epilog=render.EPILOG)(render.render)
 app.command("ghosts", epilog=ghosts.EPILOG)(ghosts.ghosts)
@@ -46,6 +50,7 @@ app.command("lenses", epilog=lenses.EPILOG)(lenses.lenses)
 app.add_typer(lens_app, name="lens")
 app.add_typer(coating_app, name="coating")
 app.add_typer(project_app, name="project")
+app.add_typer(design_app, name="design")
 lens_app.command("show", epilog=lens_show.EPILOG)(lens_show.show)
 lens_app.command("check", epilog=lens_check.EPILOG)(lens_check.check)
 lens_app.command("convert", epilog=lens_convert.EPILOG)(lens_convert.convert)
@@ -55,6 +60,11 @@ coating_app.command("plot", epilog=coating_plot.EPILOG)(coating_plot.plot)
 project_app.command("init", epilog=project_init.EPILOG)(project_init.init)
 project_app.command("check")(project_check.check)
 project_app.command("schema")(project_schema.schema)
+
+design_app.command("solve", epilog=design_solve.EPILOG)(design_solve.solve)
+design_app.command("resume")(design_solve.resume)
+design_app.command("benchmark", epilog=design_benchmark.EPILOG)(design_benchmark.benchmark)
+design_app.command("identify", epilog=design_identify.EPILOG)(design_identify.identify)
 
 
 def _version(wanted: bool) -> None:
@@ -97,7 +107,7 @@ def run(arguments: Sequence[str]) -> int:
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="replace")
     words = list(arguments)
-    if words in ([], ["lens"], ["coating"], ["project"]):
+    if words in ([], ["lens"], ["coating"], ["project"], ["design"]):
         words.append("--help")
     try:
         code = _call(words)

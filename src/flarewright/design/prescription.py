@@ -40,14 +40,18 @@ class Structure:
         glass = np.array(self.glass)
         found = glass | np.concatenate([[False], glass[:-1]])
         found[self.stop] = False
-        return found
+        return np.asarray(found, dtype=np.bool_)
 
     @cached_property
     def pairs(self) -> tuple[tuple[int, int], ...]:
         """Mirrors (j, i) of every ghost, in the order of the kernels: in front of the stop, then behind it."""
         halves = (range(self.stop), range(self.stop + 1, self.rows))
         return tuple(
-            (j, i) for half in halves for j in half if self.mirrors[j] for i in reversed(half) if i < j and self.mirrors[i]
+            (j, i)
+            for half in halves
+            for j in half
+            for i in reversed(half)
+            if i < j and self.mirrors[j] and self.mirrors[i]
         )
 
     @property
@@ -99,3 +103,81 @@ def vector_of(lens: Lens, stop_diameter: float, sensor_distance: float) -> Float
     c = [0.0 if isinstance(row, Stop) else row.curvature for row in lens.rows]
     n = [1.0 if isinstance(row, Stop) or row.medium is None else row.medium.n_d for row in lens.rows]
     return np.array([stop_diameter, *d, sensor_distance, *c, *n])
+
+
+def structures(surfaces: int, least_ghosts: int, most: int = 4096) -> tuple[Structure, ...]:
+    """List the structures without a surface between air and air that have enough ghosts, the fewest ghosts first.
+
+    Parameters
+    ----------
+    surfaces : int
+        Without the stop.
+    least_ghosts : int
+    most : int
+        Of equally good ones only so many are listed, evenly spread.
+
+    Returns
+    -------
+    tuple of Structure
+        Those with the fewest ghosts; empty when no structure has enough.
+    """
+    rows = surfaces + 1
+    counts = {stop: _pairs(stop) + _pairs(surfaces - stop) for stop in range(rows)}
+    enough = [count for count in counts.values() if count >= least_ghosts]
+    if not enough:
+        return ()
+    stops = [stop for stop, count in counts.items() if count == min(enough)]
+    found: list[Structure] = []
+    for stop in stops:
+        front, rear = glass_patterns(stop), glass_patterns(surfaces - stop)
+        pairs = [(f, r) for f in front for r in rear]
+        step = max(1, len(pairs) * len(stops) // most)
+        found += [Structure(stop, (*f, False, *r)) for f, r in pairs[::step]]
+    return tuple(found)
+
+
+def _pairs(surfaces: int) -> int:
+    return surfaces * (surfaces - 1) // 2
+
+
+def glass_patterns(surfaces: int) -> list[tuple[bool, ...]]:
+    """List where glass can be behind the surfaces of a group that stands in air, every surface touching glass.
+
+    Parameters
+    ----------
+    surfaces : int
+
+    Returns
+    -------
+    list of tuple of bool
+        The last of each is False; empty for a single surface, which no glass can touch.
+    """
+    if surfaces == 0:
+        return [()]
+    found: list[tuple[bool, ...]] = [(True,)]
+    for _ in range(surfaces - 2):
+        found = [(*one, after) for one in found for after in (True, False) if after or one[-1]]
+    # behind the last surface is air, so glass is in front of it
+    return [(*one, False) for one in found if one[-1]] if surfaces > 1 else []
+
+
+def surfaces_for(ghosts: int) -> int:
+    """Return the fewest surfaces whose stop in the middle gives that many ghosts.
+
+    Parameters
+    ----------
+    ghosts : int
+
+    Returns
+    -------
+    int
+        Without the stop.
+
+    Notes
+    -----
+    Van Acoleyen 2025, equation 5.5, whose n counts the stop as well.
+    """
+    n = 4
+    while _pairs((n - 1) // 2) + _pairs(n // 2) < ghosts:
+        n += 1
+    return n - 1

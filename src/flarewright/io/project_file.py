@@ -24,6 +24,7 @@ from pydantic import BaseModel, ValidationError
 from ..errors import FlarewrightError, LensError, ProjectError
 from ..model import art as arts
 from ..model import coating as coatings
+from ..model import design as designs
 from ..model import light as lights
 from ..model import project as choices
 from ..model import scatter as scatters
@@ -351,10 +352,16 @@ _SECTIONS: dict[str, tuple[type[BaseModel], ...]] = {
 }  # fmt: skip
 
 
+# names of these are common words, which are not looked for elsewhere
+_DESIGN: dict[str, tuple[type[BaseModel], ...]] = {
+    "design": (designs.Design,), "wishes": (designs.GhostWish,), "bounds": (designs.Bounds,),
+}  # fmt: skip
+
+
 def _suggestion(keys: list[int | str]) -> str:
     wrong = str(keys[-1]) if keys else ""
     section = next((key for key in reversed(keys[:-1]) if isinstance(key, str)), "")
-    known = [name for model in _SECTIONS.get(section, ()) for name in model.model_fields]
+    known = [name for model in (_SECTIONS | _DESIGN).get(section, ()) for name in model.model_fields]
     unfinished = any(name.startswith(f"{wrong}_") for name in known)
     for other, models in _SECTIONS.items():
         if other and not unfinished and any(wrong in model.model_fields for model in models):

@@ -119,6 +119,8 @@ def project_text(project: Project, *, folder: Path | None = None, comments: bool
         # what a rule leaves alone is not worth a line
         rules = [rule.model_dump(mode="json", exclude_defaults=True) for rule in project.art.rules]
         data["art"] = {**data["art"], "rules": rules}
+    if project.design is not None:
+        data["design"] = _without_none(project.design.model_dump(mode="json", exclude_defaults=True))
     for written, light in zip(data["lights"], project.lights, strict=True):
         written["spectrum"] = spectrum_text(light.spectrum) or written["spectrum"]
     nothing = _left_out(project) if comments else {}

@@ -413,7 +413,7 @@ def brightness_of_ghosts(q, rows, stop, mirrors, values, jacobian, light, by):
                     # r by n and by the index before
                     rn, rb = 2.0 * before / (n + before) ** 2, -2.0 * n / (n + before) ** 2
                     weight = 0.0
-                    if k == j or k == i:
+                    if k in (j, i):
                         light[ghost] += np.log(max(R, 1e-300))
                         weight = 2.0 / r if r != 0.0 else 0.0
                     # what lies between the mirrors is passed three times, they themselves once

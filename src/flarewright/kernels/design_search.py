@@ -1,4 +1,4 @@
-"""Local search for a prescription: Levenberg-Marquardt with bounds, the ghosts matched to their targets anew now and then.
+"""Local search for a prescription: Levenberg-Marquardt with bounds, ghosts matched to targets anew now and then.
 
 The variables of a search are log stop diameter, log thicknesses, curvatures and indices, in the order of `q` in
 `kernels.design_ghosts`.
@@ -8,7 +8,6 @@ import numpy as np
 
 from ._jit import compiled, inner
 from .design_ghosts import (
-    BOUND,
     COLUMNS,
     PLACE,
     RADIUS,
@@ -40,7 +39,7 @@ def to_prescription(x, logs, q):
 
 
 @inner
-def light_values(q, rows, stop, mirrors, values, ghosts, light):
+def light_values(q, rows, stop, mirrors, values, light):
     """Fill the logarithm of each ghost's irradiance, as `brightness_of_ghosts` does."""
     through = 0.0
     for k in range(rows):
@@ -101,7 +100,7 @@ def rematch(ghosts, spans, slopes, signed, targets, weights, values, light, extr
 
 
 @inner
-def system_matrix(q, rows, stop, work):
+def system_matrix(rows, stop, work):
     """Return upper and lower left of the direct system's matrix, and Ma00."""
     e, f, g, h = fill_suffix(stop, rows, work)
     a, _, c, _ = fill_suffix(0, stop, work)
@@ -111,7 +110,7 @@ def system_matrix(q, rows, stop, work):
 @inner
 def wish_values(q, rows, stop, work, wishes, out):
     """Fill how far the prescription is off its wishes, weighted; 0 inside their limits."""
-    _, power, a = system_matrix(q, rows, stop, work)
+    _, power, a = system_matrix(rows, stop, work)
     # 1 / f-number is stop diameter over |Ma00| efl
     speed = -power * q[0] / max(abs(a), 1e-12)
     length = 0.0
@@ -205,7 +204,7 @@ def _wish_row(q, rows, stop, wish, work, trail, partial, row):
         for k in range(rows - 1):
             row[1 + k] = 1.0
         return
-    _, power, a0 = system_matrix(q, rows, stop, work)
+    _, power, a0 = system_matrix(rows, stop, work)
     _, _, g, h = fill_suffix(stop, rows, work)
     a, _, c, _ = fill_suffix(0, stop, work)
     factor = -1.0 if wish == 0 else -q[0] / abs(a0)
@@ -347,7 +346,7 @@ def polish_many(
         to_prescription(x, logs, q)
         list_ghosts(q, rows, stop, mirrors, entrance, work, values)
         if lit:
-            light_values(q, rows, stop, mirrors, values, most, light)
+            light_values(q, rows, stop, mirrors, values, light)
         rematch(most, spans, slopes, signed, targets, weights, values, light, extra, chosen, cost_table, small, reals,
                 flags)  # fmt: skip
         wish_values(q, rows, stop, work, wishes, wished)
@@ -380,7 +379,7 @@ def polish_many(
                     to_prescription(trial, logs, q)
                     list_ghosts(q, rows, stop, mirrors, entrance, work, values)
                     if lit:
-                        light_values(q, rows, stop, mirrors, values, most, light)
+                        light_values(q, rows, stop, mirrors, values, light)
                     wish_values(q, rows, stop, work, wishes, wished)
                     better = total_cost(
                         most, spans, slopes, signed, targets, weights, values, light, extra, chosen, taken, wished
@@ -400,7 +399,7 @@ def polish_many(
                 to_prescription(x, logs, q)
                 list_ghosts(q, rows, stop, mirrors, entrance, work, values)
                 if lit:
-                    light_values(q, rows, stop, mirrors, values, most, light)
+                    light_values(q, rows, stop, mirrors, values, light)
                 wish_values(q, rows, stop, work, wishes, wished)
             if cost <= enough:
                 break

@@ -3,6 +3,7 @@
 from .art import Art, Rule
 from .camera import Camera
 from .coating import Bare, Coating, Film, QuarterWave, Stack, Standard
+from .design import Bounds, Design, GhostWish
 from .figure import Figure
 from .glass import Dispersion, Medium
 from .imperfection import Imperfection
@@ -21,9 +22,11 @@ __all__ = [
     "AsLens",
     "Bare",
     "BlackBody",
+    "Bounds",
     "Camera",
     "Coating",
     "CoatingChoice",
+    "Design",
     "Dirt",
     "Dispersion",
     "Element",
@@ -31,6 +34,7 @@ __all__ = [
     "Everywhere",
     "Figure",
     "Film",
+    "GhostWish",
     "Imperfection",
     "Iris",
     "Layer",

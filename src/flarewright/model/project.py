@@ -10,6 +10,7 @@ from .art import Art
 from .base import Frozen
 from .camera import Camera, Colorspace
 from .coating import Coating
+from .design import Design
 from .imperfection import Imperfection
 from .iris import Iris
 from .lens import Lens
@@ -136,6 +137,8 @@ class Project(Frozen):
         What the surfaces scatter; None: as the lens file says, which is nothing for the lenses of the library.
     art : Art
         What is changed by hand; nothing by default.
+    design : Design or None
+        The target of `flarewright design`; a render does not look at it.
     """
 
     schema_version: Literal[1] = 1
@@ -154,6 +157,7 @@ class Project(Frozen):
     imperfection: Imperfection | None = None
     scatter: Scatter | None = None
     art: Art = Art()
+    design: Design | None = None
 
     @model_validator(mode="after")
     def _picture_is_sane(self) -> Project:

@@ -1,0 +1,33 @@
+"""Design: evaluations and local searches a second on one core."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from flarewright.design.benchmark import CASES, problem_of_case
+from flarewright.design.ghosts import differentiate, evaluate
+from flarewright.design.search import batch_size, polish
+
+
+def design(seconds: Callable[[Callable[[], Any]], float], row: Callable[..., dict[str, Any]]) -> list[dict[str, Any]]:
+    """Measure both lenses of the thesis."""
+    found = []
+    for case in CASES:
+        problem, structure, vector = problem_of_case(case, 5.45)
+        many = np.repeat(vector[None], 500, axis=0)
+        work = seconds(lambda s=structure, m=many: evaluate(s, m, 100.0))
+        found.append(row("design", f"{case}: all ghosts", len(many) / work / 1e6, "million/s"))
+        work = seconds(lambda s=structure, v=vector: differentiate(s, v, 100.0))
+        found.append(row("design", f"{case}: with derivatives", 1.0 / work / 1e3, "thousand/s"))
+        known, count = problem.variables(structure), batch_size(problem)
+        starts = known.random_points(np.random.default_rng(0), 4 * count)
+        points = [(structure, x) for x in starts]
+        polish(problem, points[:1])
+        begun = time.process_time()
+        polish(problem, points)
+        found.append(row("design", f"{case}: local searches", len(points) / (time.process_time() - begun), "1/s"))
+    return found

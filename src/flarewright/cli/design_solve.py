@@ -1,0 +1,162 @@
+"""`flarewright design solve` and `design resume`: search lenses for wanted ghosts."""
+
+from __future__ import annotations
+
+import math
+import signal
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from ..errors import OutputError, ProjectError
+from .common import print_json, tell
+
+if TYPE_CHECKING:
+    from ..design.search import Problem, State
+    from ..model import Project
+
+EPILOG = (
+    "Examples:\n\nflarewright design solve shot.toml -o found --time 60\n\n"
+    "flarewright design resume found --time 600\n\nflarewright render found/lens-1.toml --light 10,5 -o flare.exr"
+)
+
+Time = Annotated[float, typer.Option("--time", help="Seconds to search; Ctrl-C ends it earlier and keeps the best.")]
+Lenses = Annotated[int, typer.Option("--lenses", min=1, max=50, help="Write so many distinct lenses.")]
+Threads = Annotated[int | None, typer.Option(min=1, help="All cores when left out; the lenses do not depend on it.")]
+Searches = Annotated[int | None, typer.Option(min=1, help="End after about so many local searches.")]
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
+
+
+def solve(
+    project: Annotated[Path, typer.Argument(metavar="PROJECT", help="A project file with a [design].")],
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="Folder for lenses and report.")],
+    time_s: Time = 60.0,
+    seed: Annotated[int, typer.Option(min=0, help="Begins the random numbers.")] = 0,
+    lenses: Lenses = 5,
+    searches: Searches = None,
+    threads: Threads = None,
+    as_json: Json = False,
+) -> None:
+    """Search lenses whose ghosts land where the project wants them.
+
+    Without a [design] in the project: other lenses with the same ghosts as its own.
+    """
+    _check_time(time_s)
+    from ..io.project_file import read_project
+
+    given = read_project(project)
+    if output.exists() and not output.is_dir():
+        raise OutputError(f"{output} is a file; give a folder for the lenses")
+    if (output / "search.json").exists():
+        raise OutputError(f"{output} holds a search already; go on with flarewright design resume {output}, or choose "
+                          "another folder")  # fmt: skip
+    from ..design.search import State as Fresh
+
+    _search(given, output, time_s, Fresh(seed), lenses, searches, threads, as_json)
+
+
+def resume(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="A folder that design solve has written.")],
+    time_s: Time = 60.0,
+    lenses: Lenses = 5,
+    searches: Searches = None,
+    threads: Threads = None,
+    as_json: Json = False,
+) -> None:
+    """Go on with a search as if it had not been cut off."""
+    _check_time(time_s)
+    from ..design.store import read_state
+    from ..io.project_file import read_project
+
+    state = read_state(folder / "search.json")
+    _search(read_project(folder / "project.toml"), folder, time_s, state, lenses, searches, threads, as_json)
+
+
+def _check_time(time_s: float) -> None:
+    if not (math.isfinite(time_s) and time_s > 0.0):
+        raise ProjectError(f"--time {time_s:g} is no time; give seconds above 0")
+
+
+def _search(
+    project: Project, folder: Path, time_s: float, state: State, lenses: int, searches: int | None,
+    threads: int | None, as_json: bool,
+) -> None:  # fmt: skip
+    from ..design.candidate import outcomes
+    from ..design.report import summary, verdict, write_folder
+    from ..design.search import compile_kernels
+    from ..design.search import solve as run
+    from ..design.target import problem_of
+
+    problem, settled = problem_of(project)
+    _check_fit(state, problem)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(f"cannot make the folder {folder}: {(error.strerror or str(error)).lower()}") from None
+    compile_kernels()
+    with _interruptible() as asked, _telling() as progress:
+        state = run(
+            problem, seed=state.seed, time_limit=time_s, most_searches=searches, threads=threads, state=state,
+            progress=progress, cancelled=asked,
+        )  # fmt: skip
+    found = outcomes(state, problem, count=lenses, name=f"After {settled.lens.name}", iris=settled.iris)
+    remarks = write_folder(folder, project, problem, state, found)
+    data = summary(state, found, problem)
+    tell([*settled.remarks, *remarks])
+    if as_json:
+        print_json({"folder": str(folder), **data})
+        return
+    words = {"met": "the wanted ghosts are met", "nearly": "the wanted ghosts are nearly met",
+             "unsolved": "the wanted ghosts are not met; the report tells how far each is off"}  # fmt: skip
+    print(f"{words[verdict(found[0] if found else None)]}: {len(found)} lenses in {folder}, report in "
+          f"{folder / 'report.html'}")  # fmt: skip
+
+
+def _check_fit(state: State, problem: Problem) -> None:
+    """Refuse a search that belongs to another project."""
+    rows = problem.structures[0].rows
+    members = [one for run in state.runs for one in run.members] + list(state.ended)
+    if any(one.structure.rows != rows for one in members):
+        raise ProjectError("the search was begun for a lens with another number of rows; begin it anew")
+
+
+@contextmanager
+def _interruptible() -> Iterator[Callable[[], bool]]:
+    """Turn Ctrl-C into a wish to end, which the search hears after its round."""
+    asked: list[bool] = []
+
+    def note(*_: Any) -> None:
+        asked.append(True)
+
+    try:
+        before = signal.signal(signal.SIGINT, note)
+    except ValueError:
+        # not the main thread: nobody presses Ctrl-C here
+        yield lambda: False
+        return
+    try:
+        yield lambda: bool(asked)
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+@contextmanager
+def _telling() -> Iterator[Callable[[State], None] | None]:
+    """Tell the best so far where someone looks at it."""
+    if not sys.stderr.isatty():
+        yield None
+        return
+    from rich.console import Console
+    from rich.status import Status
+
+    with Status("searching", console=Console(stderr=True)) as status:
+
+        def show(state: State) -> None:
+            best = "-" if state.best is None else f"{state.best.cost:.3g}"
+            status.update(f"searching: {state.searches} local searches, {state.next_run} runs, best cost {best}")
+
+        yield show

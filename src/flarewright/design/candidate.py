@@ -1,0 +1,168 @@
+"""From a search's numbers to lenses that render: the best distinct ones, polished, as prescriptions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import FlarewrightError
+from ..io.glass_catalogue import nearest
+from ..io.media import complete as complete_media
+from ..model import Iris, Lens, Medium, Stop, Surface
+from ..optics.paraxial import first_order
+from ..render.prepare import complete_lens
+from .objective import fitness, fitness_thesis, misfits
+from .prescription import Structure
+from .rims import clear_radii
+from .search import KEPT, Candidate, Problem, State, merge, polish
+
+Floats = NDArray[np.float64]
+
+# lenses whose variables differ by less than this on average are one: log lengths, curvatures (1/mm), indices
+APART = (0.15, 0.004, 0.05)
+POLISHING_STEPS = 200
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """A lens that a search found.
+
+    Attributes
+    ----------
+    lens : Lens
+        Complete: it renders.
+    structure : Structure
+    vector : ndarray, shape (1 + 3 K,)
+    cost : float
+        What the search minimised.
+    fitness : float
+        Mean squared misfit in mm^2, best matching.
+    fitness_algorithm1 : float
+        The thesis' own, sorted by size.
+    residuals : ndarray, shape (N, 2)
+        Place and size of each target's ghost, less the target's, mm.
+    ghosts : tuple of (int, int)
+        Mirrors of each target's ghost.
+    """
+
+    lens: Lens
+    structure: Structure
+    vector: Floats
+    cost: float
+    fitness: float
+    fitness_algorithm1: float
+    residuals: Floats
+    ghosts: tuple[tuple[int, int], ...]
+
+
+def lens_of(
+    structure: Structure, vector: Floats, radii: Floats, *, name: str, notes: str = "", iris: Iris | None = None
+) -> Lens:
+    """Make a lens of a prescription's vector.
+
+    Parameters
+    ----------
+    structure : Structure
+    vector : ndarray, shape (1 + 3 K,)
+    radii : ndarray, shape (K,)
+        Semi-diameters, mm (`rims.clear_radii`).
+    name, notes : str
+    iris : Iris, optional
+
+    Returns
+    -------
+    Lens
+        With the dispersion of the nearest catalogue glasses; its f-number opens the stop to the vector's diameter.
+
+    Raises
+    ------
+    FlarewrightError
+        When it makes no image by itself.
+    """
+    rows: list[Surface | Stop] = []
+    count = structure.rows
+    for k in range(count):
+        # the last gap is the sensor's distance
+        thickness = float(vector[1 + k])
+        if k == structure.stop:
+            rows.append(Stop(thickness=thickness))
+            continue
+        n_d = float(vector[1 + 2 * count + k])
+        medium = Medium(n_d=n_d, v_d=round(nearest(n_d)[0].v_d, 2)) if structure.glass[k] else None
+        curvature = float(vector[1 + count + k])
+        rows.append(
+            Surface(curvature=curvature, thickness=thickness, medium=medium, semi_diameter=float(radii[k]))
+        )
+    rough = Lens(
+        name=name, notes=notes, source="designed by Flarewright for its ghosts", f_number=1.0,
+        sensor_distance=float(vector[count]), iris=iris or Iris(), rows=tuple(rows),
+    )  # fmt: skip
+    known, _ = complete_media(rough)
+    # at f/1 the stop has this semi-diameter; the f-number that gives the wanted one follows
+    at_one = first_order(known).stop_semi_diameter
+    return complete_lens(known.replace(f_number=2.0 * at_one / float(vector[0])))
+
+
+def outcomes(state: State, problem: Problem, *, count: int = 5, name: str = "Designed lens", iris: Iris | None = None
+             ) -> tuple[Outcome, ...]:  # fmt: skip
+    """Return the best distinct lenses of a search.
+
+    Parameters
+    ----------
+    state : State
+    problem : Problem
+    count : int
+    name : str
+    iris : Iris, optional
+
+    Returns
+    -------
+    tuple of Outcome
+        Best first; distinct as lenses, not copies of one; what makes no image is left out.
+    """
+    pool = list(state.ended)
+    for run in state.runs:
+        pool = list(merge(pool, run.members, KEPT))
+    pool.sort(key=lambda one: one.cost)
+    chosen: list[Candidate] = []
+    found: list[Outcome] = []
+    for one in pool:
+        if len(found) == count:
+            break
+        if any(_same(one, other) for other in chosen):
+            continue
+        fine = polish(problem, [(one.structure, one.x)], steps=POLISHING_STEPS)[0]
+        fine = min(fine, one, key=lambda each: each.cost)
+        if any(_same(fine, other) for other in chosen):
+            continue
+        outcome = _outcome(fine, problem, f"{name} {len(found) + 1}", iris)
+        if outcome is not None:
+            chosen.append(fine)
+            found.append(outcome)
+    return tuple(found)
+
+
+def _same(one: Candidate, other: Candidate) -> bool:
+    if one.structure != other.structure:
+        return False
+    rows = one.structure.rows
+    return float(np.mean(np.abs(one.x - other.x) / np.repeat(APART, [1 + rows, rows, rows]))) < 1.0
+
+
+def _outcome(one: Candidate, problem: Problem, name: str, iris: Iris | None) -> Outcome | None:
+    vector = problem.variables(one.structure).prescription(one.x)
+    residuals, _, ghosts = misfits(problem.objective, one.structure, vector)
+    if residuals is None:
+        return None
+    aim = problem.objective
+    try:
+        radii = clear_radii(one.structure, vector, aim.slopes, aim.entrance)
+        lens = lens_of(one.structure, vector, radii, name=name, iris=iris)
+    except FlarewrightError:
+        return None
+    return Outcome(
+        lens, one.structure, vector, one.cost, fitness(problem.objective, one.structure, vector),
+        fitness_thesis(problem.objective, one.structure, vector), residuals, ghosts,
+    )  # fmt: skip

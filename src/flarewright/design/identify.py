@@ -1,0 +1,125 @@
+"""What ghosts tell of a lens: which numbers of its prescription they fix, and what else should be measured."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .ghosts import differentiate
+from .objective import HIDDEN, seen
+from .prescription import Structure
+
+Floats = NDArray[np.float64]
+
+# singular values below this part of the largest are 0; rounding leaves 1e-13, the smallest that count are near 1e-6
+SMALLEST = 1e-9
+# a variable that moves less than this along every free direction is fixed
+STILL = 1e-6
+
+
+@dataclass(frozen=True)
+class Identification:
+    """What is known of a lens from its ghosts.
+
+    Attributes
+    ----------
+    rank, unknowns : int
+        Independent measurements, and variables.
+    fixed, free : tuple of str
+        Variables that the ghosts determine near this lens, and those that can change together unseen.
+    remedies : tuple of str
+        Measurements that would fix the rest, one after the other.
+    singular_values : ndarray
+        Largest first.
+    """
+
+    rank: int
+    unknowns: int
+    fixed: tuple[str, ...]
+    free: tuple[str, ...]
+    remedies: tuple[str, ...]
+    singular_values: Floats
+
+
+def identify(
+    structure: Structure,
+    vector: Floats,
+    slopes: Floats,
+    *,
+    entrance: float = 100.0,
+    brightness: bool = False,
+    stop_known: bool = False,
+) -> Identification:
+    """Tell which variables of a lens its ghosts fix.
+
+    Parameters
+    ----------
+    structure : Structure
+    vector : ndarray, shape (1 + 3 K,)
+    slopes : ndarray, shape (L,)
+        Of the lights at which ghosts are measured.
+    entrance : float
+        mm.
+    brightness : bool
+        Whether the irradiance of every ghost is measured as well as place and size (bare surfaces).
+    stop_known : bool
+        Whether the stop's diameter is known.
+
+    Returns
+    -------
+    Identification
+
+    Notes
+    -----
+    Rank of the Jacobian by its singular values, every column in the variable's own unit: parts of a length, parts of
+    the mean curvature, parts of n - 1. Local: another lens far away may have the same ghosts.
+    """
+    names, columns, unit = _variables(structure, vector, stop_known)
+    found = differentiate(structure, vector, entrance)
+    rows = []
+    for slope in slopes:
+        here = seen(found.values, float(slope))
+        for g in np.flatnonzero(here[:, 1] != HIDDEN):
+            size = abs(here[g, 1]) + 0.3
+            rows += [found.place[g] * slope / size, found.radius[g] / size]
+            if brightness:
+                rows.append(found.log_irradiance_by[g])
+    table = np.array(rows).reshape(-1, len(vector))[:, columns] * unit
+    _, values, turned = np.linalg.svd(table, full_matrices=True)
+    rank = int((values > SMALLEST * values[0]).sum()) if values.size else 0
+    free = turned[rank:].T
+    moving = np.abs(free).max(axis=1, initial=0.0) > STILL
+    remedies: list[str] = []
+    while free.shape[1]:
+        best = int(np.argmax((free**2).sum(axis=1)))
+        remedies.append(names[best])
+        # what stays free when this variable is known
+        row = free[best] / np.linalg.norm(free[best])
+        rest = np.linalg.svd(row[None])[2][1:].T
+        free = free @ rest
+    return Identification(
+        rank, len(names), tuple(n for n, m in zip(names, moving, strict=True) if not m),
+        tuple(n for n, m in zip(names, moving, strict=True) if m), tuple(remedies), values,
+    )  # fmt: skip
+
+
+def _variables(
+    structure: Structure, vector: Floats, stop_known: bool
+) -> tuple[list[str], NDArray[np.int64], Floats]:
+    """Name the variables, and give their columns and units."""
+    rows, stop = structure.rows, structure.stop
+    curvature = float(np.abs(vector[1 + rows : 1 + 2 * rows]).mean()) or 1.0
+    entries = [] if stop_known else [("stop diameter", 0, vector[0])]
+    for k in range(rows):
+        label = "sensor distance" if k == rows - 1 else f"thickness behind row {k}"
+        entries.append((label, 1 + k, vector[1 + k]))
+    entries += [(f"curvature of row {k}", 1 + rows + k, curvature) for k in range(rows) if k != stop]
+    entries += [
+        (f"index behind row {k}", 1 + 2 * rows + k, vector[1 + 2 * rows + k] - 1.0)
+        for k in range(rows)
+        if structure.glass[k]
+    ]
+    names, columns, unit = zip(*entries, strict=True)
+    return list(names), np.array(columns), np.array(unit, dtype=np.float64)

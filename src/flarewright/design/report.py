@@ -1,0 +1,217 @@
+"""The folder of a search: lenses, pictures, a report that needs nothing else, and the search itself."""
+
+from __future__ import annotations
+
+import base64
+import html
+from math import atan2, cos, sin
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import FlarewrightError
+from ..io.atomic import write_atomically
+from ..io.lens_writer import write_lens
+from ..io.project_file import project_text
+from ..model import Output, Project, Quality
+from .candidate import Outcome
+from .ghosts import evaluate
+from .objective import seen
+from .picture import disc_picture, png_bytes
+from .search import Problem, State
+from .store import write_state
+
+Floats = NDArray[np.float64]
+
+# mean squared misfit in mm^2 below which ghosts are met, and below which they nearly are
+MET, NEARLY = 1e-6, 0.05
+
+
+def verdict(outcome: Outcome | None) -> str:
+    """Say in a word how well the ghosts are met: "met", "nearly", "unsolved"."""
+    if outcome is None:
+        return "unsolved"
+    return "met" if outcome.fitness < MET else ("nearly" if outcome.fitness < NEARLY else "unsolved")
+
+
+def summary(state: State, found: tuple[Outcome, ...], problem: Problem) -> dict[str, Any]:
+    """Return the facts of a search, ready for JSON.
+
+    Parameters
+    ----------
+    state : State
+    found : tuple of Outcome
+    problem : Problem
+
+    Returns
+    -------
+    dict
+    """
+    return {
+        "verdict": verdict(found[0] if found else None),
+        "seconds": state.seconds,
+        "searches": state.searches,
+        "seed": state.seed,
+        "structures": len(problem.structures),
+        "lenses": [
+            {
+                "file": f"lens-{number}.toml",
+                "cost": one.cost,
+                "fitness": one.fitness,
+                "fitness_algorithm1": one.fitness_algorithm1,
+                "f_number": one.lens.f_number,
+                "stop_row": one.structure.stop,
+                "ghosts": [
+                    {
+                        "target": name,
+                        "ghost": f"{j}-{i}",
+                        "place_error_mm": float(place),
+                        "radius_error_mm": float(size),
+                    }
+                    for name, (j, i), (place, size) in zip(
+                        problem.objective.names, one.ghosts, one.residuals, strict=True
+                    )
+                ],
+            }
+            for number, one in enumerate(found, 1)
+        ],
+    }
+
+
+def write_folder(
+    folder: Path, project: Project, problem: Problem, state: State, found: tuple[Outcome, ...]
+) -> list[str]:
+    """Write project, search, lenses, pictures and report.
+
+    Parameters
+    ----------
+    folder : Path
+        It is there.
+    project : Project
+    problem : Problem
+    state : State
+    found : tuple of Outcome
+
+    Returns
+    -------
+    list of str
+        Remarks.
+
+    Raises
+    ------
+    OutputError
+        A file cannot be written.
+    """
+    remarks: list[str] = []
+    write_state(state, folder / "search.json")
+    _write_text(folder / "project.toml", project_text(project, folder=folder))
+    target = target_pictures(problem, project)
+    wanted = png_bytes(target[0])
+    sections: list[str] = []
+    for number, one in enumerate(found, 1):
+        write_lens(one.lens, folder / f"lens-{number}.toml")
+        pictures = found_pictures(one, problem, project)
+        draft = _draft(folder / f"lens-{number}.png", one, project, remarks)
+        sections.append(_section(number, one, problem, wanted, png_bytes(pictures[0]), draft))
+    data = summary(state, found, problem)
+    _write_text(folder / "report.html", _page(data, "".join(sections), wanted))
+    return remarks
+
+
+def target_pictures(problem: Problem, project: Project) -> list[Floats]:
+    """Draw the wanted ghosts of each light as even discs."""
+    aim = problem.objective
+    return [
+        _discs(aim.targets[aim.spans[light] : aim.spans[light + 1], :2], light, project)
+        for light in range(len(aim.slopes))
+    ]
+
+
+def found_pictures(outcome: Outcome, problem: Problem, project: Project) -> list[Floats]:
+    """Draw the ghosts of a lens for each light as even discs."""
+    aim = problem.objective
+    values = evaluate(outcome.structure, outcome.vector[None], aim.entrance)[0]
+    return [_discs(seen(values, float(slope)), light, project) for light, slope in enumerate(aim.slopes)]
+
+
+def _discs(ghosts: Floats, light: int, project: Project) -> Floats:
+    x, y = (float(np.tan(np.radians(angle))) for angle in project.lights[light].field_deg)
+    azimuth = atan2(y, x)
+    half = 0.5 * max(project.camera.sensor)
+    # as bright as in the thesis' picture: by one over the height, the smallest that fills a few pixels not clipped
+    radii = np.maximum(np.abs(ghosts[:, 1]), half / 100.0)
+    levels = np.minimum(half / 20.0 / radii, 1.0) * 0.6
+    return disc_picture(ghosts[:, 0], ghosts[:, 1], levels[:, None], (cos(azimuth), sin(azimuth)), half, 256)
+
+
+def _draft(path: Path, outcome: Outcome, project: Project, remarks: list[str]) -> bytes | None:
+    """Render a lens in draft quality: the proof that its file is a lens."""
+    from ..render.display import view
+    from ..render.render import render
+
+    width, height = project.camera.size_px
+    small = 480.0 / max(width, height, 480)
+    camera = project.camera.replace(size_px=(max(1, round(width * small)), max(1, round(height * small))))
+    shot = project.replace(
+        lens=outcome.lens, camera=camera, quality=Quality(mode="draft", wavelengths=3, paths="same-side"),
+        output=Output(layers="beauty", starburst=False), f_number=None, iris=project.iris, design=None,
+    )  # fmt: skip
+    try:
+        rendering = render(shot)
+    except FlarewrightError as error:
+        remarks.append(f"{path.name} was not rendered: {error}")
+        return None
+    data = png_bytes(view(rendering.layers[0].pixels))
+    write_atomically(path, lambda temporary: _write_bytes(temporary, data))
+    return data
+
+
+def _section(
+    number: int, one: Outcome, problem: Problem, target: bytes, found: bytes, draft: bytes | None
+) -> str:
+    rows = "".join(
+        f"<tr><td>{html.escape(name)}</td><td>{j}-{i}</td><td>{place:+.4f}</td><td>{size:+.4f}</td></tr>"
+        for name, (j, i), (place, size) in zip(problem.objective.names, one.ghosts, one.residuals, strict=True)
+    )
+    rendered = f'<figure><img src="{_inline(draft)}"><figcaption>draft render</figcaption></figure>' if draft else ""
+    return (
+        f"<h2>Lens {number}</h2><p>fitness {one.fitness:.3g} mm² (best matching), {one.fitness_algorithm1:.3g} "
+        f"(Algorithm 1), f/{one.lens.f_number:.3g}, stop at row {one.structure.stop}: "
+        f"<code>lens-{number}.toml</code></p>"
+        f'<figure><img src="{_inline(target)}"><figcaption>wanted</figcaption></figure>'
+        f'<figure><img src="{_inline(found)}"><figcaption>found</figcaption></figure>{rendered}'
+        "<details><summary>every ghost</summary><table><tr><th>wanted</th><th>ghost</th><th>place off, mm</th>"
+        f"<th>radius off, mm</th></tr>{rows}</table></details>"
+    )
+
+
+def _page(data: dict[str, Any], sections: str, target: bytes) -> str:
+    words = {
+        "met": "The wanted ghosts are met.",
+        "nearly": "The wanted ghosts are nearly met.",
+        "unsolved": "The wanted ghosts are not met: a longer search, more surfaces or wider bounds may help; the table "
+        "of a lens tells which ghosts are far off.",
+    }
+    nothing = "" if sections else f'<p>No lens was found.</p><img src="{_inline(target)}">'
+    return (
+        '<!doctype html><html lang="en"><meta charset="utf-8"><title>Flarewright design</title><style>'
+        "body{font:15px sans-serif;max-width:60em;margin:2em auto;padding:0 1em;background:#16181c;color:#ddd}"
+        "figure{display:inline-block;margin:0 .5em .5em 0}img{max-height:256px}table{border-collapse:collapse}"
+        "td,th{padding:.1em .8em;text-align:right}figcaption{color:#999}</style>"
+        f"<h1>Flarewright design</h1><p>{words[data['verdict']]} {data['searches']} local searches in "
+        f"{data['seconds']:.1f} s, seed {data['seed']}.</p>{nothing}{sections}</html>\n"
+    )
+
+
+def _inline(data: bytes) -> str:
+    return "data:image/png;base64," + base64.b64encode(data).decode("ascii")
+
+
+def _write_text(path: Path, text: str) -> None:
+    write_atomically(path, lambda temporary: _write_bytes(temporary, text.encode("utf-8")))
+
+
+def _write_bytes(path: Path, data: bytes) -> None:
+    path.write_bytes(data)

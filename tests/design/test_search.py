@@ -1,0 +1,237 @@
+"""The solver: it finds what was planted, never leaves its bounds, and goes on where it was cut off."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from planted import planted
+
+from flarewright.design.candidate import outcomes
+from flarewright.design.prescription import Structure, glass_patterns, structures, surfaces_for
+from flarewright.design.search import State, advance, neighbour, polish, propose, solve
+from flarewright.design.store import read_state, write_state
+from flarewright.design.target import problem_of
+from flarewright.errors import FlarewrightError, ProjectError
+from flarewright.kernels.design_search import polish_many
+from flarewright.model import Design, GhostWish, Light, Project
+from flarewright.model.design import Bounds
+from flarewright.render.prepare import complete_lens
+
+
+@pytest.mark.parametrize("signed", [True, False])
+def test_a_planted_lens_is_found(signed):
+    problem, _, _ = planted(signed=signed)
+    state = solve(problem, seed=1, time_limit=None, most_searches=20000)
+    assert state.best.cost < 1e-14
+    best = outcomes(state, problem, count=1)[0]
+    assert best.fitness < 1e-8
+    assert np.abs(best.residuals).max() < 1e-4
+
+
+@given(st.integers(0, 2**32 - 1))
+@settings(max_examples=25, deadline=None)
+def test_bounds_are_never_broken(seed):
+    problem, _, _ = planted()
+    random = np.random.default_rng(seed)
+    structure = problem.structures[int(random.integers(len(problem.structures)))]
+    known = problem.variables(structure)
+    # starting points far outside as well
+    starts = known.random_points(random, 3) + random.normal(size=(3, len(known.low))) * random.choice([0.0, 1.0, 50.0])
+    for found in polish(problem, [(structure, x) for x in starts]):
+        assert np.all(found.x >= known.low)
+        assert np.all(found.x <= known.high)
+        vector, bounds, rows = known.prescription(found.x), problem.bounds, structure.rows
+        glass = np.array(structure.glass)
+        d, c, n = vector[1 : 1 + rows], vector[1 + rows : 1 + 2 * rows], vector[1 + 2 * rows :]
+        assert vector[0] == 6.0
+        assert np.all((d[glass] >= bounds.glass[0]) & (d[glass] <= bounds.glass[1]))
+        assert np.all((d[~glass] >= bounds.air[0]) & (d[~glass] <= bounds.air[1]))
+        assert np.all((n[glass] >= bounds.n_d[0]) & (n[glass] <= bounds.n_d[1]))
+        assert np.all(n[~glass] == 1.0)
+        assert np.all(np.abs(c) <= 1.0 / bounds.least_radius)
+        assert c[structure.stop] == 0.0
+
+
+def test_proposals_stay_what_they_are_called():
+    problem, _, _ = planted()
+    state = solve(problem, seed=0, time_limit=None, most_searches=400)
+    random = np.random.default_rng(0)
+    for run in state.runs:
+        for _ in range(50):
+            structure, x = propose(run.members, problem, random)
+            assert structure == run.home
+            assert np.all(np.isfinite(x))
+
+
+def test_the_cost_is_that_of_the_objective():
+    # the kernel's cost against the sum written out from the values
+    problem, _, _ = planted(extra=0.0)
+    structure = problem.structures[0]
+    known, aim = problem.variables(structure), problem.objective
+    start = known.random_points(np.random.default_rng(3), 1)
+    ends, costs = np.empty_like(start), np.empty(1)
+    matches = np.empty((1, len(aim.targets)), np.int64)
+    wishes = aim.wishes * [1.0, 1.0, 0.0]
+    polish_many(
+        start, structure.stop, structure.mirrors, aim.entrance, known.low, known.high, known.free, known.longest,
+        aim.slopes, aim.spans, aim.targets, aim.weights, True, 0.0, wishes, 5, 4, 0.0, ends, costs, matches,
+    )  # fmt: skip
+    from flarewright.design.ghosts import evaluate
+
+    values = evaluate(structure, known.prescription(ends), aim.entrance)[0][matches[0]]
+    place = aim.weights[:, 0] * (values[:, 0] * aim.slopes[0] - aim.targets[:, 0])
+    size = aim.weights[:, 1] * (values[:, 1] - aim.targets[:, 1])
+    assert costs[0] == pytest.approx((place**2).sum() + (size**2).sum(), rel=1e-9)
+    assert costs[0] < 1e6
+
+
+def test_threads_and_interruptions_do_not_change_the_result(tmp_path):
+    problem, _, _ = planted()
+    whole = solve(problem, seed=5, time_limit=None, most_searches=1600, threads=1)
+    half = solve(problem, seed=5, time_limit=None, threads=4, most_searches=800)
+    write_state(half, tmp_path / "search.json")
+    resumed = solve(problem, time_limit=None, most_searches=1600, threads=3, state=read_state(tmp_path / "search.json"))
+    assert whole.searches == resumed.searches
+    assert whole.next_run == resumed.next_run
+    for one, other in zip(whole.runs, resumed.runs, strict=True):
+        assert one.number == other.number
+        assert [m.cost for m in one.members] == [m.cost for m in other.members]
+        for m, k in zip(one.members, other.members, strict=True):
+            assert np.array_equal(m.x, k.x)
+
+
+def test_cancelling_and_time_end_a_search_with_what_there_is():
+    problem, _, _ = planted()
+    rounds = []
+    state = solve(problem, time_limit=None, cancelled=lambda: len(rounds) >= 2, progress=rounds.append)
+    assert len(rounds) == 2
+    assert state.best is not None
+    assert solve(problem, time_limit=1e-6).searches > 0
+
+
+def test_a_base_lens_joins_the_first_run():
+    problem, structure, _ = planted(begin=True)
+    state = solve(problem, seed=0, time_limit=None, most_searches=100)
+    assert state.best.cost < 1e-14
+    assert state.best.structure == structure
+
+
+def test_different_seeds_search_differently():
+    problem, _, _ = planted()
+    one, other = (solve(problem, seed=s, time_limit=None, most_searches=100) for s in (1, 2))
+    assert one.best.cost != other.best.cost
+
+
+def test_lenses_are_distinct_and_valid():
+    problem, _, _ = planted()
+    state = solve(problem, seed=2, time_limit=None, most_searches=3000)
+    found = outcomes(state, problem, count=4)
+    assert len(found) >= 2
+    for one in found:
+        assert complete_lens(one.lens) is not None
+        assert one.lens.sensor_distance == pytest.approx(one.vector[one.structure.rows])
+    for k, one in enumerate(found):
+        for other in found[:k]:
+            assert one.structure != other.structure or np.abs(one.vector - other.vector).max() > 1e-3
+
+
+@given(st.integers(2, 9))
+def test_patterns_touch_glass_everywhere_and_none_is_missed(surfaces):
+    found = glass_patterns(surfaces)
+    every = [tuple(bool(k >> b & 1) for b in range(surfaces)) for k in range(2**surfaces)]
+    good = [p for p in every if not p[-1] and all(p[k] or (k > 0 and p[k - 1]) for k in range(surfaces))]
+    assert sorted(found) == sorted(good)
+
+
+def test_structures_have_enough_ghosts_and_neighbours_as_many():
+    random = np.random.default_rng(0)
+    for surfaces, ghosts in ((8, 13), (8, 12), (12, 30)):
+        found = structures(surfaces, ghosts)
+        assert found
+        for one in found:
+            assert len(one.pairs) >= ghosts
+            assert one.standing_in_air
+            turned = neighbour(one, random)
+            assert len(turned.pairs) == len(one.pairs)
+            assert turned.standing_in_air
+    assert structures(4, 100) == ()
+    # equation 5.5 of the thesis counts the stop: 5, 10 and 15 ghosts need 7, 9 and 10 rows
+    assert [surfaces_for(ghosts) + 1 for ghosts in (1, 5, 10, 15)] == [4, 7, 9, 10]
+
+
+def project(**design):
+    light = Light(field_deg=(6.0, 3.0))
+    return Project(lens="heliar-tronnier", f_number=16.0, lights=(light,), design=Design(**design))
+
+
+def test_wishes_change_the_targets_they_name():
+    plain, _ = problem_of(project())
+    wishes = (
+        GhostWish(ghost="4-1", move_mm=2.0, height=1.5),
+        GhostWish(ghost="8-6", action="remove"),
+        GhostWish(ghost="8-7", action="ignore"),
+        GhostWish(place_mm=-3.0, radius_mm=-1.0, weight=2.0),
+    )
+    changed, _ = problem_of(project(wishes=wishes))
+    one, other = plain.objective, changed.objective
+    at = {name: k for k, name in enumerate(other.names)}
+    assert "8-6" not in at
+    before = one.targets[one.names.index("4-1")]
+    assert np.allclose(other.targets[at["4-1"]][:2], [before[0] + 2.0, before[1] * 1.5])
+    assert not other.weights[at["8-7"]].any()
+    assert np.allclose(other.targets[at["wish 3"]][:2], [-3.0, -1.0])
+    assert len(changed.begin_with) == 1
+    assert plain.begin_with == ()
+    same = [k for k in at if k not in ("4-1", "8-7", "wish 3")]
+    assert all(np.array_equal(one.targets[one.names.index(k)], other.targets[at[k]]) for k in same)
+
+
+def test_fixed_rows_stay():
+    wish = GhostWish(ghost="4-1", move_mm=1.0)
+    problem, settled = problem_of(project(structure="lens", fixed_rows=(0, 1, 6), wishes=(wish,)))
+    state = solve(problem, time_limit=None, most_searches=60)
+    vector = problem.variables(state.best.structure).prescription(state.best.x)
+    for row in (0, 1, 6):
+        surface = settled.lens.rows[row]
+        assert vector[1 + row] == surface.thickness
+        assert vector[1 + 9 + row] == surface.curvature
+        assert vector[1 + 18 + row] == surface.medium.n_d
+
+
+@pytest.mark.parametrize(
+    ("design", "words"),
+    [
+        ({"wishes": (GhostWish(ghost="7-1", move_mm=1.0),)}, "no ghost 7-1"),
+        ({"wishes": (GhostWish(ghost="4-1", light=3),)}, "no light 3"),
+        ({"surfaces": 4}, "surfaces = 6 or more"),
+        ({"structure": "lens", "wishes": (GhostWish(place_mm=1.0, radius_mm=1.0),)}, "has 13"),
+        ({"structure": "lens", "fixed_rows": (40,)}, "rows are 0 to 8"),
+        ({"brightness": "stop", "bounds": Bounds(stop_diameter=(1.0, 2.0))}, "outside stop_diameter"),
+        ({"structure": "lens", "fixed_rows": tuple(range(9)), "brightness": "stop"}, "nothing to search"),
+    ],
+)
+def test_impossible_targets_are_told_apart_from_unsolved_ones(design, words):
+    with pytest.raises(ProjectError, match=words):
+        solve(problem_of(project(**design))[0], time_limit=0.1)
+
+
+def test_a_damaged_search_is_no_traceback(tmp_path):
+    path = tmp_path / "search.json"
+    for text in ("", "{", "[]", '{"version": 9}', '{"version": 1, "seed": 0}'):
+        path.write_text(text)
+        with pytest.raises(FlarewrightError):
+            read_state(path)
+    write_state(State(3), path)
+    assert read_state(path) == State(3)
+
+
+def test_a_batch_is_a_function_of_its_seed():
+    problem, _, _ = planted()
+    state = solve(problem, seed=4, time_limit=None, most_searches=200)
+    one, other = (advance(state.runs[0], problem, 4) for _ in range(2))
+    assert [m.cost for m in one.members] == [m.cost for m in other.members]
+    assert advance(state.runs[0], problem, 5).members[0].cost == pytest.approx(one.members[0].cost, rel=1.0)
+
+
+def test_a_structure_in_glass_is_none():
+    assert not Structure(2, (True, True, False, True, False)).standing_in_air
