@@ -54,7 +54,9 @@ from flarewright.render.reference import spectral_shots
 from flarewright.render.render import render
 from flarewright.render.shot import make_opening, make_shots
 
-PARTS = ("yardsticks", "trace", "raster", "frame", "art", "built", "scatter", "reference", "design", "startup", "memory")
+PARTS = (
+    "yardsticks", "trace", "raster", "frame", "art", "built", "scatter", "reference", "design", "startup", "memory",
+)  # fmt: skip
 
 LIGHT = (10.0, 5.0)
 """Field angles of the frames' light, degrees."""
