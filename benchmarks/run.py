@@ -32,7 +32,9 @@ import flarewright
 from flarewright.kernels.raster import blank_plane, fill_polygon
 from flarewright.model import (
     Art,
+    Bare,
     Camera,
+    Everywhere,
     Imperfection,
     Iris,
     Lens,
@@ -307,7 +309,7 @@ def scatter(repeat: int) -> Rows:
 
 
 def reference(repeat: int) -> Rows:
-    """Random rays through the whole lens on one thread: what one batch traces, with and without a picture."""
+    """Random rays through the whole lens on one thread, with and without a picture; what four reflections cost."""
     found = []
     for name in ("heliar-tronnier", "canon-28-80"):
         project = Project(lens=name, lights=(Light(field_deg=LIGHT),), quality=Quality(mode="reference"))
@@ -321,6 +323,16 @@ def reference(repeat: int) -> Rows:
             )
             label = f"{name}, {'1280x720' if picture else 'numbers only'}"
             found.append(row("reference", label, HEROES * side**2 / seconds / 1e3, "k rays/s"))
+    bare = heliar_frame("final", starburst=False).replace(coating=Everywhere(coating=Bare()))
+    alone = 0.0
+    for orders in (2, 4):
+        project = bare.replace(quality=bare.quality.replace(orders=orders))
+        seconds = 1e3 * median_seconds(lambda project=project: render(project), repeat)  # type: ignore[misc]
+        found.append(
+            row("reference", f"bare Heliar final 1280x720, orders {orders}", seconds, "ms",
+                seconds / alone if alone else None, "orders 2")
+        )  # fmt: skip
+        alone = seconds
     return found
 
 

@@ -118,7 +118,7 @@ def test_every_flag_reaches_the_project(capsys, projects, folder):
         "--size", "10x8", "--sensor", "24x18", "--layers", "ghosts", "--brightest", "4", "--colorspace", "acescg",
         "--half", "--paths", "same-side", "--focus", "2000", "--sensor-distance", "82.5", "--no-starburst",
         "--full-windows", "--exposure", "-2", "--view", "filmic", "--threads", "1", "--seed", "5", "--error", "0.1",
-        "--error-of", "total", "--samples", "1000", "-o", "a.exr",
+        "--error-of", "total", "--samples", "1000", "--orders", "4", "--order4-limit", "1e-5", "-o", "a.exr",
     )  # fmt: skip
     (project,) = projects
     flat = Tabulated(wavelength_nm=(400, 700), power=(1, 1))
@@ -131,6 +131,7 @@ def test_every_flag_reaches_the_project(capsys, projects, folder):
     assert (project.quality.mode, project.quality.wavelengths, project.quality.paths) == ("draft", 3, "same-side")
     quality = project.quality
     assert (quality.seed, quality.reference_samples) == (5, 1000)
+    assert (quality.orders, quality.order4_limit) == (4, 1e-5)
     assert (quality.reference_error, quality.reference_error_of) == (0.1, "total")
     assert (project.camera.size_px, project.camera.sensor_mm) == ((10, 8), (24, 18))
     assert (project.camera.focus_distance, project.camera.sensor_distance) == (2000, 82.5)

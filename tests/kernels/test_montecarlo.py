@@ -123,6 +123,30 @@ def test_two_reflections_by_path():
     np.testing.assert_allclose(paths, expected, rtol=1e-9, atol=1e-15)
 
 
+def test_four_reflections_by_path():
+    """The rays noted for each four-reflection path of three plates carry what the reflectances say."""
+    R = np.array([0.1, 0.2, 0.3])
+    T = 1.0 - R
+    shot = stack_of_plates(R)
+    source = ray_source(shot, 0, side=64, light=0, followed=(2.0, 0.0))
+    batches = 20
+    found = np.zeros((batches, 4**4))
+    entered = 0.0
+    for batch in range(batches):
+        result = run_batch([source], batch, picture=False, fours=100_000)
+        np.add.at(found[batch], result["fours"][:, 0].astype(int), result["fours"][:, 1])
+        entered += result["figures"][ENTERED] / batches
+    mean, error = found.mean(axis=0) / entered, found.std(axis=0, ddof=1) / np.sqrt(batches) / entered
+    expected = np.zeros(4**4)
+    for j, i, k, m in np.ndindex(3, 3, 3, 3):
+        if i < j and k > i and m < k:
+            passed = [*range(j), *range(i + 1, j), *range(i + 1, k), *range(m + 1, k), *range(m + 1, 3)]
+            expected[((j * 4 + i) * 4 + k) * 4 + m] = R[[j, i, k, m]].prod() * T[passed].prod()
+    assert np.count_nonzero(expected) == np.count_nonzero(mean) == 8
+    assert (np.abs(mean - expected) <= 4.5 * error).all()
+    assert error.sum() < 0.05 * expected.sum()
+
+
 def test_without_reflectance_there_are_no_ghosts():
     shot = stack_of_plates([0.0] * 5, tilt_deg=20.0)
     mean = gathered(shot, 2).mean("figures")

@@ -16,7 +16,7 @@ from scipy import stats
 from flarewright.kernels.montecarlo import BESIDE, IN_PICTURE
 from flarewright.model import Project
 from flarewright.optics.color import luminance_weights
-from flarewright.render.montecarlo import BLOCK, Sums, ray_source, run_batch
+from flarewright.render.montecarlo import BLOCK, FOLLOWED, Sums, ray_source, run_batch
 from flarewright.render.prepare import settle
 from flarewright.render.render import Rendering, render
 from flarewright.render.shot import make_opening, make_shots
@@ -62,18 +62,22 @@ def blocks_of(pixels: np.ndarray, window: tuple[int, int, int, int], project: Pr
     return np.add.reduceat(rows, np.arange(0, width, BLOCK), axis=1) * area
 
 
-def gather(project: Project, batches: int, side: int, seed: int = 0) -> Sums:
-    """Trace the reference at the wavelengths that final quality traces."""
+def gather(project: Project, batches: int, side: int, *, fours: bool = False) -> Sums:
+    """Trace the reference at the wavelengths that final quality traces; `fours`: to four reflections, no more."""
     settled = settle(project)
     shots = make_shots(settled, make_opening(settled, None))
-    sources = [ray_source(shot, seed, side=side, light=k) for k, shot in enumerate(shots)]
+    followed = (4.0, 0.0) if fours else (FOLLOWED, FOLLOWED)
+    sources = [ray_source(shot, 0, side=side, light=k, followed=followed) for k, shot in enumerate(shots)]
     sums = Sums(0, {}, {})
     for batch in range(batches):
-        sums.add(run_batch(sources, batch, picture=True))
+        result = run_batch(sources, batch, picture=True)
+        two, every = result["blocks"]
+        result["blocks"] = every - two if fours else two
+        sums.add(result)
     return sums
 
 
-def judge(project: Project, *, batches: int = 64, side: int = 128) -> Judged:
+def judge(project: Project, *, batches: int = 64, side: int = 128, fours: bool = False) -> Judged:
     """Render a project by both.
 
     Parameters
@@ -82,8 +86,11 @@ def judge(project: Project, *, batches: int = 64, side: int = 128) -> Judged:
         With `output.layers = "ghosts"`, so that every path is drawn in full detail.
     batches, side : int
         Of the reference.
+    fours : bool
+        Whether to judge the blocks and the total of four reflections instead of two; `final` and `paths` are of two
+        reflections in any case.
     """
-    sums = gather(project, batches, side)
+    sums = gather(project, batches, side, fours=fours)
     rendering: Rendering = render(project)
     ghosts = next(layer for layer in rendering.layers if layer.name == "ghosts")
     final = blocks_of(ghosts.pixels, ghosts.window, project)
@@ -94,14 +101,15 @@ def judge(project: Project, *, batches: int = 64, side: int = 128) -> Judged:
         if layer.name.startswith("ghost."):
             j, i = (int(row) for row in str(layer.about["path"]).split("-"))
             paths[f"{j}-{i}"] = (float(layer.about["flux_mm2"]), float(mean[j, i]), float(spread[j, i]))
+    end = IN_PICTURE + (2 if fours else 1)
     every = figures[IN_PICTURE + 1 : BESIDE].sum()
     return Judged(
         final,
-        sums.mean("blocks")[0],
-        sums.variance("blocks")[0],
+        sums.mean("blocks"),
+        sums.variance("blocks"),
         paths,
         batches,
-        (float(final.sum()), float(figures[IN_PICTURE + 1]), float(errors[IN_PICTURE + 1])),
+        (float(final.sum()), float(figures[end]), float(errors[end])),
         float(figures[IN_PICTURE + 2 : BESIDE].sum() / every),
     )
 

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Films = tuple[tuple[float, float], ...]
 """Films on a surface from the front to the back: (index, thickness in nm)."""
-Path = tuple[int, int] | None
+Path = tuple[int, ...] | None
 """(first mirror j, second mirror i < j), or None for the direct image."""
 
 FAR = 40.0
@@ -126,14 +126,14 @@ def steps(system: System, path: Path) -> list[Step]:
     last = len(rows)
     if path is None:
         return [step(k, False, True) for k in range(last)]
-    j, i = path
-    return [
-        *(step(k, False, True) for k in range(j)),
-        step(j, True, True),
-        *(step(k, False, False) for k in range(j - 1, i, -1)),
-        step(i, True, False),
-        *(step(k, False, True) for k in range(i + 1, last)),
-    ]
+    walked: list[Step] = []
+    at, forward = 0, True
+    for mirror in path:
+        way = range(at, mirror) if forward else range(at, mirror, -1)
+        walked += [*(step(k, False, forward) for k in way), step(mirror, True, forward)]
+        forward = not forward
+        at = mirror + (1 if forward else -1)
+    return [*walked, *(step(k, False, True) for k in range(at, last))]
 
 
 # --- films -----------------------------------------------------------------------------------------------------

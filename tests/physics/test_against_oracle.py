@@ -23,6 +23,7 @@ from prescriptions import CANON, FIVE, HELIAR, SUPER_ANGULON, lens, system
 
 from flarewright.model import Bare, Everywhere, Lens, QuarterWave
 from flarewright.optics import ghosts
+from flarewright.render.analysis import ghosts as analyse
 from flarewright.render.prepare import load_lens
 
 FLUX, PLACE, SIZE, FLOOR = 0.01, 0.02, 0.02, 1e-4
@@ -129,6 +130,26 @@ def test_a_shipped_lens():
     """The file, its loader and the table together, against the oracle's reading of the same frozen data."""
     a_lens = load_lens("triplet-pestrecov")
     compare_systems(from_lens(a_lens), a_lens, (6.0, 4.0), samples=2000)
+
+
+@pytest.mark.parametrize("several", [2, pytest.param(8, marks=pytest.mark.slow)])
+def test_four_reflections(several):
+    """The brightest ghosts of four reflections: flux, place and size, bare."""
+    a_lens = load_lens("triplet-pestrecov")
+    s, field = from_lens(a_lens), (6.0, 4.0)
+    listed = [row for row in analyse(a_lens, field, orders=4, order4_limit=3e-4).ghosts if row.later_reflections]
+    assert len(listed) > 8
+    wrong = []
+    for row in listed[:several]:
+        path = (row.first_reflection, row.second_reflection, *row.later_reflections)
+        assert row.name == "-".join(map(str, path))
+
+        def ask_again(n: int, path=path) -> Estimate:
+            return estimate(s, path, field, samples=n, replicas=8, seed=n)[0]
+
+        wrong += complaints(row, ask_again(2000), ask_again)
+    assert not [complaint for complaint in wrong if DOUBT not in complaint], wrong
+    assert len(wrong) <= MOST_UNDECIDED
 
 
 @pytest.mark.slow

@@ -5,9 +5,12 @@ import pytest
 from judge import blocks_of, deviations, judge, probabilities
 from scipy import stats
 
+from flarewright.kernels.montecarlo import IN_PICTURE
 from flarewright.model import Camera, Everywhere, Iris, Light, Lines, Output, Project, Quality, QuarterWave, Surface
-from flarewright.render.prepare import load_lens
+from flarewright.render.montecarlo import ray_source, run_batch
+from flarewright.render.prepare import load_lens, settle
 from flarewright.render.render import render
+from flarewright.render.shot import make_opening, make_shots
 
 D_LINE = Lines(lines=((587.56, 1.0),))
 
@@ -38,6 +41,14 @@ def scene(lens, field, f_number=None, *, size=(256, 160), light=None, wavelength
         output=Output(layers="ghosts", starburst=False),
         **parts,
     )
+
+
+def picture(layer, size_px):
+    """Return a layer's pixels at the size of the picture."""
+    whole = np.zeros((size_px[1], size_px[0], 3), np.float32)
+    x, y, w, h = layer.window
+    whole[y : y + h, x : x + w] = layer.pixels
+    return whole
 
 
 def assert_paths_agree(judged):
@@ -75,10 +86,8 @@ def test_wrong_pictures_are_refused(small):
     """The judgement has teeth: 5 % too bright, a path left out, a shift by half a block, a mirrored picture."""
     project, judged = small
     ghosts = next(layer for layer in render(project).layers if layer.name == "ghosts")
-    x, y, w, h = ghosts.window
     assert blocks_of(ghosts.pixels, ghosts.window, project) == pytest.approx(judged.final)
-    whole = np.zeros((64, 96, 3), np.float32)
-    whole[y : y + h, x : x + w] = ghosts.pixels
+    whole = picture(ghosts, (96, 64))
     shifted = np.roll(whole, 8, axis=1)
     wrong = [
         1.05 * judged.final,
@@ -88,9 +97,84 @@ def test_wrong_pictures_are_refused(small):
     third = sorted((layer for layer in render(project).layers if layer.name.startswith("ghost.")),
                    key=lambda layer: -float(layer.about["flux_mm2"]))[2]  # fmt: skip
     wrong.append(judged.final - blocks_of(third.pixels, third.window, project))
-    for picture in wrong:
-        everywhere, worst = probabilities(judged, picture)
+    for blocks in wrong:
+        everywhere, worst = probabilities(judged, blocks)
         assert min(everywhere, worst) < 1e-6
+
+
+@pytest.fixture(scope="module")
+def fours():
+    """All four-reflection ghosts of an uncoated triplet that are worth anything."""
+    project = scene("triplet-pestrecov", (8.0, 4.0), 4.0, size=(96, 64))
+    return project, render(project.replace(quality=project.quality.replace(orders=4, order4_limit=1e-6)))
+
+
+def test_ghosts_of_four_reflections_agree(fours):
+    """Their sum, block by block, against rays that end after the fourth reflection."""
+    project, rendering = fours
+    layers = {layer.name: layer for layer in rendering.layers}
+    facts = rendering.summary["ghosts.order4"]
+    assert facts["drawn"] > 130
+    assert facts["left_out_share"] < 1e-3
+    singles = [layer for name, layer in layers.items() if name.count("-") == 3]
+    assert len(singles) == facts["drawn"]
+    ghosts = layers["ghosts.order4"]
+    final = blocks_of(ghosts.pixels, ghosts.window, project)
+    assert sum(float(layer.about["flux_mm2"]) for layer in singles) == pytest.approx(final.sum(), rel=1e-5)
+    judged = judge(project, batches=64, side=64, fours=True)
+    everywhere, worst = probabilities(judged, final)
+    assert everywhere > CHANCE
+    assert worst > CHANCE
+    _, mean, error = judged.total
+    assert error < 0.02 * mean
+    assert abs(final.sum() - mean) < 5e-3 * mean + 4.0 * error
+    # and without them the picture is the same but for them
+    two = {layer.name: layer for layer in render(project).layers}
+    np.testing.assert_array_equal(two["ghosts"].pixels, layers["ghosts"].pixels)
+    np.testing.assert_array_equal(
+        layers["beauty"].pixels, two["beauty"].pixels + picture(ghosts, project.camera.size_px)
+    )
+
+
+def test_every_path_of_four_reflections_agrees(fours):
+    """Flux of each path against the rays that the reference saw take it."""
+    project, rendering = fours
+    drawn = {str(layer.about["path"]): float(layer.about["flux_mm2"]) for layer in rendering.layers
+             if layer.name.count("-") == 3}  # fmt: skip
+    settled = settle(project)
+    shots = make_shots(settled, make_opening(settled, None))
+    sources = [ray_source(shot, 7, side=64, light=k, followed=(4.0, 0.0)) for k, shot in enumerate(shots)]
+    batches, count = 24, len(settled.lens.rows)
+    found = np.zeros((batches, count**4))
+    two = 0.0
+    for batch in range(batches):
+        result = run_batch(sources, batch, picture=False, fours=1000)
+        np.add.at(found[batch], result["fours"][:, 0].astype(int), result["fours"][:, 1])
+        two += float(result["figures"][IN_PICTURE + 1]) / batches
+    mean, error = found.mean(axis=0), found.std(axis=0, ddof=1) / np.sqrt(batches)
+    keys = {"-".join(map(str, np.unravel_index(k, (count,) * 4))): k for k in np.flatnonzero(mean)}
+    # none that is clearly above the limit is missing
+    assert {name for name, k in keys.items() if mean[k] - 4.0 * error[k] > 1.3e-6 * two} <= set(drawn)
+    bright = {name: flux for name, flux in drawn.items() if flux > 3e-5 * two}
+    assert len(bright) > 80
+    bound = stats.t.isf(CHANCE / (2 * len(bright)), batches - 1)
+    for name, flux in bright.items():
+        k = keys[name]
+        assert abs(flux - mean[k]) < PATH * mean[k] + bound * error[k], name
+
+
+def test_what_is_left_out_of_four_reflections_is_told():
+    project = scene("heliar-tronnier", (10.0, 5.0), 8.0, size=(48, 32))
+    found = {}
+    for limit in (1e-3, 1e-4):
+        quality = project.quality.replace(orders=4, order4_limit=limit)
+        rendering = render(project.replace(quality=quality, output=Output(starburst=False)))
+        facts = found[limit] = rendering.summary["ghosts.order4"]
+        assert [layer.name for layer in rendering.layers] == ["beauty", "ghosts", "ghosts.order4"]
+        assert any("ghosts of four reflections were drawn" in remark for remark in rendering.remarks)
+        assert facts["left_out"] > 0
+    assert found[1e-3]["drawn"] < found[1e-4]["drawn"]
+    assert found[1e-3]["left_out_share"] > found[1e-4]["left_out_share"] > 0.0
 
 
 @pytest.mark.slow

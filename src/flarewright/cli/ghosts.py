@@ -50,10 +50,14 @@ def ghosts(
         str | None,
         typer.Option(metavar="SEED[:UM:ARCMIN[:NM]]", help="One sample of the lens within tolerances."),
     ] = None,
+    orders: Annotated[int, typer.Option(help="2; 4 also lists ghosts of four reflections.")] = 2,
+    order4_limit: Annotated[
+        float, typer.Option(help="Of those, list what carries more than this part of the two-reflection light.")
+    ] = 1e-4,
     brightest: Annotated[int | None, typer.Option(min=1, help="List only so many.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
-    """Tell for every two-reflection path what it carries and where it lands.
+    """Tell for every two-reflection path, and on request for those of four, what it carries and where it lands.
 
     Rays are traced, not paraxial, to the unbounded sensor plane. The throughput is the flux on it when the light gives
     an irradiance of 1 on a plane facing it; the peak irradiance is relative to the direct image's flux.
@@ -66,6 +70,12 @@ def ghosts(
         raise ProjectError(f"--wavelength-nm {wavelength_nm:g} is not visible light; choose one between 380 and 780 nm")
     if paths not in ("all", "same-side"):
         raise ProjectError(f"--paths {paths!r} is unknown; choose all or same-side")
+    if orders not in (2, 4):
+        raise ProjectError(f"--orders {orders} is unknown; choose 2 or 4")
+    if not 0.0 < order4_limit < 1.0:
+        raise ProjectError(
+            f"--order4-limit {order4_limit:g} is no part of the light; choose between 0 and 1, like 1e-4"
+        )
     choice = parse_coating_choice(coating)
     f_number = chosen_fstop(fstop)
 
@@ -101,6 +111,8 @@ def ghosts(
         imperfection=sample,
         filter_plate=in_front,
         cover_glass=behind,
+        orders=orders,
+        order4_limit=order4_limit,
         remarks=remarks,
     )
     tell(dict.fromkeys(remarks))
@@ -128,6 +140,7 @@ def as_data(table: GhostTable, brightest: int | None = None) -> dict[str, Any]:
             {
                 "first_reflection": row.first_reflection,
                 "second_reflection": row.second_reflection,
+                **({"later_reflections": list(row.later_reflections)} if row.later_reflections else {}),
                 "throughput_mm2": row.throughput_mm2,
                 "centroid_mm": list(row.centroid_mm),
                 "rms_radius_mm": row.rms_radius_mm,
@@ -156,7 +169,7 @@ def _print_table(table: GhostTable, name: str, angles: tuple[float, float], brig
     direct = table.direct
     out.add_row("direct", *_cells(direct, direct), end_section=True)
     for row in table.ghosts[:brightest]:
-        out.add_row(f"{row.first_reflection}-{row.second_reflection}", *_cells(row, direct))
+        out.add_row(row.name, *_cells(row, direct))
     console().print(out)
 
 

@@ -221,6 +221,16 @@ def render(
     threads: Annotated[
         int | None, typer.Option(min=1, help="All cores when left out; pixels do not change.", rich_help_panel=_WORK)
     ] = None,
+    orders: Annotated[
+        int | None, typer.Option(help="2; 4 also draws ghosts of four reflections (final).", rich_help_panel=_WORK)
+    ] = None,
+    order4_limit: Annotated[
+        float | None,
+        typer.Option(
+            help="Of those, draw what carries more than this part of the two-reflection light (1e-4).",
+            rich_help_panel=_WORK,
+        ),
+    ] = None,
     seed: Annotated[
         int | None, typer.Option(help="Begins all random numbers: rays, dirt, rough edges.", rich_help_panel=_REFERENCE)
     ] = None,
@@ -295,6 +305,7 @@ def render(
         focus=focus, size=size, sensor=sensor, sensor_distance=sensor_distance, quality=quality,
         wavelengths=wavelengths, paths=paths, layers=layers, brightest=brightest, no_starburst=no_starburst,
         colorspace=colorspace, half=half, mute=mute or [], solo=solo or [], gain=gain or [], physical=physical,
+        orders=orders, order4_limit=order4_limit,
         seed=seed, error=error, error_of=error_of, samples=samples, resumed=None if state is None else state.project,
         scatter=scatter, surface_roughness=surface_roughness, cleanliness=cleanliness,
         zoom=zoom, filter_plate=filter_plate, imperfection=imperfection, ghost_offset=ghost_offset,

@@ -46,6 +46,8 @@ _FLAG_OF = {
     "quality.mode": "--quality",
     "quality.wavelengths": "--wavelengths",
     "quality.paths": "--paths",
+    "quality.orders": "--orders",
+    "quality.order4_limit": "--order4-limit",
     "quality.seed": "--seed",
     "quality.reference_error": "--error",
     "quality.reference_error_of": "--error-of",
@@ -108,6 +110,8 @@ class Flags:
     scatter: str | None = None
     surface_roughness: float | None = None
     cleanliness: float | None = None
+    orders: int | None = None
+    order4_limit: float | None = None
     seed: int | None = None
     error: float | None = None
     error_of: str | None = None
@@ -204,6 +208,8 @@ def _sections(flags: Flags) -> dict[str, dict[str, Any]]:
             "mode": flags.quality,
             "wavelengths": flags.wavelengths,
             "paths": flags.paths,
+            "orders": flags.orders,
+            "order4_limit": flags.order4_limit,
             "seed": flags.seed,
             "reference_error": flags.error,
             "reference_error_of": flags.error_of,

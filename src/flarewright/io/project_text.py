@@ -43,6 +43,8 @@ ABOUT = {
     "quality.mode": '"draft": paraxial matrices, "final": traced ray bundles, "reference": random rays, all orders',
     "quality.wavelengths": "3 for a draft of the colours, 7 to 31 for final pictures",
     "quality.paths": '"all" or "same-side" of the stop',
+    "quality.orders": "4 also draws ghosts of four reflections (final)",
+    "quality.order4_limit": "of those, what carries more than this part of the two-reflection light",
     "quality.seed": "begins the random numbers",
     "quality.reference_error": "where reference quality ends: relative standard error of the ghosts",
     "quality.reference_error_of": '"total": of their flux in the picture, "blocks": of blocks of 16 x 16 pixels',

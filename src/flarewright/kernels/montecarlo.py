@@ -26,7 +26,7 @@ SPLIT_BELOW = 0.5
 STACK = 512
 
 # columns of a waiting ray
-_X, _Y, _Z, _DX, _DY, _DZ, _WEIGHT, _ROW, _HEADING, _ORDER, _FIRST, _SECOND = range(12)
+_X, _Y, _Z, _DX, _DY, _DZ, _WEIGHT, _ROW, _HEADING, _ORDER, _ROWS = range(11)
 
 
 @inner
@@ -66,8 +66,8 @@ def _cross(curvature, conic, row, vertex, x, y, z, dx, dy, dz, heading, eta):
 @compiled
 def trace_batch(
     curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, rows, direction, axes, box, side,
-    cumulative, luminances, rgbs, heroes, boost, key, batch, light, blades, mask, half, to_pixels, size,
-    planes, tallies, paths,
+    cumulative, luminances, rgbs, heroes, boosts, key, batch, light, blades, mask, half, to_pixels, size,
+    planes, tallies, paths, fours,
 ):  # fmt: skip
     """Trace one batch of points of the front, each at several wavelengths, through all orders of reflection.
 
@@ -99,8 +99,8 @@ def trace_batch(
         Colour of each sample over its chance.
     heroes : int
         Wavelengths traced from each point, evenly spread over the chances.
-    boost : float
-        Chance over reflectance of a reflection's being followed, from the third on.
+    boosts : ndarray, shape (2,)
+        Chance over reflectance of a reflection's being followed: of the third and fourth, and of later ones.
     key : ndarray, shape (2,), uint64
     batch, light : int
         Which stream of random numbers.
@@ -115,6 +115,14 @@ def trace_batch(
         Added to: luminous flux by what became of it.
     paths : ndarray, shape (2, K, K)
         Added to: luminous flux of two reflections by their rows (j, i), in the picture and beside it.
+    fours : ndarray, shape (N, 2)
+        Filled with rays of four reflections that fell into the picture, as long as there is room: their rows as one
+        number, the first times K^3 and so on, and their luminous flux. Of length 0 when nobody asks.
+
+    Returns
+    -------
+    int
+        How many such rays there were, room or not.
 
     Notes
     -----
@@ -126,9 +134,10 @@ def trace_batch(
     unit = (box[1] - box[0]) * (box[3] - box[2]) / (points * heroes)
     cell_x, cell_y = (box[1] - box[0]) / side, (box[3] - box[2]) / side
     stream, pool = np.empty(6, dtype=np.uint64), np.empty(4)
-    stack = np.empty((STACK, 12))
+    stack = np.empty((STACK, 11))
     start = np.empty(5)
     stream[4], stream[5] = key[0], key[1]
+    noted = 0
     for point in range(points):
         stream[0], stream[1] = np.uint64(0), np.uint64(point)
         stream[2], stream[3] = np.uint64(batch), np.uint64(2 * light)
@@ -153,19 +162,21 @@ def trace_batch(
                 s += 1
             stream[0], stream[1] = np.uint64(0), np.uint64(point * heroes + hero)
             stream[2], stream[3] = np.uint64(batch), np.uint64(2 * light + 1)
-            _trace_tree(
+            noted = _trace_tree(
                 curvature, conic, z_vertex, inv_semi, n_gap[s], reflectance[s], sensor_z, rows[0], start,
-                amount, luminances[s], rgbs[s], boost, stream, pool, stack, blades, mask, half, to_pixels, size,
-                planes, tallies, paths,
+                amount, luminances[s], rgbs[s], boosts, stream, pool, stack, blades, mask, half, to_pixels, size,
+                planes, tallies, paths, fours, noted,
             )  # fmt: skip
+    return noted
 
 
 @inner
 def _trace_tree(
     curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, stop_row, start,
-    unit, luminance, rgb, boost, stream, pool, stack, blades, mask, half, to_pixels, size, planes, tallies, paths,
+    unit, luminance, rgb, boosts, stream, pool, stack, blades, mask, half, to_pixels, size, planes, tallies, paths,
+    fours, noted,
 ):  # fmt: skip
-    """Follow one ray and everything that splits off it."""
+    """Follow one ray and everything that splits off it; return the number of rays of four reflections so far."""
     count = curvature.shape[0]
     samples = reflectance.shape[1]
     bright = unit * luminance
@@ -173,7 +184,8 @@ def _trace_tree(
     drawn = 4
     x, y, z, dx, dy, dz = start[0], start[1], 0.0, start[2], start[3], start[4]
     weight = 1.0
-    row, heading, order, first, second = np.int64(0), np.int64(1), np.int64(0), np.int64(0), np.int64(0)
+    # the rows of the first four reflections stand in one number
+    row, heading, order, mirrors = np.int64(0), np.int64(1), np.int64(0), np.int64(0)
     waiting = 0
     steps = 0
     while True:
@@ -183,10 +195,14 @@ def _trace_tree(
             ended = True
         elif row >= count:
             t = (sensor_z - z) / dz
-            _land(
-                x + t * dx, y + t * dy, order, first, second, bright * weight, unit * weight, rgb, to_pixels, size,
+            seen = _land(
+                x + t * dx, y + t * dy, order, mirrors, bright * weight, unit * weight, rgb, to_pixels, size,
                 planes, tallies, paths,
             )  # fmt: skip
+            if seen and order == 4:
+                if noted < fours.shape[0]:
+                    fours[noted, 0], fours[noted, 1] = mirrors, bright * weight
+                noted += 1
             ended = True
         elif steps >= MOST_STEPS:
             tallies[LOST] += bright * weight
@@ -225,7 +241,7 @@ def _trace_tree(
                 up, on = 0.0, 1.0 - R
                 if R > 0.0:
                     # beyond these the light is split: R and 1 - R
-                    chance = 1.0 if order < 2 else min(1.0, boost * R)
+                    chance = 1.0 if order < 2 else min(1.0, boosts[0 if order < 4 else 1] * R)
                     alone = (order >= 2 and R > SPLIT_BELOW) or waiting == STACK
                     up = R
                     if alone or chance < 1.0:
@@ -249,7 +265,7 @@ def _trace_tree(
                     ray[_X], ray[_Y], ray[_Z], ray[_DX], ray[_DY], ray[_DZ] = x, y, z, rx, ry, rz
                     ray[_WEIGHT], ray[_ROW], ray[_HEADING] = weight * up, row - heading, -heading
                     ray[_ORDER] = order + 1
-                    ray[_FIRST], ray[_SECOND] = row if order == 0 else first, row if order == 1 else second
+                    ray[_ROWS] = mirrors * count + row if order < 4 else mirrors
                     waiting += 1
                 if on > 0.0:
                     weight *= on
@@ -258,7 +274,7 @@ def _trace_tree(
                 elif up > 0.0:
                     weight *= up
                     dx, dy, dz = rx, ry, rz
-                    first, second = row if order == 0 else first, row if order == 1 else second
+                    mirrors = mirrors * count + row if order < 4 else mirrors
                     order += 1
                     heading = -heading
                     row += heading
@@ -266,24 +282,26 @@ def _trace_tree(
                     ended = True
         if ended:
             if waiting == 0:
-                return
+                return noted
             waiting -= 1
             ray = stack[waiting]
             x, y, z, dx, dy, dz = ray[_X], ray[_Y], ray[_Z], ray[_DX], ray[_DY], ray[_DZ]
             weight, row, heading = ray[_WEIGHT], np.int64(ray[_ROW]), np.int64(ray[_HEADING])
-            order, first, second = np.int64(ray[_ORDER]), np.int64(ray[_FIRST]), np.int64(ray[_SECOND])
+            order, mirrors = np.int64(ray[_ORDER]), np.int64(ray[_ROWS])
             steps = 0
 
 
 @inner
-def _land(x, y, order, first, second, bright, amount, rgb, to_pixels, size, planes, tallies, paths):
-    """Put light on the sensor's plane: into a pixel if it meets one."""
+def _land(x, y, order, mirrors, bright, amount, rgb, to_pixels, size, planes, tallies, paths):
+    """Put light on the sensor's plane: into a pixel if it meets one; tell whether it does."""
     column, line = to_pixels[0] - to_pixels[2] * x, to_pixels[1] + to_pixels[3] * y
     inside = 0.0 <= column < size[0] and 0.0 <= line < size[1]
     kind = min(order // 2, 3)
     tallies[(IN_PICTURE if inside else BESIDE) + kind] += bright
     if order == 2:
-        paths[0 if inside else 1, first, second] += bright
+        count = paths.shape[1]
+        paths[0 if inside else 1, mirrors // count, mirrors % count] += bright
     if inside and order > 0 and planes.shape[2] > 0:
         for channel in range(3):
             planes[min(kind, 2) - 1, channel, int(line), int(column)] += amount * rgb[channel]
+    return inside

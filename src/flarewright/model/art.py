@@ -10,10 +10,12 @@ from pydantic import AfterValidator, Field, model_validator
 
 from .base import Frozen
 
+_ROW = r"(?:sensor|\d+)"
 SELECTOR = re.compile(
     r"(?P<opposite>not\s+)?"
     r"(?:(?P<all>all)|row:(?P<row>\d{1,4})|largest:(?P<largest>\d{1,6})|brightest:(?P<brightest>\d{1,6})|"
-    r"bounded:(?P<bounded>stop|entrance)|(?P<names>(?:sensor|\d+)(?:-\d+)+(?:,(?:sensor|\d+)(?:-\d+)+)*))"
+    r"bounded:(?P<bounded>stop|entrance)|"
+    rf"(?P<names>{_ROW}(?:-{_ROW})+(?:,{_ROW}(?:-{_ROW})+)*))"
 )
 """How ghosts are chosen; what each form means stands at `Rule`."""
 
@@ -47,7 +49,8 @@ class Rule(Frozen):
     select : str
         "all"; path names "7-3" or "7-3,8-2"; "row:7": paths that reflect at row 7; "brightest:5", "largest:10": by
         throughput and by rms radius as `flarewright ghosts` lists them; "bounded:stop", "bounded:entrance": by what
-        it says bounds them; "not " before any of these: all others.
+        it says bounds them; "not " before any of these: all others. Ghosts of four reflections are named like
+        "7-3-5-2", and are never among the largest or brightest.
     enable : bool or None
         False leaves the ghosts out, True brings back what an earlier rule left out.
     gain : float

@@ -15,8 +15,9 @@ class Layer:
     Attributes
     ----------
     name : str
-        "beauty", "starburst", "ghosts", or "ghost.J-I" for a single path; reference quality adds "ghosts.order4+", and
-        ".variance" behind a name holds the variance of its pixels.
+        "beauty", "starburst", "ghosts", or "ghost.J-I" for a single path; four reflections are in
+        "ghosts.order4" and "ghost.J-I-K-L"; reference quality has "ghosts.order4+", and ".variance" behind a name holds
+        the variance of its pixels.
     pixels : ndarray, shape (height, width, 3), float32
         RGB inside the window; row 0 is the top of the upright picture.
     window : tuple of int

@@ -68,6 +68,10 @@ class Quality(Frozen):
         The bundle's grid is refined until interpolation errs by less than this, in pixels.
     cull : float
         Paths that carry less than this part of all ghost flux are left out, and said so.
+    orders : {2, 4}
+        4 also draws four-reflection ghosts (final only); reference quality has all orders in any case.
+    order4_limit : float
+        Of those only paths that carry more than this part of all two-reflection light in the picture.
     seed : int
         Begins the random numbers.
     reference_error : float
@@ -84,6 +88,8 @@ class Quality(Frozen):
     paths: Literal["all", "same-side"] = "all"
     tolerance_px: float = Field(0.25, gt=0.0, le=10.0)
     cull: float = Field(0.0, ge=0.0, lt=1.0)
+    orders: Literal[2, 4] = 2
+    order4_limit: float = Field(1e-4, gt=0.0, lt=1.0)
     seed: int = Field(0, ge=0, lt=2**63)
     reference_error: float = Field(0.02, gt=0.0, le=1.0)
     reference_error_of: Literal["total", "blocks"] = "blocks"

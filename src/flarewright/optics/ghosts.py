@@ -1,4 +1,4 @@
-"""The ghost analysis: what every two-reflection path carries, where it lands, how large and how bright it is."""
+"""The ghost analysis: what every path carries, where it lands, how large and how bright it is."""
 
 from __future__ import annotations
 
@@ -23,6 +23,7 @@ from .paraxial import D_LINE_NM, FirstOrder, first_order, path_matrices
 from .paths import LightPath, direct_path, ghost_paths
 
 Floats = NDArray[np.float64]
+Mirror = int | Literal["sensor"]
 
 # pixels per rms radius for tracing, and the side of the grid on which a peak is looked for
 RESOLUTION = 100.0
@@ -44,7 +45,7 @@ class GhostRow:
     Attributes
     ----------
     first_reflection, second_reflection : int or None
-        Rows j, then i < j; None for the direct image. The sensor as the first mirror is "sensor".
+        Rows j, then i < j; None for the direct image. The sensor as a mirror is "sensor".
     throughput_mm2 : float
         Flux on the unbounded sensor plane when the light gives irradiance 1 on a plane facing it.
     centroid_mm : tuple of float
@@ -61,9 +62,11 @@ class GhostRow:
         (docs/physics.md).
     focus_distance_mm : float or None
         Where the path focuses a distant light, mm behind the sensor (negative: in front); None for an afocal path.
+    later_reflections : tuple
+        Rows of the third and fourth mirror of a four-reflection path.
     """
 
-    first_reflection: int | Literal["sensor"] | None
+    first_reflection: Mirror | None
     second_reflection: int | None
     throughput_mm2: float
     centroid_mm: tuple[float, float]
@@ -72,6 +75,14 @@ class GhostRow:
     peak_patch_mm: float
     bounded_by: str
     focus_distance_mm: float | None
+    later_reflections: tuple[Mirror, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """Name of the path, as that of its layer in a render."""
+        if self.first_reflection is None:
+            return "direct"
+        return "-".join(map(str, (self.first_reflection, self.second_reflection, *self.later_reflections)))
 
 
 @dataclass(frozen=True)
@@ -85,7 +96,8 @@ class GhostTable:
     wavelength_nm : float
     direct : GhostRow
     ghosts : tuple of GhostRow
-        Every path, brightest (by throughput) first; paths that pass no light have throughput 0.
+        Every two-reflection path and the others asked for, brightest (by throughput) first; paths that pass no light
+        have throughput 0.
     """
 
     efl: float
@@ -110,6 +122,7 @@ def ghost_table(
     sensor_distance: float | None = None,
     focus_distance: float | None = None,
     sensor: SensorMirror | None = None,
+    others: Sequence[LightPath] = (),
     threads: int | None = None,
 ) -> GhostTable:
     """Analyse every ghost of a lens for one distant light.
@@ -130,6 +143,8 @@ def ghost_table(
         Override the lens file's, mm.
     sensor : SensorMirror, optional
         The sensor reflects too: adds the paths "sensor-i".
+    others : sequence of LightPath
+        Further paths to analyse, of four reflections.
     threads : int, optional
         None: all cores; the numbers do not depend on it.
 
@@ -148,7 +163,7 @@ def ghost_table(
     packed = pack_lens(lens, order, coatings, np.array([wavelength_nm]), sensor=sensor)
     light = incidence(field_deg)
     packed = facing(packed, light.axes)
-    todo = (direct_path(lens), *ghost_paths(lens, paths, sensor=sensor is not None))
+    todo = (direct_path(lens), *ghost_paths(lens, paths, sensor=sensor is not None), *others)
     with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
         measured = list(pool.map(lambda path: _measure(lens, packed, path, light), todo))
     direct = measured[0]
@@ -177,9 +192,10 @@ def _measure(lens: Lens, packed: PackedLens, path: LightPath, light: Incidence) 
     bounded_by, focus = _paraxial_facts(lens, packed, path)
     blades = blade_edges(Iris(), packed.stop_semi)
     region = find_region(packed, path, light.tilt, packed.stop_semi)
-    j: int | Literal["sensor"] | None = "sensor" if path.sensor else path.first_reflection
-    i = path.second_reflection
-    nothing = GhostRow(j, i, 0.0, (0.0, 0.0), 0.0, 0.0, 0.0, bounded_by, focus)
+    mirrors: list[Mirror] = ["sensor" if row == len(lens.rows) else row for row in path.mirrors]
+    j, i = (mirrors[0], path.second_reflection) if mirrors else (None, None)
+    later = tuple(mirrors[2:])
+    nothing = GhostRow(j, i, 0.0, (0.0, 0.0), 0.0, 0.0, 0.0, bounded_by, focus, later)
     if region is None:
         return nothing
     bundle = _grid(packed, path, light, region, 1e-6)
@@ -198,7 +214,7 @@ def _measure(lens: Lens, packed: PackedLens, path: LightPath, light: Incidence) 
         middle, reach = np.array([x, y]), 4.0 * rms
     peak, patch = _peak(bundle, data, blades, light, (float(middle[0]), float(middle[1])), reach)
     flux = float(sums[0] * light.cosine)
-    return GhostRow(j, i, flux, (float(x), float(y)), rms, peak, patch, bounded_by, focus)
+    return GhostRow(j, i, flux, (float(x), float(y)), rms, peak, patch, bounded_by, focus, later)
 
 
 def _grid(packed: PackedLens, path: LightPath, light: Incidence, region: Region, scale: float) -> Bundle:

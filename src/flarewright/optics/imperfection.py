@@ -126,6 +126,6 @@ def ghost_offset(path: LightPath, sample: Imperfection | None) -> tuple[float, f
     """
     if sample is None or sample.ghost_offset_mm == 0.0:
         return 0.0, 0.0
-    generator = np.random.default_rng([sample.seed, 2, path.first_reflection or 0, path.second_reflection or 0])
+    generator = np.random.default_rng([sample.seed, 2, *path.mirrors])
     right, up = sample.ghost_offset_mm * generator.standard_normal(2)
     return float(right), float(up)

@@ -1,4 +1,4 @@
-"""Which way the light goes: the direct path and every two-reflection path, as steps over the rows."""
+"""Which way the light goes: the direct path and paths of two and four reflections, as steps over the rows."""
 
 from __future__ import annotations
 
@@ -19,11 +19,13 @@ class LightPath:
     Attributes
     ----------
     first_reflection, second_reflection : int or None
-        Rows of the two mirrors (j, then i < j); None for the direct path.
+        Rows of the first two mirrors (j, then i < j); None for the direct path.
     rows, actions : ndarray, shape (S,), int64
         Row of each step; REFRACT, REFLECT or STOP.
     sensor : bool
-        The first mirror is the sensor, which stands as one row more behind the lens' own.
+        One of the mirrors is the sensor, which stands as one row more behind the lens' own.
+    later_reflections : tuple of int
+        Rows of the third and fourth mirror of a four-reflection path.
     """
 
     first_reflection: int | None
@@ -31,37 +33,52 @@ class LightPath:
     rows: NDArray[np.int64]
     actions: NDArray[np.int64]
     sensor: bool = False
+    later_reflections: tuple[int, ...] = ()
+
+    @property
+    def mirrors(self) -> tuple[int, ...]:
+        """Rows of all mirrors, in the order in which light meets them."""
+        if self.first_reflection is None or self.second_reflection is None:
+            return ()
+        return (self.first_reflection, self.second_reflection, *self.later_reflections)
 
     @property
     def name(self) -> str:
-        """Name of the path: "j-i", "sensor-i", or "direct"."""
+        """Name of the path: "j-i", "j-i-k-l", with "sensor" for the sensor's row, or "direct"."""
         if self.first_reflection is None:
             return "direct"
-        return f"{'sensor' if self.sensor else self.first_reflection}-{self.second_reflection}"
+        # the sensor lies behind every surface, so among the mirrors of a path it has the greatest row
+        last = max(self.mirrors) if self.sensor else None
+        return "-".join("sensor" if row == last else str(row) for row in self.mirrors)
 
     @cached_property
     def stop_crossings(self) -> int:
-        """How often the path crosses the stop: 1 or 3."""
+        """How often the path crosses the stop: 1, 3 or 5."""
         return int(np.count_nonzero(self.actions == STOP))
 
 
-def _path(lens: Lens, legs: tuple[range, ...], mirrors: tuple[int, ...]) -> LightPath:
+def _path(lens: Lens, mirrors: tuple[int, ...]) -> LightPath:
+    """Go to and fro between mirrors; row len(lens.rows) is the sensor."""
+    count = len(lens.rows)
     rows: list[int] = []
     actions: list[int] = []
-    for number, leg in enumerate(legs):
-        for row in leg:
-            rows.append(row)
-            actions.append(STOP if isinstance(lens.rows[row], Stop) else REFRACT)
+    start, heading = 0, 1
+    for end in (*mirrors, None):
+        leg = range(start, count if end is None else end + heading, heading)
+        rows += leg
+        actions += [STOP if row < count and isinstance(lens.rows[row], Stop) else REFRACT for row in leg]
         # every leg but the last ends at a mirror
-        if number < len(mirrors):
+        if end is not None:
             actions[-1] = REFLECT
-    first, second = mirrors if mirrors else (None, None)
-    return LightPath(first, second, np.array(rows, dtype=np.int64), np.array(actions, dtype=np.int64))
+            start, heading = end - heading, -heading
+    first, second = mirrors[:2] if mirrors else (None, None)
+    steps = np.array(rows, dtype=np.int64), np.array(actions, dtype=np.int64)
+    return LightPath(first, second, *steps, count in mirrors, mirrors[2:])
 
 
 def direct_path(lens: Lens) -> LightPath:
     """Return the path that makes the picture: every row once, no reflection."""
-    return _path(lens, (range(len(lens.rows)),), ())
+    return _path(lens, ())
 
 
 def ghost_path(lens: Lens, j: int, i: int) -> LightPath:
@@ -77,8 +94,7 @@ def ghost_path(lens: Lens, j: int, i: int) -> LightPath:
     -------
     LightPath
     """
-    legs = (range(j + 1), range(j - 1, i - 1, -1), range(i + 1, len(lens.rows)))
-    return _path(lens, legs, (j, i))
+    return _path(lens, (j, i))
 
 
 def sensor_path(lens: Lens, i: int) -> LightPath:
@@ -95,12 +111,23 @@ def sensor_path(lens: Lens, i: int) -> LightPath:
     LightPath
         The sensor is row len(lens.rows) of its steps.
     """
-    count = len(lens.rows)
-    there, back, again = range(count), range(count - 1, i - 1, -1), range(i + 1, count)
-    rows = [*there, count, *back, *again]
-    actions = [STOP if row < count and isinstance(lens.rows[row], Stop) else REFRACT for row in rows]
-    actions[count] = actions[count + len(back)] = REFLECT
-    return LightPath(count, i, np.array(rows, dtype=np.int64), np.array(actions, dtype=np.int64), sensor=True)
+    return _path(lens, (len(lens.rows), i))
+
+
+def four_path(lens: Lens, j: int, i: int, k: int, m: int) -> LightPath:
+    """Return the path that reflects at rows j, i < j, k > i and m < k, in this order.
+
+    Parameters
+    ----------
+    lens : Lens
+    j, i, k, m : int
+        Rows, none of them the stop; j and k may be the sensor, row len(lens.rows).
+
+    Returns
+    -------
+    LightPath
+    """
+    return _path(lens, (j, i, k, m))
 
 
 def ghost_paths(lens: Lens, which: str = "all", *, sensor: bool = False) -> tuple[LightPath, ...]:

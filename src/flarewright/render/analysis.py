@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
 
 from ..errors import ProjectError
 from ..model import CoatingChoice, Imperfection, Lens, Plate
 from ..optics.ghosts import GhostTable, ghost_table
-from ..optics.pack import SensorMirror
+from ..optics.pack import SensorMirror, pack_lens, resolve_coatings
 from ..optics.paraxial import D_LINE_NM, FirstOrder
 from .prepare import as_lens, build, first_order
+
+if TYPE_CHECKING:
+    from .four_reflections import FourReflections
 
 
 def paraxial(
@@ -58,6 +65,8 @@ def ghosts(
     cover_glass: Plate | None = None,
     sensor_reflectance: float = 0.0,
     imperfection: Imperfection | None = None,
+    orders: int = 2,
+    order4_limit: float = 1e-4,
     remarks: list[str] | None = None,
     threads: int | None = None,
 ) -> GhostTable:
@@ -85,6 +94,10 @@ def ghosts(
         Above 0 the sensor, unbounded here, is a mirror too, and there are paths "sensor-i".
     imperfection : Imperfection, optional
         One sample of the lens within tolerances.
+    orders : {2, 4}
+        4 adds ghosts of four reflections.
+    order4_limit : float
+        Of those only paths that carry more than this part of all two-reflection light on the unbounded sensor plane.
     remarks : list of str, optional
         What is assumed on the way, and which rows a filter and a cover glass are, is appended to it.
     threads : int, optional
@@ -106,10 +119,23 @@ def ghosts(
     )  # fmt: skip
     if remarks is not None:
         remarks.extend(built.remarks)
-    first_order(built.lens, f_number)  # refuses an f-number that the lens does not open to
     if not 0.0 <= sensor_reflectance <= 1.0:
         raise ProjectError(f"a sensor reflects between 0 and 1 of the light, not {sensor_reflectance:g}")
-    return ghost_table(
+    if orders not in (2, 4) or not 0.0 < order4_limit < 1.0:
+        raise ProjectError(f"orders are 2 or 4, not {orders}, and their limit lies between 0 and 1: {order4_limit:g}")
+    # refuses an f-number that the lens does not open to
+    order = first_order(
+        built.lens, f_number, sensor_distance=built.sensor_distance, focus_distance=built.focus_distance
+    )
+    sensor = SensorMirror(sensor_reflectance) if sensor_reflectance > 0.0 else None
+    found = None
+    if orders == 4:
+        from .four_reflections import find_fours_everywhere
+
+        coatings = resolve_coatings(built.lens, built.coating)
+        packed = pack_lens(built.lens, order, coatings, np.array([wavelength_nm]), sensor=sensor)
+        found = find_fours_everywhere(built.lens, packed, field_deg, order4_limit, which=paths, threads=threads)
+    table = ghost_table(
         built.lens,
         field_deg,
         f_number=f_number,
@@ -118,6 +144,21 @@ def ghosts(
         paths=paths,
         sensor_distance=built.sensor_distance,
         focus_distance=built.focus_distance,
-        sensor=SensorMirror(sensor_reflectance) if sensor_reflectance > 0.0 else None,
+        sensor=sensor,
+        others=() if found is None else found.paths,
         threads=threads,
     )
+    return table if found is None else _above(table, found, order4_limit, remarks)
+
+
+def _above(table: GhostTable, found: FourReflections, limit: float, remarks: list[str] | None) -> GhostTable:
+    """Leave out four-reflection rows below the limit, and tell what is missing."""
+    two = sum(row.throughput_mm2 for row in table.ghosts if not row.later_reflections)
+    rows = [row for row in table.ghosts if not row.later_reflections or row.throughput_mm2 > limit * two]
+    if remarks is not None:
+        dark, part = found.left_out({row.name for row in rows})
+        remarks.append(
+            f"ghosts of four reflections carry {found.share:.2%} of what those of two do; {dark} fainter ones with "
+            f"{part:.1%} of that are not listed"
+        )
+    return replace(table, ghosts=tuple(rows))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import pairwise
 from math import hypot
 from typing import Any
 
@@ -157,12 +158,14 @@ def directed(project: Project) -> bool:
     return not art.physical and bool(art.rules or art.gain or moved)
 
 
-def resolve_art(settled: Settled) -> ResolvedArt:
+def resolve_art(settled: Settled, fours: tuple[LightPath, ...] | None = None) -> ResolvedArt:
     """Find out which ghosts the rules choose, and add up what they change; offsets by chance come first.
 
     Parameters
     ----------
     settled : Settled
+    fours : tuple of LightPath, optional
+        Ghosts of four reflections, which no rule counts among the largest or brightest. None: all of two are asked for.
 
     Returns
     -------
@@ -177,7 +180,8 @@ def resolve_art(settled: Settled) -> ResolvedArt:
     art, project = settled.project.art, settled.project
     if not directed(project):
         return ResolvedArt()
-    facts = _Facts(settled, ghost_paths(settled.lens, project.quality.paths, sensor=settled.sensor is not None))
+    paths = ghost_paths(settled.lens, project.quality.paths, sensor=settled.sensor is not None)
+    facts = _Facts(settled, paths if fours is None else fours)
     found = {path.name: replace(PLAIN, offset=ghost_offset(path, project.imperfection)) for path in facts.paths}
     across = project.camera.size_px[0] / project.camera.sensor[0]
     down = project.camera.size_px[1] / project.camera.sensor[1]
@@ -191,8 +195,8 @@ def resolve_art(settled: Settled) -> ResolvedArt:
                 f"art.rules: ghost {name} is blurred by {changed.blur:g} mm, more than an eighth of the sensor's "
                 f"width; keep the blur below {widest:g} mm ({widest * across:.0f} pixels)"
             )
-    paths = {name: changed for name, changed in found.items() if changed != PLAIN}
-    return ResolvedArt(paths, {name: gain for name, gain in art.gain.items() if gain != 1.0})
+    changes = {name: changed for name, changed in found.items() if changed != PLAIN}
+    return ResolvedArt(changes, {name: gain for name, gain in art.gain.items() if gain != 1.0})
 
 
 def graded(layer: Layer, gain: float) -> Layer:
@@ -246,13 +250,28 @@ class _Facts:
             for light in project.lights
         ]
 
+    def may_be(self, name: str) -> bool:
+        """Tell whether a name that is not among the paths is one of another number of reflections."""
+        quality, lens = self.settled.project.quality, self.settled.lens
+        count = len(lens.rows)
+        rows = [count if row == "sensor" else int(row) for row in name.split("-")]
+        if ("sensor" in name and self.settled.sensor is None) or str(count) in name.split("-"):
+            return False
+        if len(rows) not in (2, 4) or quality.orders == 2 or max(rows) > count or lens.stop_row in rows:
+            return False
+        if quality.paths != "all" and len({row < lens.stop_row for row in rows}) > 1:
+            return False
+        return all((b < a) == (k % 2 == 0) and a != b for k, (a, b) in enumerate(pairwise(rows)))
+
     def ranked(self, measure: str) -> list[str]:
         """Names by throughput of all lights together, or by the largest rms radius; dark paths are left out."""
         score: dict[str, float] = dict.fromkeys(self.names, 0.0)
         lit: set[str] = set()
+        if any(path.later_reflections for path in self.paths):
+            return []
         for table, light in zip(self.tables, self.settled.project.lights, strict=True):
             for row in table.ghosts:
-                name = f"{row.first_reflection}-{row.second_reflection}"
+                name = row.name
                 if row.throughput_mm2 * light.intensity > 0.0:
                     lit.add(name)
                     flux = row.throughput_mm2 * light.intensity
@@ -273,7 +292,7 @@ def _chosen(facts: _Facts, select: str, where: str) -> list[str]:
     lens = facts.settled.lens
     if match["names"]:
         chosen = set(match["names"].split(","))
-        if unknown := sorted(chosen - set(facts.names)):
+        if unknown := sorted(name for name in chosen - set(facts.names) if not facts.may_be(name)):
             raise ProjectError(
                 f"{where}: {lens.name} has no ghost {unknown[0]}; a path J-I reflects at row J, then at row I < J, "
                 f"both between 0 and {len(lens.rows) - 1} and neither the stop (row {lens.stop_row})"
@@ -286,7 +305,7 @@ def _chosen(facts: _Facts, select: str, where: str) -> list[str]:
                 f"{where}: nothing reflects at row {row} of {lens.name}; its surfaces are rows 0 to "
                 f"{len(lens.rows) - 1} without the stop (row {lens.stop_row})"
             )
-        chosen = {path.name for path in facts.paths if row in (path.first_reflection, path.second_reflection)}
+        chosen = {path.name for path in facts.paths if row in path.mirrors}
     elif match["bounded"]:
         chosen = {name for name, edge in facts.bounds.items() if edge == match["bounded"]}
     elif match["largest"] or match["brightest"]:

@@ -49,6 +49,11 @@ class GhostPass:
         Their part of the flux, by the pre-pass.
     muted : int
         Paths left out by hand.
+    names : tuple of str
+        Of the paths drawn.
+    level : float
+        Mean irradiance of the ghosts over the circle around the picture, by the pre-pass, per unit irradiance of the
+        light; 0 in draft quality.
     """
 
     total: Layer
@@ -58,6 +63,8 @@ class GhostPass:
     culled: int
     culled_share: float
     muted: int
+    names: tuple[str, ...] = ()
+    level: float = 0.0
 
 
 class _Meter:
@@ -82,6 +89,8 @@ def render_ghosts(
     *,
     singles: int | None = 0,
     art: Mapping[str, PathArt] | None = None,
+    level: float = 0.0,
+    faintest: float = 0.0,
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> GhostPass:
@@ -96,6 +105,11 @@ def render_ghosts(
         How many of the brightest paths also get a layer of their own; None: all.
     art : mapping of str to PathArt, optional
         What is changed by hand, by path name.
+    level : float
+        `GhostPass.level` of other ghosts of the same picture, so that these are drawn in no more detail than can be
+        seen among them (final).
+    faintest : float
+        Paths of no more than this level by themselves, whatever `art` makes of them, are left out (final).
     threads : int, optional
         None: all cores. The pixels do not depend on it.
     progress : callable, optional
@@ -114,7 +128,7 @@ def render_ghosts(
             if quality.mode == "draft":
                 done = _draft(shots, paths, singles, art, pool, meter)
             else:
-                done = _final(shots, paths, quality, singles, art, pool, meter)
+                done = _final(shots, paths, quality, singles, art, (level, faintest), pool, meter)
             return replace(done, muted=len(given) - len(paths))
         except BaseException:
             # Ctrl-C arrives here: let the workers end at their next wavelength
@@ -129,9 +143,12 @@ def _final(
     quality: Quality,
     singles: int | None,
     art: Mapping[str, PathArt],
+    levels: tuple[float, float],
     pool: ThreadPoolExecutor,
     meter: _Meter,
 ) -> GhostPass:
+    others, faintest = levels
+
     def find(path: LightPath) -> list[FinalPass]:
         if meter.cancelled.is_set():
             return []
@@ -143,8 +160,11 @@ def _final(
     found = [items for items in pool.map(find, paths) if items]
     # what lands beside the picture is neither bright nor worth keeping
     flux = np.array([sum(item.region.seen_flux * item.gain for item in items) for items in found])
-    level = _level(found)
+    own = _level(found)
+    level = own + others
     keep = _worth_drawing(flux, quality.cull)
+    if faintest > 0.0:
+        keep &= np.array([_level([items], plain=True) > faintest for items in found], dtype=np.bool_)
     order = [int(k) for k in np.argsort(-flux, kind="stable") if keep[k]]
 
     alone = set(order if singles is None else order[:singles])
@@ -173,7 +193,8 @@ def _final(
     named = [found[k][0].path for k in order]
     total, layers = _collect(shots, order, named, singles, art, draw, pool)
     share = float(flux[~keep].sum() / flux.sum()) if flux.sum() > 0.0 else 0.0
-    return GhostPass(total, layers, len(order), len(paths) - len(found), int((~keep).sum()), share, 0)
+    names = tuple(path.name for path in named)
+    return GhostPass(total, layers, len(order), len(paths) - len(found), int((~keep).sum()), share, 0, names, own)
 
 
 def _draft(
@@ -229,12 +250,31 @@ def _rank_draft(shots: Sequence[Shot], paths: Sequence[LightPath], art: Mapping[
     return [int(k) for k in np.argsort(-flux, kind="stable")]
 
 
-def _level(found: list[list[FinalPass]]) -> float:
-    """Mean irradiance of all ghosts over the circle around the picture."""
+def plain_level(shots: Sequence[Shot], paths: Sequence[LightPath], threads: int | None = None) -> float:
+    """Tell the level (`GhostPass.level`) of ghosts as they are without art direction.
+
+    Parameters
+    ----------
+    shots : sequence of Shot
+    paths : sequence of LightPath
+    threads : int, optional
+        None: all cores.
+
+    Returns
+    -------
+    float
+    """
+    with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
+        found = list(pool.map(lambda path: [item for shot in shots if (item := find_final(shot, path))], paths))
+    return _level(found)
+
+
+def _level(found: Sequence[Sequence[FinalPass]], *, plain: bool = False) -> float:
+    """Mean irradiance of all ghosts over the circle around the picture, with art's gains or without."""
     items = [item for group in found for item in group]
     if not items:
         return 0.0
-    seen = sum(item.region.seen_flux * item.gain for item in items)
+    seen = sum(item.region.seen_flux * (item.shot.light.intensity if plain else item.gain) for item in items)
     return float(seen / (np.pi * items[0].shot.view_radius ** 2))
 
 

@@ -46,7 +46,9 @@ class RaySource:
     behind: tuple[Any, ...]
 
 
-def ray_source(shot: Shot, seed: int, *, side: int, light: int) -> RaySource:
+def ray_source(
+    shot: Shot, seed: int, *, side: int, light: int, followed: tuple[float, float] = (FOLLOWED, FOLLOWED)
+) -> RaySource:
     """Prepare a light for random rays.
 
     Parameters
@@ -58,6 +60,9 @@ def ray_source(shot: Shot, seed: int, *, side: int, light: int) -> RaySource:
         A batch has side x side points of the front.
     light : int
         Its number, which keeps its random numbers apart from those of other lights.
+    followed : tuple of float
+        Reflections to follow, on average, while a ray crosses the lens once: of rays of two or three reflections, and
+        of those of more.
 
     Returns
     -------
@@ -82,7 +87,7 @@ def ray_source(shot: Shot, seed: int, *, side: int, light: int) -> RaySource:
         packed.curvature, form, packed.z_vertex, packed.inv_semi, packed.n_gap, packed.reflectance,
         packed.sensor_z, (int(np.flatnonzero(packed.inv_semi == 0.0)[0]), packed.first_surface), direction, axes, box,
         side, np.cumsum(chance), (over * rgb) @ luminance_weights(shot.colorspace), over * rgb,
-        min(HEROES, len(rgb)), FOLLOWED / total if total > 0.0 else 0.0,
+        min(HEROES, len(rgb)), np.array(followed) / max(total, 1e-9),
         np.array([seed & 0xFFFFFFFF, seed >> 32], dtype=np.uint64),
     )  # fmt: skip
     opening = shot.opening
@@ -90,7 +95,7 @@ def ray_source(shot: Shot, seed: int, *, side: int, light: int) -> RaySource:
     return RaySource(shot, before, behind)
 
 
-def run_batch(sources: Sequence[RaySource], batch: int, *, picture: bool) -> Batch:
+def run_batch(sources: Sequence[RaySource], batch: int, *, picture: bool, fours: int = 0) -> Batch:
     """Trace one batch of every light.
 
     Parameters
@@ -100,6 +105,8 @@ def run_batch(sources: Sequence[RaySource], batch: int, *, picture: bool) -> Bat
         Its number; the same number gives the same light.
     picture : bool
         Whether pixels are wanted, or numbers only.
+    fours : int
+        For how many rays of four reflections of a light there is room to begin with; 0: they are not asked for.
 
     Returns
     -------
@@ -107,17 +114,28 @@ def run_batch(sources: Sequence[RaySource], batch: int, *, picture: bool) -> Bat
         "figures", shape (15,): luminous flux by what became of it (`kernels.montecarlo`), then BALANCE and GHOSTS;
         "paths", shape (2, K, K): of two reflections, in the picture and beside it. With a picture also "planes",
         shape (2, 3, H, W), float32: flux per pixel after two reflections and after more; "blocks", shape (2, A, B):
-        luminous flux in blocks of 16 x 16 pixels, after two reflections and of all ghosts.
+        luminous flux in blocks of 16 x 16 pixels, after two reflections and of all ghosts. With `fours` also "fours",
+        shape (N, 2): the rows of four reflections as one number, and luminous flux, ray by ray.
     """
     width, height = sources[0].shot.size_px
     rows = len(sources[0].shot.packed.curvature)
     planes = np.zeros((2, 3, height if picture else 0, width if picture else 0), dtype=np.float32)
     figures, paths = np.zeros(TALLIES + 2), np.zeros((2, rows, rows))
+    notes = []
     for source in sources:
-        trace_batch(*source.before, batch, *source.behind, planes, figures[:TALLIES], paths)
+        room = np.empty((fours, 2))
+        noted = trace_batch(*source.before, batch, *source.behind, planes, figures[:TALLIES], paths, room)
+        if 0 < fours < noted:
+            # the same rays once more, for their notes only
+            room, nowhere = np.empty((noted, 2)), np.zeros((2, 3, 0, 0), dtype=np.float32)
+            aside = np.zeros(TALLIES), np.zeros_like(paths)
+            trace_batch(*source.before, batch, *source.behind, nowhere, *aside, room)
+        notes.append(room[:noted])
     figures[BALANCE] = figures[ENTERED + 1 : TALLIES].sum() - figures[ENTERED]
     figures[GHOSTS] = figures[IN_PICTURE + 1 : BESIDE].sum()
     result: Batch = {"figures": figures, "paths": paths}
+    if fours:
+        result["fours"] = np.concatenate(notes)
     if picture:
         light = np.tensordot(luminance_weights(sources[0].shot.colorspace), planes, (0, 1))
         two, more = (_in_blocks(plane) for plane in light)

@@ -19,7 +19,7 @@ from ..optics.shape import ideal
 from .art import ResolvedArt, directed, graded, resolve_art
 from .compose import beauty
 from .direct import DirectImage, defocus_mm, direct_image
-from .ghosts import render_ghosts
+from .ghosts import plain_level, render_ghosts
 from .prepare import Settled, settle
 from .scatter import dimmed, render_scatter, scatter_facts, scatter_of
 from .shot import Shot, make_opening, make_shots, soiled_opening
@@ -117,7 +117,7 @@ def render(
         scattered = {"scatter": facts}
     if project.output.starburst:
         passes.insert(0, starburst_of(settled, shots, images, mask, soil))
-    passes = [graded(layer, art.gain.get(layer.name, 1.0)) for layer in passes]
+    passes = [graded(layer, art.gain.get(layer.name.removesuffix(".order4"), 1.0)) for layer in passes]
     others = [graded(layer, art.gain.get("ghosts", 1.0)) for layer in drawn.others]
     whole = beauty(passes, project.camera.size_px)
     layers = (whole,) if project.output.layers == "beauty" else (whole, *passes, *others)
@@ -167,8 +167,56 @@ def _ghosts(
         "culled_share": ghosts.culled_share,
         "muted": ghosts.muted,
     }
-    told = (f"{ghosts.culled} ghosts that carry {ghosts.culled_share:.2e} of the ghost light were left out",)
-    return _Drawn((ghosts.total,), ghosts.singles, {"ghosts": facts}, told if ghosts.culled else ())
+    told = []
+    if ghosts.culled:
+        told.append(f"{ghosts.culled} ghosts that carry {ghosts.culled_share:.2e} of the ghost light were left out")
+    two = _Drawn((ghosts.total,), ghosts.singles, {"ghosts": facts}, tuple(told))
+    if project.quality.orders == 2:
+        return two
+    if project.quality.mode == "draft":
+        return replace(two, remarks=(*told, "draft quality has no ghosts of four reflections; final quality has"))
+    plain = plain_level(shots, paths, threads) if art.paths else ghosts.level
+    four = _fours(settled, shots, (plain, ghosts.level), singles, threads, progress)
+    return _Drawn(
+        two.passes + four.passes, two.others + four.others, {**two.facts, **four.facts}, two.remarks + four.remarks
+    )
+
+
+def _fours(
+    settled: Settled,
+    shots: tuple[Shot, ...],
+    levels: tuple[float, float],
+    singles: int | None,
+    threads: int | None,
+    progress: Progress | None,
+) -> _Drawn:
+    """Draw the ghosts of four reflections worth it beside those of two, whose levels stand without and with art."""
+    from .four_reflections import find_fours
+
+    quality = settled.project.quality
+    limit = quality.order4_limit
+    found = find_fours(settled.lens, shots, limit, quality.seed, which=quality.paths, threads=threads)
+    art = resolve_art(settled, found.paths)
+    ghosts = render_ghosts(
+        shots, found.paths, quality.replace(cull=0.0), singles=singles, art=art.paths, level=levels[1],
+        faintest=limit * levels[0], threads=threads, progress=progress,
+    )  # fmt: skip
+    muted = {name for name, changed in art.paths.items() if not changed.enabled}
+    dark, part = found.left_out(muted.union(ghosts.names))
+    facts = {
+        "drawn": ghosts.drawn,
+        "muted": ghosts.muted,
+        "left_out": dark,
+        "left_out_share": part,
+        "share_of_two_reflections": found.share,
+    }
+    told = [
+        f"{ghosts.drawn} ghosts of four reflections were drawn; {dark} fainter ones were left out, which carry "
+        f"{part:.1%} of that light, {part * found.share:.2%} of the two-reflection light"
+    ]
+    if found.short:
+        told.append(f"--order4-limit {limit:g} is so low that some ghosts above it may have been missed")
+    return _Drawn((replace(ghosts.total, name="ghosts.order4"),), ghosts.singles, {"ghosts.order4": facts}, tuple(told))
 
 
 def _reference(
