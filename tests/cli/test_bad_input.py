@@ -182,6 +182,7 @@ PROJECT_FILES = {
 
 H = ["render", "heliar-tronnier"]
 GOOD = ["--light", "10,5", "-o", "a.exr"]
+G = ["ghosts", "heliar-tronnier", "--light", "1,1"]
 REF = ["--quality", "reference"]
 
 COMMAND_LINES = {
@@ -272,6 +273,9 @@ COMMAND_LINES = {
     "negative polish": ([*H, *GOOD, "--surface-roughness", "-1"], "--surface-roughness"),
     "polish is nan": ([*H, *GOOD, "--surface-roughness", "nan"], "--surface-roughness"),
     "cleaner than clean": ([*H, *GOOD, "--cleanliness", "0"], "--cleanliness"),
+    "scatter without glare": ([*G, "--scatter", "abg"], "add --glare"),
+    "glare of unknown scatter": ([*G, "--glare", "--scatter", "fog"], "--scatter should be"),
+    "glare of negative polish": ([*G, "--glare", "--surface-roughness", "-1"], "--surface-roughness"),
     "negative dust": ([*H, *GOOD, "--dust", "-1"], "--dust"),
     "dust is nan": ([*H, *GOOD, "--dust", "nan"], "--dust"),
     "negative scratches": ([*H, *GOOD, "--scratches", "-1"], "--scratches"),

@@ -247,6 +247,7 @@ def test_a_real_draft_render(capsys, folder):
 
 def test_ghosts_json_is_the_promised_contract(capsys):
     data = call_json(capsys, "ghosts", "heliar-tronnier", "--light", "10,0", "--coating", "none")
+    assert "veiling_glare" not in data
     assert data["efl_mm"] == pytest.approx(HELIAR_EFL, abs=1e-5)
     assert data["bfl_mm"] == pytest.approx(81.315056, abs=1e-5)
     assert data["f_number"] == 3.5
@@ -260,6 +261,19 @@ def test_ghosts_json_is_the_promised_contract(capsys):
     assert all(row["first_reflection"] > row["second_reflection"] for row in data["ghosts"])
     same_side = call_json(capsys, "ghosts", "heliar-tronnier", "--light", "10,0", "--paths", "same-side")
     assert len(same_side["ghosts"]) == 13
+
+
+def test_ghosts_tells_the_veiling_glare(capsys):
+    words = ["ghosts", "triplet-pestrecov", "--light", "5,0", "--brightest", "1", "--glare"]
+    bare = call_json(capsys, *words, "--coating", "none")["veiling_glare"]
+    dusty = call_json(capsys, *words, "--coating", "modern-broadband", "--cleanliness", "300")["veiling_glare"]
+    assert bare["scatter"] == 0.0
+    assert 0.01 < bare["index"] < 0.2
+    assert dusty["ghosts"] < 0.1 * bare["ghosts"]
+    assert dusty["scatter"] > 0.0
+    assert dusty["index"] == pytest.approx(dusty["ghosts"] + dusty["scatter"] + dusty["blur"])
+    assert run(words) == 0
+    assert "veiling glare index" in capsys.readouterr().out
 
 
 def test_ghosts_table_is_for_people(capsys):

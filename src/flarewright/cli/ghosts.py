@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -12,6 +13,7 @@ from .common import chosen_fstop, console, field_angles, print_json, tell
 
 if TYPE_CHECKING:
     from ..optics.ghosts import GhostRow, GhostTable
+    from ..render.glare import VeilingGlare
 
 EPILOG = (
     "Examples:\n\nflarewright ghosts heliar-tronnier --light 10,0\n\n"
@@ -54,6 +56,14 @@ def ghosts(
     order4_limit: Annotated[
         float, typer.Option(help="Of those, list what carries more than this part of the two-reflection light.")
     ] = 1e-4,
+    glare: Annotated[bool, typer.Option("--glare", help="Also tell the veiling glare index.")] = False,
+    scatter: Annotated[
+        str | None, typer.Option(metavar="MODEL", help="For --glare: none, harvey-shack, abg, chaumond.")
+    ] = None,
+    surface_roughness: Annotated[
+        float | None, typer.Option(help="For --glare: rms roughness of the surfaces, nm.")
+    ] = None,
+    cleanliness: Annotated[float | None, typer.Option(help="For --glare: dust, level of IEST-STD-CC1246.")] = None,
     brightest: Annotated[int | None, typer.Option(min=1, help="List only so many.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
@@ -64,6 +74,7 @@ def ghosts(
     """
     from ..io.plate_text import parse_imperfection, parse_plate
     from ..io.project_file import parse_coating_choice
+    from .render_flags import scatter_flags
 
     angles = field_angles(light)
     if not (math.isfinite(wavelength_nm) and 380.0 <= wavelength_nm <= 780.0):
@@ -86,6 +97,10 @@ def ghosts(
         raise ProjectError(
             f"--sensor-reflectance {sensor_reflectance:g} is no part of the light; choose between 0 and 1"
         )
+
+    said = scatter_flags(scatter, surface_roughness, cleanliness)
+    if said is not None and not glare:
+        raise ProjectError("--scatter, --surface-roughness and --cleanliness change the glare only; add --glare")
 
     from ..render.analysis import ghosts as analyse
     from ..render.first_run import compile_for_analysis
@@ -115,11 +130,44 @@ def ghosts(
         order4_limit=order4_limit,
         remarks=remarks,
     )
+    veil = None
+    if glare:
+        settings: dict[str, Any] = {
+            "lens": prescription, "f_number": f_number, "coating": choice, "zoom": zoom, "filter": in_front,
+            "imperfection": sample, "quality": {"paths": paths}, "scatter": said,
+            "camera": {
+                "cover_glass": behind, "sensor_reflectance": sensor_reflectance, "focus_distance": focus,
+                "sensor_distance": sensor_distance,
+            },
+        }  # fmt: skip
+        veil = _glare(settings, wavelength_nm)
     tell(dict.fromkeys(remarks))
     if as_json:
-        print_json(as_data(table, brightest))
-    else:
-        _print_table(table, prescription.name, angles, brightest)
+        print_json(as_data(table, brightest) | ({} if veil is None else {"veiling_glare": asdict(veil)}))
+        return
+    _print_table(table, prescription.name, angles, brightest)
+    if veil is not None:
+        console().print(
+            f"veiling glare index {veil.index:.3%} at {veil.wavelength_nm:g} nm: ghosts {veil.ghosts:.3%}, scatter "
+            f"{veil.scatter:.3%}, blur {veil.blur:.3%}; a black patch of {veil.patch_deg:.2f} degrees"
+        )
+
+
+def _glare(settings: dict[str, Any], wavelength_nm: float) -> VeilingGlare:
+    """Compute the veiling glare index of what the flags say."""
+    from pydantic import ValidationError
+
+    from ..io.project_file import explain
+    from ..model import Light, Project
+    from ..render.glare import veiling_glare
+    from .render_flags import in_flags
+
+    fields = {**settings, "lights": (Light(field_deg=(0.0, 0.0)),)}
+    try:
+        project = Project.model_validate(fields)
+    except ValidationError as error:
+        raise ProjectError(in_flags(explain(error, fields)[0])) from None
+    return veiling_glare(project, wavelength_nm)
 
 
 def as_data(table: GhostTable, brightest: int | None = None) -> dict[str, Any]:

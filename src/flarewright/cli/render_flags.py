@@ -13,7 +13,7 @@ from ..errors import ProjectError
 from ..io.plate_text import parse_imperfection, parse_plate
 from ..io.project_file import ProjectFileError, explain, parse_coating_choice, read_project
 from ..io.spectrum_text import parse_spectrum
-from ..model import Art, Iris, Light, Project, Rule
+from ..model import Art, Iris, Light, Project, Rule, Scatter
 from ..model.art import PASSES
 from .common import field_angles, pair
 
@@ -167,14 +167,15 @@ def build_project(flags: Flags) -> Project:
         given = {key: value for key, value in changes.items() if value is not None}
         if given:
             fields[section] = {**(dict(getattr(base, section)) if base else {}), **given}
-    if (scatter := _scatter(flags, base)) is not None:
+    said = base.scatter if base else None
+    if (scatter := scatter_flags(flags.scatter, flags.surface_roughness, flags.cleanliness, said)) is not None:
         fields["scatter"] = scatter
     if (art := _art(flags, base.art if base else Art())) is not None:
         fields["art"] = art
     try:
         return Project.model_validate(fields)
     except ValidationError as error:
-        findings = [_in_flags(sentence) for sentence in explain(error, fields)]
+        findings = [in_flags(sentence) for sentence in explain(error, fields)]
         if len(findings) == 1:
             raise ProjectError(findings[0]) from None
         message = f"{len(findings)} settings cannot be used, the first: {findings[0]}"
@@ -287,18 +288,27 @@ def _iris(flags: Flags, lens: Any, base: Project | None) -> dict[str, Any] | Non
     return {**dict(iris), **given}
 
 
-def _scatter(flags: Flags, base: Project | None) -> dict[str, Any] | None:
-    """Return what scatters with the flags' changes, or None when no flag changes it."""
-    changes = {
-        "model": flags.scatter,
-        "roughness_nm": flags.surface_roughness,
-        "cleanliness_level": flags.cleanliness,
-    }
+def scatter_flags(
+    model: str | None, roughness: float | None, cleanliness: float | None, base: Scatter | None = None
+) -> dict[str, Any] | None:
+    """Return what scatters with the flags' changes, or None when no flag changes it.
+
+    Parameters
+    ----------
+    model : str or None
+        `--scatter`.
+    roughness, cleanliness : float or None
+        `--surface-roughness` and `--cleanliness`; they say by themselves that something scatters.
+    base : Scatter or None
+        What they change.
+    """
+    changes = {"model": model, "roughness_nm": roughness, "cleanliness_level": cleanliness}
     given = {key: value for key, value in changes.items() if value is not None}
     if not given:
         return None
-    known = dict(base.scatter) if base is not None and base.scatter is not None else {}
-    # polish and dust say by themselves that something scatters
+    known = dict(base) if base is not None else {}
+    if known.get("model") == "none":
+        del known["model"]
     return {"model": "harvey-shack", **known, **given}
 
 
@@ -341,7 +351,7 @@ def _rule(flag: str, select: str, **changes: Any) -> Rule:
         raise ProjectError(f"{flag}: {explain(error, {'select': select})[0].removeprefix('select: ')}") from None
 
 
-def _in_flags(sentence: str) -> str:
+def in_flags(sentence: str) -> str:
     """Name the flag where a finding names the key of a project file."""
     for key, flag in _FLAG_OF.items():
         found = re.match(rf"(?:lights\[\d+\]\.)?{re.escape(key)}(?:\[\d\])?(?=[ :])", sentence)

@@ -92,9 +92,7 @@ def lens_of(
         n_d = float(vector[1 + 2 * count + k])
         medium = Medium(n_d=n_d, v_d=round(nearest(n_d)[0].v_d, 2)) if structure.glass[k] else None
         curvature = float(vector[1 + count + k])
-        rows.append(
-            Surface(curvature=curvature, thickness=thickness, medium=medium, semi_diameter=float(radii[k]))
-        )
+        rows.append(Surface(curvature=curvature, thickness=thickness, medium=medium, semi_diameter=float(radii[k])))
     rough = Lens(
         name=name, notes=notes, source="designed by Flarewright for its ghosts", f_number=1.0,
         sensor_distance=float(vector[count]), iris=iris or Iris(), rows=tuple(rows),

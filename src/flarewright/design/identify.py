@@ -105,9 +105,7 @@ def identify(
     )  # fmt: skip
 
 
-def _variables(
-    structure: Structure, vector: Floats, stop_known: bool
-) -> tuple[list[str], NDArray[np.int64], Floats]:
+def _variables(structure: Structure, vector: Floats, stop_known: bool) -> tuple[list[str], NDArray[np.int64], Floats]:
     """Name the variables, and give their columns and units."""
     rows, stop = structure.rows, structure.stop
     curvature = float(np.abs(vector[1 + rows : 1 + 2 * rows]).mean()) or 1.0

@@ -258,6 +258,7 @@ def algorithm_2(targets: Floats, found: Floats) -> float:
     -----
     The thesis' program normalises by the sum of the three.
     """
+
     def normalised(rgb: Floats) -> Floats:
         return np.asarray(rgb / np.maximum(rgb.sum(axis=1, keepdims=True), 1e-300), dtype=np.float64)
 

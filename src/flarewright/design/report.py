@@ -168,9 +168,7 @@ def _draft(path: Path, outcome: Outcome, project: Project, remarks: list[str]) -
     return data
 
 
-def _section(
-    number: int, one: Outcome, problem: Problem, target: bytes, found: bytes, draft: bytes | None
-) -> str:
+def _section(number: int, one: Outcome, problem: Problem, target: bytes, found: bytes, draft: bytes | None) -> str:
     rows = "".join(
         f"<tr><td>{html.escape(name)}</td><td>{j}-{i}</td><td>{place:+.4f}</td><td>{size:+.4f}</td></tr>"
         for name, (j, i), (place, size) in zip(problem.objective.names, one.ghosts, one.residuals, strict=True)

@@ -100,6 +100,7 @@ def _heights(structure: Structure, vector: Floats, pair: tuple[int, int], slope:
 
 def _apart(front: float, back: float, gap: float, common: float) -> float:
     """Largest radius, up to a common one, at which two surfaces stay apart."""
+
     def edge(r: float) -> float:
         return gap + _sag(back, r) - _sag(front, r)
 

@@ -285,9 +285,7 @@ def _first_points(
     return points
 
 
-def propose(
-    members: Sequence[Candidate], problem: Problem, random: np.random.Generator
-) -> tuple[Structure, Floats]:
+def propose(members: Sequence[Candidate], problem: Problem, random: np.random.Generator) -> tuple[Structure, Floats]:
     """Draw a new starting point from a pool.
 
     Parameters

@@ -308,9 +308,7 @@ def _own_column(first, last, j, i, x0, x1, work):
 
 
 @inner
-def _front_ghost(
-    q, rows, stop, j, i, e, f, entrance, with_scale, work, trail, slopes, common, values, jacobian, ghost
-):
+def _front_ghost(q, rows, stop, j, i, e, f, entrance, with_scale, work, trail, slopes, common, values, jacobian, ghost):
     """Differentiate a ghost in front of the stop: Ma is its own, (e, f) the upper row of the Ms that all share."""
     a, c = _own_column(0, stop, j, i, 1.0, 0.0, work)
     b, d = _own_column(0, stop, j, i, 0.0, 1.0, work)

@@ -100,7 +100,7 @@ class GhostWish(Frozen):
     @model_validator(mode="after")
     def _is_complete(self) -> GhostWish:
         if self.ghost is None and (self.action == "remove" or self.place_mm is None or self.radius_mm is None):
-            raise ValueError("a new ghost has place_mm and radius_mm, or names the lens' own with ghost = \"j-i\"")
+            raise ValueError('a new ghost has place_mm and radius_mm, or names the lens\' own with ghost = "j-i"')
         if self.radius_mm == 0.0:
             raise ValueError("radius_mm is 0: give the ghost a size")
         if self.color is not None and (min(self.color) < 0.0 or max(self.color) <= 0.0):

@@ -1,0 +1,170 @@
+"""The veiling glare index: closed forms where nothing blocks, and forward random rays from all sides where rims do."""
+
+from dataclasses import replace
+from math import pi
+
+import numpy as np
+import pytest
+
+from flarewright.kernels.montecarlo import IN_PICTURE
+from flarewright.model import (
+    Bare,
+    Camera,
+    Everywhere,
+    Iris,
+    Lens,
+    Light,
+    Lines,
+    Medium,
+    Output,
+    Project,
+    Quality,
+    Scatter,
+    Standard,
+    Stop,
+    Surface,
+)
+from flarewright.optics.glare import from_surround, object_nearness
+from flarewright.optics.pack import pack_lens
+from flarewright.optics.paths import direct_path, ghost_paths
+from flarewright.render.glare import veiling_glare
+from flarewright.render.montecarlo import Sums, ray_source, run_batch
+from flarewright.render.prepare import complete_lens, first_order, load_lens, settle
+from flarewright.render.render import render
+from flarewright.render.shot import make_opening, make_shots
+
+NM = 587.56
+ANYWHERE = (Light(field_deg=(0.0, 0.0)),)
+
+
+def wide(lenses):
+    """Weak singlets whose rims block nothing; the stop stands behind them, so rays from the sensor meet it first."""
+    rows = []
+    for _ in range(lenses):
+        rows += [
+            Surface(curvature=0.004, thickness=12.0, medium=Medium(n_d=1.6, v_d=60.0), semi_diameter=60.0),
+            Surface(curvature=-0.004, thickness=8.0, semi_diameter=60.0),
+        ]
+    return complete_lens(Lens(name="wide", f_number=20.0, field_deg=0.02, rows=(*rows, Stop(thickness=60.0))))
+
+
+def packed(lens, wavelength_nm=NM):
+    order = first_order(lens)
+    return pack_lens(lens, order, (None,) * len(lens.rows), np.array([wavelength_nm]))
+
+
+@pytest.mark.parametrize("lenses", [1, 2])
+def test_where_nothing_blocks_ghosts_add_up_reflectances(lenses):
+    """Every path sees the surround through the same stop: R_j R_i of the direct light, less what lies between takes."""
+    lens = wide(lenses)
+    pack = packed(lens)
+    paths = ghost_paths(lens)
+    (direct, _), *ghosts = from_surround(lens, pack, [direct_path(lens), *paths], 0.0)
+    R = ((1.6 - 1.0) / (1.6 + 1.0)) ** 2
+    parts = [R * R * (1.0 - R) ** (2 * (path.first_reflection - path.second_reflection - 1)) for path in paths]
+    for (everywhere, beyond), part in zip(ghosts, parts, strict=True):
+        assert everywhere / direct == pytest.approx(part, rel=0.01)
+        assert beyond == everywhere
+    told = veiling_glare(Project(lens=lens, lights=ANYWHERE), NM)
+    assert told.index == pytest.approx(sum(parts) / (1.0 + sum(parts)), rel=0.01)
+    assert (told.scatter, told.blur) == (0.0, pytest.approx(0.0, abs=1e-3))
+
+
+def test_without_reflections_there_is_no_glare():
+    lens = wide(2)
+    pack = packed(lens)
+    dark = replace(pack, reflectance=np.zeros_like(pack.reflectance))
+    assert (from_surround(lens, dark, ghost_paths(lens), 0.01) == 0.0).all()
+    assert from_surround(lens, dark, [direct_path(lens)], 0.01)[0, 0] > 0.0
+
+
+def test_where_nothing_blocks_scatter_adds_up_totals():
+    lens = wide(1)
+    polish = Scatter(model="harvey-shack", roughness_nm=4.0, correlation_um=4.0, slope=5.0)
+    told = veiling_glare(Project(lens=lens, lights=ANYWHERE, scatter=polish), NM)
+    total = 1.0 - np.exp(-((2.0 * pi * 0.6 * 4.0 / NM) ** 2))
+    # per surface, over the direct light that is left and the light that is there in all
+    expected = 2.0 * total / (1.0 + told.ghosts)
+    assert told.scatter == pytest.approx(expected, rel=0.02)
+
+
+def test_white_is_what_a_render_says_of_an_extended_scene():
+    coating = Everywhere(coating=Standard(name="modern-broadband"))
+    project = Project(lens="double-gauss-tronnier", f_number=8.0, lights=ANYWHERE, coating=coating)
+    told = veiling_glare(project, NM)
+    light = Light(field_deg=(0.0, 0.0), spectrum=Lines(lines=((NM, 1.0),)))
+    drawn = render(
+        project.replace(
+            lights=(light,), camera=Camera(size_px=(8, 8)), output=Output(starburst=False),
+            quality=Quality(mode="draft", wavelengths=1),
+        )
+    )  # fmt: skip
+    scene = drawn.summary["scene_irradiance_per_radiance"]
+    assert told.white * (1.0 - told.index) == pytest.approx(scene, rel=0.02)
+
+
+def test_against_random_rays_from_all_sides():
+    """Forward: lights over the hemisphere, what their ghosts bring to a patch in the middle of the picture."""
+    lens = load_lens("triplet-pestrecov")
+    side = 6.0
+    common = {"lens": lens, "f_number": 4.0, "coating": Everywhere(coating=Bare()), "iris": Iris()}
+    nodes, weights = np.polynomial.legendre.leggauss(24)
+    angles = 0.5 * np.radians(80.0) * (nodes + 1.0)
+    ghosts, variance = 0.0, 0.0
+    for angle, weight in zip(angles, 0.5 * np.radians(80.0) * weights, strict=True):
+        light = Light(field_deg=(float(np.degrees(angle)), 0.0), spectrum=Lines(lines=((NM, 1.0),)))
+        project = Project(
+            **common, lights=(light,), camera=Camera(size_px=(4, 4), sensor_mm=(side, side)),
+            quality=Quality(wavelengths=1, bridge=False),
+        )  # fmt: skip
+        settled = settle(project)
+        shot = make_shots(settled, make_opening(settled, None))[0]
+        source, sums = ray_source(shot, 0, side=48, light=0), Sums(0, {}, {})
+        for batch in range(12):
+            sums.add(run_batch([source], batch, picture=False))
+        # radiance 1 from a ring of directions; the shot's own cosine is in the flux
+        ring = 2.0 * pi * np.sin(angle) * weight / side**2
+        ghosts += ring * sums.mean("figures")[IN_PICTURE + 1]
+        variance += ring**2 * sums.variance("figures")[IN_PICTURE + 1]
+    settled = settle(Project(**common, lights=(Light(field_deg=(0.0, 0.0), spectrum=Lines(lines=((NM, 1.0),))),)))
+    pack = make_shots(settled, make_opening(settled, None))[0].packed
+    mine = from_surround(settled.lens, pack, ghost_paths(settled.lens), 0.0)[:, 0].sum()
+    # the patch is not a point, and the ghosts are not even over it
+    assert abs(mine / ghosts - 1.0) < 0.03 + 4.0 * np.sqrt(variance) / ghosts < 0.12
+
+
+def test_general_surfaces_see_the_same():
+    lens = load_lens("triplet-pestrecov")
+    rows = list(lens.rows)
+    rows[0] = rows[0].replace(asphere=(1e-15,))
+    plain, general = (
+        veiling_glare(Project(lens=a, lights=ANYWHERE), NM).index for a in (lens, lens.replace(rows=tuple(rows)))
+    )
+    assert general == pytest.approx(plain, rel=1e-6)
+
+
+def test_coating_and_polish_change_it():
+    bare = Project(lens="double-gauss-tronnier", lights=ANYWHERE, coating=Everywhere(coating=Bare()))
+    coated = bare.replace(coating=Everywhere(coating=Standard(name="modern-broadband")))
+    dusty = coated.replace(scatter=Scatter(model="harvey-shack", cleanliness_level=300.0))
+    one, two, three = (veiling_glare(project, NM) for project in (bare, coated, dusty))
+    assert 0.02 < one.index < 0.15
+    assert two.index < 0.02 * one.index
+    assert three.ghosts == pytest.approx(two.ghosts, rel=0.02)
+    assert three.index > 5.0 * two.index
+
+
+def test_threads_do_not_matter():
+    project = Project(lens="triplet-pestrecov", lights=ANYWHERE, scatter=Scatter(model="abg"))
+    assert veiling_glare(project, NM, threads=1) == veiling_glare(project, NM, threads=3)
+
+
+def test_the_plane_in_focus():
+    lens = load_lens("triplet-pestrecov")
+    assert object_nearness(packed(lens), lens) == 0.0
+    order = first_order(lens, focus_distance=700.0)
+    near = pack_lens(lens, order, (None,) * len(lens.rows), np.array([NM]))
+    assert object_nearness(near, lens) == pytest.approx(1.0 / 700.0, rel=1e-4)
+    # focused near, the patch is as far from the blur
+    told = veiling_glare(Project(lens=lens, lights=ANYWHERE, camera=Camera(focus_distance=700.0)), NM)
+    assert told.blur == 0.0
