@@ -63,6 +63,9 @@ LENS_FILES = {
             "radius = -50.0", 'radius = "flat", radius_x = -50.0')), "afocal"),
     "positions without names": (LENS + "[[positions]]\ngaps = { 1 = 3.0 }\n", "position 0: name"),
     "positions without gaps": (LENS + '[[positions]]\nname = "wide"\n', "position 0: gaps"),
+    "two positions for one setting": (
+        LENS + '[[positions]]\nname = "a"\ngaps = { 1 = 3.0 }\nfocus_distance = 500\n[[positions]]\nname = "b"\n'
+        "gaps = { 1 = 4.0 }\nfocus_distance = 500\n", "positions 'a' and 'b' are for one focal length"),
     "a gap that is glass": (LENS + '[[positions]]\nname = "a"\ngaps = { 0 = 3.0 }\n', "behind row 0 is glass"),
     "a gap behind no row": (LENS + '[[positions]]\nname = "a"\ngaps = { 7 = 3.0 }\n', "rows 0 to 1"),
     "positions of different gaps": (
@@ -302,6 +305,10 @@ COMMAND_LINES = {
     "imperfection below nothing": ([*H, *GOOD, "--imperfection", "1:-5"], "--imperfection '1:-5'"),
     "ghosts moved by less than nothing": ([*H, *GOOD, "--ghost-offset", "-1"], "--ghost-offset"),
     "ghosts moved by nan": ([*H, *GOOD, "--ghost-offset", "nan"], "--ghost-offset"),
+    "mute a mirror that is none": ([*H, *GOOD, "--mute", "sensor-8"], "while the sensor reflects nothing"),
+    "mute a mirror's ghost at the stop": (
+        [*H, *GOOD, "--mute", "sensor-5", "--sensor-reflectance", "0.1"], "has no ghost sensor-5"),
+    "zoom to nan": (["render", "canon-70-200", *GOOD, "--zoom", "nan"], "not to nan mm"),
     "squeeze of nothing": ([*H, *GOOD, "--squeeze", "0"], "--squeeze"),
     "ghosts of a bright sensor": (["ghosts", "heliar-tronnier", "--light", "1,1", "--sensor-reflectance", "2"],
                                   "no part of the light"),

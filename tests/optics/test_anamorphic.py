@@ -100,3 +100,13 @@ def test_drawn_wide_it_is_the_same_light(lens):
     assert fine.reshape(50, 60, 2, 3).mean(axis=2) == pytest.approx(coarse, abs=2e-3 * float(coarse.max()))
     assert Camera(size_px=(1200, 500), squeeze=2.0, desqueeze=True).sensor == pytest.approx((18.0, 15.0))
     assert Camera(size_px=(1200, 500)).sensor == pytest.approx((36.0, 15.0))
+
+
+def test_a_lens_that_squeezes_nothing_says_so():
+    project = Project(
+        lens="heliar-tronnier", lights=(Light(field_deg=(3.0, 2.0)),),
+        camera=Camera(size_px=(60, 40), desqueeze=True), quality=Quality(mode="draft", wavelengths=3),
+    )  # fmt: skip
+    told, plain = (render(project.replace(camera=project.camera.replace(desqueeze=d))) for d in (True, False))
+    assert any("desqueeze changes nothing" in remark for remark in told.remarks)
+    assert np.array_equal(told.layers[0].pixels, plain.layers[0].pixels)

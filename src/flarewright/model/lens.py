@@ -233,6 +233,15 @@ class Lens(Frozen):
 
     def _positions_agree(self) -> None:
         names = [position.name.lower() for position in self.positions]
+        if any(position.focus_distance is not None for position in self.positions):
+            settings = [(position.focal_length, position.focus_distance) for position in self.positions]
+            for position, setting in zip(self.positions, settings, strict=True):
+                other = self.positions[settings.index(setting)]
+                if other is not position:
+                    raise ValueError(
+                        f"positions {other.name!r} and {position.name!r} are for one focal length and one focus "
+                        "distance; say where they differ"
+                    )
         moving: set[int] | None = None
         for position in self.positions:
             where = f"position {position.name!r}"

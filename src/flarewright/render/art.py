@@ -292,6 +292,11 @@ def _chosen(facts: _Facts, select: str, where: str) -> list[str]:
     lens = facts.settled.lens
     if match["names"]:
         chosen = set(match["names"].split(","))
+        if facts.settled.sensor is None and (dark := sorted(name for name in chosen if "sensor" in name)):
+            raise ProjectError(
+                f"{where}: there is no ghost {dark[0]} while the sensor reflects nothing; set "
+                "camera.sensor_reflectance (--sensor-reflectance) above 0"
+            )
         if unknown := sorted(name for name in chosen - set(facts.names) if not facts.may_be(name)):
             raise ProjectError(
                 f"{where}: {lens.name} has no ghost {unknown[0]}; a path J-I reflects at row J, then at row I < J, "

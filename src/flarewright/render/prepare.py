@@ -347,6 +347,8 @@ def settle(project: Project) -> Settled:
     if camera.squeeze is None and lens.squeeze is not None:
         camera = camera.replace(squeeze=lens.squeeze)
         project = project.replace(camera=camera)
+    if camera.desqueeze and camera.squeeze is None:
+        remarks.append(f"{lens.name} squeezes nothing, so desqueeze changes nothing; state a squeeze if it does")
     built = build(
         lens, project.coating, zoom=project.zoom, filter_plate=project.filter, cover_glass=camera.cover_glass,
         imperfection=project.imperfection, sensor_distance=camera.sensor_distance,
