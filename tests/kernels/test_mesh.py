@@ -13,6 +13,8 @@ from flarewright.model import Iris, Light, Project
 from flarewright.optics.bundle import _arguments, find_region, front_box, trace_grid, trace_points
 from flarewright.optics.iris import blade_edges
 from flarewright.optics.paths import LightPath, ghost_path, ghost_paths
+from flarewright.render.art import PLAIN
+from flarewright.render.ghosts_final import find_entry, find_final
 from flarewright.render.prepare import load_lens, settle
 from flarewright.render.shot import Shot, make_opening, make_shots
 
@@ -138,9 +140,11 @@ def dense_flux(shot: Shot, path: LightPath, w: int, n: int) -> tuple[float, floa
     for c in range(path.stop_crossings):
         passing &= np.hypot(data[:, 5 + 2 * c], data[:, 6 + 2 * c]) <= shot.opening.radius
     weight = np.where(passing, data[:, 2], 0.0) * hx * hy * 2.0 * shot.incidence.cosine
-    region = find_region(packed, path, tilt, shot.opening.radius, shot.view_radius)
-    if region is None:
+    entry = None if path.entry is None else find_entry(shot, path.entry)
+    item = find_final(shot, path, PLAIN, entry)
+    if item is None:
         return float(weight.sum()), 0.0
+    region = item.region
     b = region.box
     inside = (px >= b[0]) & (px <= b[1]) & (py >= b[2]) & (py <= b[3])
     return float(weight.sum()), float(weight[inside].sum())

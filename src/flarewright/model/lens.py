@@ -192,6 +192,10 @@ class Lens(Frozen):
     coating_presets: dict[str, tuple[Coating | None, ...]] = Field(default_factory=dict)
     scatter: Scatter | None = None
 
+    def __hash__(self) -> int:
+        # equal lenses have equal rows; the presets are a dict, which has no hash
+        return hash((self.name, self.rows))
+
     @property
     def stop_row(self) -> int:
         """Index of the stop among the rows."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import atan, atan2, cos, hypot, radians, sin, sqrt, tan
+from math import atan, atan2, ceil, cos, hypot, radians, sin, sqrt, tan
 from typing import Any
 
 import numpy as np
@@ -222,6 +222,7 @@ def find_region(
     tilt: float,
     iris_radius: float,
     view_radius: float = float("inf"),
+    within: Floats | None = None,
 ) -> Region | None:
     """Find the part of the pupil that a path accepts (Hullin 2011, section 4.2, "Ray Bounding").
 
@@ -234,25 +235,34 @@ def find_region(
         Radius around the iris, mm.
     view_radius : float
         Radius around the axis that the picture covers, mm.
+    within : ndarray, shape (4,), optional
+        A box that holds the region; None: the whole front.
 
     Returns
     -------
     Region or None
         None when nothing passes.
     """
-    middle, *others = _fitted(packed)
+    limits = (path.stop_crossings, iris_radius, view_radius)
+    middle, *others = [(*_arguments(packed, w, path, tilt), *limits) for w in _fitted(packed)]
     box, cells = front_box(packed, tilt), _cells(packed, PREPASS)
+    if within is not None:
+        # as dense as on the whole front
+        parts = (within[1::2] - within[0::2]) / (box[1::2] - box[0::2])
+        few = _cells(packed, FINER)
+        cells = (max(ceil(cells[0] * parts[0]), few[0]), max(ceil(cells[1] * parts[1]), few[1]))
+        box = within
     whole = True
     held = np.array([np.inf, -np.inf, np.inf, -np.inf])
     for _ in range(4):
-        found, sums, spots = _scan(packed, middle, path, tilt, iris_radius, view_radius, box, cells)
+        found, sums, spots = _scan(packed, middle, box, cells)
         plenty = sums[4] >= (SPECK if whole else SMALL_REGION)
         near, few = box, _cells(packed, COARSE) if plenty else cells
         if whole and sums[4] > 0.0:
             # the whole front is too much to scan thrice where one colour has shown the place
             near, few = _around(found, box, cells), _cells(packed, COARSE if plenty else FINER)
-        for w in others:
-            elsewhere, more, _ = _scan(packed, w, path, tilt, iris_radius, view_radius, near, few)
+        for other in others:
+            elsewhere, more, _ = _scan(packed, other, near, few)
             found = _joined(found, elsewhere)
             if not plenty:
                 sums = np.maximum(sums, more)
@@ -292,17 +302,9 @@ def _fitted(packed: PackedLens) -> list[int]:
 
 
 def _scan(
-    packed: PackedLens,
-    w: int,
-    path: LightPath,
-    tilt: float,
-    iris_radius: float,
-    view_radius: float,
-    box: Floats,
-    cells: tuple[int, int],
+    packed: PackedLens, arguments: tuple[Any, ...], box: Floats, cells: tuple[int, int]
 ) -> tuple[Floats, Floats, Floats]:
     """Run the pre-pass over a box at one wavelength."""
-    arguments = (*_arguments(packed, w, path, tilt), path.stop_crossings, iris_radius, view_radius)
     found, sums, spots = find_box(*arguments, box, *cells)
     if packed.halves == 1:
         # the kernel counts every ray for its mirror image too

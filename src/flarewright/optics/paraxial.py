@@ -6,13 +6,14 @@ Rays are (y, u), the path is unfolded so that distances run forward (docs/physic
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import LensError
 from ..kernels import matrix
-from ..model import Lens, Stop, Surface
+from ..model import Lens, Medium, Stop, Surface
 from .dispersion import refractive_index
 from .paths import LightPath, direct_path
 from .shape import curvature_across
@@ -65,12 +66,17 @@ def vertex_positions(lens: Lens) -> NDArray[np.float64]:
 
 def gap_indices(lens: Lens, wavelength_nm: float) -> NDArray[np.float64]:
     """Return the index before row 0 and behind every row, shape (K + 1,)."""
-    at = np.array([wavelength_nm])
     indices = [1.0]
     for row in lens.rows:
         # the stop is a plane in a gap: it has the medium of the gap it stands in
-        indices.append(indices[-1] if isinstance(row, Stop) else float(refractive_index(row.medium, at)[0]))
+        indices.append(indices[-1] if isinstance(row, Stop) else _index(row.medium, wavelength_nm))
     return np.array(indices)
+
+
+# every frame of a sequence asks for the same
+@lru_cache(maxsize=4096)
+def _index(medium: Medium | None, wavelength_nm: float) -> float:
+    return float(refractive_index(medium, wavelength_nm))
 
 
 def path_matrices(lens: Lens, path: LightPath, wavelength_nm: float, sensor_z: float) -> tuple[list[Matrix], Matrix]:

@@ -56,6 +56,14 @@ class LightPath:
         """How often the path crosses the stop: 1, 3 or 5."""
         return int(np.count_nonzero(self.actions == STOP))
 
+    @property
+    def entry(self) -> LightPath | None:
+        """The way in as far as the stop; None when a mirror comes first."""
+        stop = int(np.argmax(self.actions == STOP))
+        if (self.actions[: stop + 1] == REFLECT).any():
+            return None
+        return LightPath(None, None, self.rows[: stop + 1], self.actions[: stop + 1])
+
 
 def _path(lens: Lens, mirrors: tuple[int, ...]) -> LightPath:
     """Go to and fro between mirrors; row len(lens.rows) is the sensor."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from math import atan, radians, sqrt
 
 import numpy as np
@@ -32,6 +33,8 @@ def half_field(lens: Lens) -> float:
     return atan(IMAGE_RADIUS / first_order(lens).efl)
 
 
+# an editor or a sequence asks for the same lens again and again
+@lru_cache(maxsize=64)
 def complete(lens: Lens) -> Lens:
     """Fill in missing semi-diameters and mark them as estimated.
 

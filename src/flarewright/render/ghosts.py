@@ -19,7 +19,7 @@ from ..optics.paths import LightPath
 from .art import PLAIN, PathArt
 from .canvas import DETAILS, Plane, blank, merge, to_layer
 from .ghosts_draft import draft_alone, draw_draft, draw_draft_by_hand
-from .ghosts_final import FinalPass, contrast, draw_alone, draw_final, find_final
+from .ghosts_final import FinalPass, contrast, draw_alone, draw_final, find_entry, find_final
 from .shot import Shot
 
 Progress = Callable[[float, str], None]
@@ -148,12 +148,17 @@ def _final(
     meter: _Meter,
 ) -> GhostPass:
     others, faintest = levels
+    # what reaches the stop is common to all paths whose mirrors stand behind it
+    way_in = next((path.entry for path in paths if path.entry is not None), None)
+    entries = [None if way_in is None else find_entry(shot, way_in) for shot in shots]
 
     def find(path: LightPath) -> list[FinalPass]:
         if meter.cancelled.is_set():
             return []
         changed = art.get(path.name, PLAIN)
-        found = [item for item in (find_final(shot, path, changed) for shot in shots) if item is not None]
+        inside = entries if path.entry is not None else [None] * len(shots)
+        looked = (find_final(shot, path, changed, entry) for shot, entry in zip(shots, inside, strict=True))
+        found = [item for item in looked if item is not None]
         meter.step("looking for ghosts")
         return found
 

@@ -72,7 +72,7 @@ class FinalPass:
         return self.shot.light.intensity * self.shot.incidence.falloff * self.art.visible_gain
 
 
-def find_final(shot: Shot, path: LightPath, art: PathArt = PLAIN) -> FinalPass | None:
+def find_final(shot: Shot, path: LightPath, art: PathArt = PLAIN, entry: Region | None = None) -> FinalPass | None:
     """Look where a path accepts light; None when it passes nothing.
 
     Parameters
@@ -81,23 +81,41 @@ def find_final(shot: Shot, path: LightPath, art: PathArt = PLAIN) -> FinalPass |
     path : LightPath
     art : PathArt
         What is changed about it by hand.
+    entry : Region, optional
+        What reaches the stop without a mirror, of a path that begins so (`LightPath.entry`).
 
     Returns
     -------
     FinalPass or None
     """
     lens, tilt, iris_radius = shot.packed, shot.incidence.tilt, shot.opening.radius
-    frame = None
+    frame, within = None, None if entry is None else entry.box
     if art.framed:
-        whole = find_region(lens, path, tilt, iris_radius)
+        whole = find_region(lens, path, tilt, iris_radius, within=within)
         if whole is None:
             return None
         frame = _frame(shot, path, whole)
     view_radius = art.view_radius(shot.view_radius, frame)
-    region = find_region(lens, path, tilt, iris_radius, view_radius)
+    region = find_region(lens, path, tilt, iris_radius, view_radius, within)
     if region is None:
         return None
     return FinalPass(shot, path, region, art.place(shot.to_pixels, frame), view_radius, art, frame)
+
+
+def find_entry(shot: Shot, way_in: LightPath) -> Region | None:
+    """Find the part of the pupil whose light reaches the stop, or None when nothing does.
+
+    Parameters
+    ----------
+    shot : Shot
+    way_in : LightPath
+        `LightPath.entry` of any path that has one.
+
+    Returns
+    -------
+    Region or None
+    """
+    return find_region(shot.packed, way_in, shot.incidence.tilt, shot.opening.radius)
 
 
 def _frame(shot: Shot, path: LightPath, region: Region) -> Frame:

@@ -80,7 +80,7 @@ def complete_lens(lens: Lens, *, remarks: list[str] | None = None) -> Lens:
     order = first_order(known)
     full = _complete_everywhere(known)
     surfaces = sum(isinstance(row, Surface) for row in full.rows)
-    estimated = [str(k) for k, row in enumerate(full.rows) if isinstance(row, Surface) and row is not known.rows[k]]
+    estimated = [str(k) for k, row in enumerate(known.rows) if isinstance(row, Surface) and row.semi_diameter is None]
     if remarks is not None:
         if estimated:
             which = (
@@ -105,7 +105,7 @@ def _complete_everywhere(lens: Lens) -> Lens:
     """Estimate missing semi-diameters so that they pass the light of every position."""
     full = complete(lens)
     rows = list(full.rows)
-    for position in lens.positions if full is not lens else ():
+    for position in lens.positions if full != lens else ():
         for k, row in enumerate(complete(at_position(lens, position)).rows):
             mine = rows[k]
             if isinstance(row, Surface) and isinstance(mine, Surface) and row.semi_diameter_estimated:
