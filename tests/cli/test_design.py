@@ -87,6 +87,23 @@ def test_identify_finds_the_rank_that_trials_found(capsys):
     assert "fix 17 of 23" in capsys.readouterr().out
 
 
+def test_scratch_and_colors_write_lenses(folder, capsys):
+    words = ["design", "scratch", "--random", "3", "--unsigned", "--searches", "200", "--lenses", "1", "-o", "new"]
+    assert run([*words, "--json"]) == 0
+    assert len(json.loads(capsys.readouterr().out)["lenses"][0]["ghosts"]) == 3
+    (folder / "red.toml").write_text(PROJECT.replace("height = 1.001", "color = [1.0, 0.2, 0.1]"))
+    words = ["design", "colors", "red.toml", "-o", "red-lens.toml", "--starts", "4", "--map", "4-1"]
+    assert run([*words, "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert set(told["rows"]) == {str(k) for k in range(9)} - {"5"}
+    assert len(told["ghosts"]) == 13
+    lens = read_lens(folder / "red-lens.toml")[0]
+    assert lens.rows[0].coating.center_wavelength_nm == told["rows"]["0"]["center_wavelength_nm"]
+    assert (folder / "red-lens.4-1.png").stat().st_size > 1000
+    assert run([*words, "--films", "free"]) == 0
+    assert "Algorithm 2" in capsys.readouterr().out
+
+
 @pytest.mark.parametrize(
     ("words", "told"),
     [
@@ -102,6 +119,15 @@ def test_identify_finds_the_rank_that_trials_found(capsys):
         (["solve", "wish.toml", "-o", "x"], "place_mm"),
         (["solve", "bounds.toml", "-o", "x"], "design.bounds"),
         (["solve", "misspelt.toml", "-o", "x"], "did you mean"),
+        (["scratch", "-o", "x"], "--random N"),
+        (["scratch", "-o", "x", "--random", "3", "--ghost", "1,1"], "--random N"),
+        (["scratch", "-o", "x", "--ghost", "1"], "not two numbers"),
+        (["scratch", "-o", "x", "--ghost", "1,0"], "a radius is not 0"),
+        (["scratch", "-o", "x", "--random", "3", "--stop-diameter", "-1"], "no diameter"),
+        (["scratch", "-o", "x", "--random", "20", "--surfaces", "4"], "surfaces ="),
+        (["colors", "shot.toml", "-o", "x.exr"], "must be named"),
+        (["colors", "shot.toml", "-o", "x.toml", "--films", "gold"], "choose quarter-wave or free"),
+        (["colors", "shot.toml", "-o", "x.toml", "--map", "9-9"], "is no ghost"),
         (["resume", "nothing"], "design solve has written"),
         (["benchmark", "tessar"], "choose heliar or canon"),
         (["benchmark", "heliar", "--angle", "0"], "above 0"),

@@ -16,7 +16,9 @@ from . import (
     coating_list,
     coating_plot,
     design_benchmark,
+    design_colors,
     design_identify,
+    design_scratch,
     design_solve,
     ghosts,
     lens_check,
@@ -63,6 +65,8 @@ project_app.command("schema")(project_schema.schema)
 
 design_app.command("solve", epilog=design_solve.EPILOG)(design_solve.solve)
 design_app.command("resume")(design_solve.resume)
+design_app.command("scratch", epilog=design_scratch.EPILOG)(design_scratch.scratch)
+design_app.command("colors", epilog=design_colors.EPILOG)(design_colors.colors)
 design_app.command("benchmark", epilog=design_benchmark.EPILOG)(design_benchmark.benchmark)
 design_app.command("identify", epilog=design_identify.EPILOG)(design_identify.identify)
 

@@ -45,7 +45,7 @@ def solve(
 
     Without a [design] in the project: other lenses with the same ghosts as its own.
     """
-    _check_time(time_s)
+    check_time(time_s)
     from ..io.project_file import read_project
 
     given = read_project(project)
@@ -56,7 +56,7 @@ def solve(
                           "another folder")  # fmt: skip
     from ..design.search import State as Fresh
 
-    _search(given, output, time_s, Fresh(seed), lenses, searches, threads, as_json)
+    search(given, output, time_s, Fresh(seed), lenses, searches, threads, as_json)
 
 
 def resume(
@@ -68,23 +68,40 @@ def resume(
     as_json: Json = False,
 ) -> None:
     """Go on with a search as if it had not been cut off."""
-    _check_time(time_s)
+    check_time(time_s)
     from ..design.store import read_state
     from ..io.project_file import read_project
 
     state = read_state(folder / "search.json")
-    _search(read_project(folder / "project.toml"), folder, time_s, state, lenses, searches, threads, as_json)
+    search(read_project(folder / "project.toml"), folder, time_s, state, lenses, searches, threads, as_json)
 
 
-def _check_time(time_s: float) -> None:
+def check_time(time_s: float) -> None:
+    """Refuse a time that is none."""
     if not (math.isfinite(time_s) and time_s > 0.0):
         raise ProjectError(f"--time {time_s:g} is no time; give seconds above 0")
 
 
-def _search(
+def search(
     project: Project, folder: Path, time_s: float, state: State, lenses: int, searches: int | None,
-    threads: int | None, as_json: bool,
+    threads: int | None, as_json: bool, name: str | None = None,
 ) -> None:  # fmt: skip
+    """Search, write the folder and tell what was found.
+
+    Parameters
+    ----------
+    project : Project
+    folder : Path
+    time_s : float
+    state : State
+        Where to begin.
+    lenses : int
+    searches : int or None
+    threads : int or None
+    as_json : bool
+    name : str, optional
+        Of the lenses; None: after the project's.
+    """
     from ..design.candidate import outcomes
     from ..design.report import summary, verdict, write_folder
     from ..design.search import compile_kernels
@@ -103,10 +120,10 @@ def _search(
             problem, seed=state.seed, time_limit=time_s, most_searches=searches, threads=threads, state=state,
             progress=progress, cancelled=asked,
         )  # fmt: skip
-    found = outcomes(state, problem, count=lenses, name=f"After {settled.lens.name}", iris=settled.iris)
+    found = outcomes(state, problem, count=lenses, name=name or f"After {settled.lens.name}", iris=settled.iris)
     remarks = write_folder(folder, project, problem, state, found)
     data = summary(state, found, problem)
-    tell([*settled.remarks, *remarks])
+    tell([*(settled.remarks if name is None else ()), *remarks])
     if as_json:
         print_json({"folder": str(folder), **data})
         return

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import sqrt
 
 import numpy as np
@@ -21,6 +21,8 @@ Integers = NDArray[np.int64]
 HIDDEN = 100000.0
 # what too few ghosts are worth there
 TOO_FEW = 100000.0
+# a ghost of 100 mm without a target costs a tenth of a wanted one that misses by its own radius
+RELATIVE_EXTRA = 0.02
 # a ghost smaller than this is not weighted any more than one of this radius, mm
 LEAST_RADIUS = 0.3
 
@@ -48,6 +50,8 @@ class Objective:
         Least, largest and weight of 1/efl, 1/f-number and length.
     names : tuple of str
         What each target is, for reports.
+    extra_part : float
+        Part of `extra` that the search charges, which has no unit of mm^2 where its weights are relative.
     """
 
     slopes: Floats
@@ -59,16 +63,12 @@ class Objective:
     entrance: float
     wishes: Floats
     names: tuple[str, ...]
+    extra_part: float = 1.0
 
     @property
     def wanted(self) -> int:
         """Largest number of targets at one light: a lens needs as many ghosts."""
         return int(np.diff(self.spans).max())
-
-    def unweighted(self) -> Objective:
-        """Return the same with all lengths counted alike, in mm."""
-        on = (self.weights > 0.0).astype(np.float64)
-        return replace(self, weights=on * np.array([1.0, 1.0, 1.0]))
 
 
 def wishes_of(bounds: Bounds) -> Floats:
@@ -310,7 +310,7 @@ def own_objective(
     return Objective(
         slopes=np.asarray(slopes, dtype=np.float64), spans=np.array(spans, dtype=np.int64), targets=table,
         weights=np.stack([weight, weight, light_weight], axis=1), signed=signed, extra=extra, entrance=entrance,
-        wishes=wishes_of(bounds), names=tuple(names),
+        wishes=wishes_of(bounds), names=tuple(names), extra_part=RELATIVE_EXTRA if weights == "relative" else 1.0,
     )  # fmt: skip
 
 

@@ -122,7 +122,9 @@ def structures(surfaces: int, least_ghosts: int, most: int = 4096) -> tuple[Stru
         Those with the fewest ghosts; empty when no structure has enough.
     """
     rows = surfaces + 1
-    counts = {stop: _pairs(stop) + _pairs(surfaces - stop) for stop in range(rows)}
+    # a lone surface cannot touch glass and stand in air
+    stops = [stop for stop in range(rows) if 1 not in (stop, surfaces - stop)]
+    counts = {stop: _pairs(stop) + _pairs(surfaces - stop) for stop in stops}
     enough = [count for count in counts.values() if count >= least_ghosts]
     if not enough:
         return ()

@@ -25,15 +25,16 @@ from .store import write_state
 
 Floats = NDArray[np.float64]
 
-# mean squared misfit in mm^2 below which ghosts are met, and below which they nearly are
-MET, NEARLY = 1e-6, 0.05
+# place or size of any ghost off by less than this, mm: met, nearly met
+MET, NEARLY = 0.005, 0.3
 
 
 def verdict(outcome: Outcome | None) -> str:
     """Say in a word how well the ghosts are met: "met", "nearly", "unsolved"."""
     if outcome is None:
         return "unsolved"
-    return "met" if outcome.fitness < MET else ("nearly" if outcome.fitness < NEARLY else "unsolved")
+    worst = float(np.abs(outcome.residuals).max())
+    return "met" if worst < MET else ("nearly" if worst < NEARLY else "unsolved")
 
 
 def summary(state: State, found: tuple[Outcome, ...], problem: Problem) -> dict[str, Any]:

@@ -373,8 +373,8 @@ def polish(
         matches = np.empty((len(which), len(aim.targets)), np.int64)
         polish_many(
             points, structure.stop, structure.mirrors, aim.entrance, known.low, known.high, known.free, known.longest,
-            aim.slopes, aim.spans, aim.targets, aim.weights, aim.signed, aim.extra, aim.wishes, steps, 4, ENOUGH, ends,
-            costs, matches,
+            aim.slopes, aim.spans, aim.targets, aim.weights, aim.signed, aim.extra * aim.extra_part, aim.wishes, steps,
+            4, ENOUGH, ends, costs, matches,
         )  # fmt: skip
         found.update((k, Candidate(float(costs[m]), structure, ends[m])) for m, k in enumerate(which))
     return [found[k] for k in range(len(starts))]

@@ -71,16 +71,21 @@ def _structures(design: Design, own: Structure, objective: Objective) -> tuple[S
                 'either side of its stop; choose structure = "any" and more surfaces'
             )
         return (own,)
-    surfaces = design.surfaces or (own.rows - 1 if design.own_ghosts else surfaces_for(wanted))
+    surfaces = design.surfaces or (own.rows - 1 if design.own_ghosts else _enough(surfaces_for(wanted), wanted))
     found = structures(surfaces, wanted)
     if not found:
-        fewest = next(count for count in range(surfaces, 1000) if structures(count, wanted, most=1))
+        fewest = _enough(surfaces, wanted)
         raise ProjectError(
             f"{wanted} ghosts are wanted at one light, but no lens of {surfaces} surfaces has so many on one side of "
             f"its stop; give surfaces = {fewest} or more"
         )
     # where the lens' own pattern is as good as the others, it is tried first
     return (own, *(one for one in found if one != own)) if own in found else found
+
+
+def _enough(surfaces: int, wanted: int) -> int:
+    """Return so many surfaces, or the next number that makes enough ghosts."""
+    return next(count for count in range(surfaces, 1000) if structures(count, wanted, most=1))
 
 
 def _checked(rows: tuple[int, ...], structure: Structure) -> tuple[int, ...]:

@@ -1,0 +1,39 @@
+"""From scratch: no lens to begin with."""
+
+import numpy as np
+import pytest
+
+from flarewright.design.candidate import outcomes
+from flarewright.design.scratch import random_wishes, scratch_project, wanted_picture
+from flarewright.design.search import solve
+from flarewright.design.target import problem_of
+from flarewright.model.design import GhostWish
+
+
+def test_ghosts_along_a_line_are_met():
+    wishes = tuple(GhostWish(place_mm=p, radius_mm=r) for p, r in ((5.0, 2.0), (-8.0, 1.0), (12.0, 4.0)))
+    problem, _ = problem_of(scratch_project(wishes, (6.0, 6.0), surfaces=6, signed=False))
+    state = solve(problem, seed=0, time_limit=None, most_searches=4000)
+    best = outcomes(state, problem, count=1)[0]
+    assert np.abs(best.residuals).max() < 0.2
+    # the ghosts that nobody asked for are large, so faint
+    from flarewright.design.ghosts import evaluate
+
+    radii = np.abs(evaluate(best.structure, best.vector[None], 100.0)[0, :, 1])
+    assert np.median(np.sort(radii)[3:]) > 20.0
+
+
+def test_random_wishes_follow_their_seed():
+    assert random_wishes(10, 3) == random_wishes(10, 3)
+    assert random_wishes(10, 3) != random_wishes(10, 4)
+    assert len(random_wishes(15, 0)) == 15
+
+
+def test_the_wanted_picture_is_lit_where_ghosts_are():
+    problem, _ = problem_of(scratch_project((GhostWish(place_mm=10.0, radius_mm=2.0),), (5.0, 5.0)))
+    picture = wanted_picture(problem.objective, 5.0, ghosts=10)
+    y, x = np.nonzero(picture)
+    assert (x.mean() + 0.5) * 46.6 / 512 - 23.3 == pytest.approx(10.0 / 2**0.5, abs=0.05)
+    assert (y.mean() + 0.5) * 46.6 / 512 - 23.3 == pytest.approx(10.0 / 2**0.5, abs=0.05)
+    # the sum, for edge pixels are covered in part
+    assert picture.sum() / picture.max() * (46.6 / 512) ** 2 == pytest.approx(2.598 * 2.0**2, rel=0.03)
