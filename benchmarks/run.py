@@ -57,7 +57,8 @@ from flarewright.render.render import render
 from flarewright.render.shot import make_opening, make_shots
 
 PARTS = (
-    "yardsticks", "trace", "raster", "frame", "art", "built", "scatter", "reference", "design", "startup", "memory",
+    "yardsticks", "trace", "raster", "frame", "art", "built", "scatter", "ringing", "reference", "design", "startup",
+    "memory",
 )  # fmt: skip
 
 LIGHT = (10.0, 5.0)
@@ -308,6 +309,20 @@ def scatter(repeat: int) -> Rows:
     return found
 
 
+def ringing(repeat: int) -> Rows:
+    """The Heliar's frame at f/16 with rings inside its ghosts; the first row is the frame without."""
+    plain = heliar_frame("final", starburst=False).replace(f_number=16.0, iris=Iris(blades=8))
+    found: Rows = []
+    for mode, diameter in (("off", 0.0), ("collins", 0.0), ("collins", 0.53), ("frft", 0.0)):
+        lights = tuple(light.replace(diameter_deg=diameter) for light in plain.lights)
+        project = plain.replace(quality=plain.quality.replace(ringing=mode), lights=lights)
+        seconds = median_seconds(lambda project=project: render(project), repeat)  # type: ignore[misc]
+        ratio = 1e3 * seconds / found[0]["value"] if found else None
+        name = f"Heliar final 1280x720 f/16, {mode}" + (" of the sun" if diameter else "")
+        found.append(row("ringing", name, 1e3 * seconds, "ms", ratio, "off"))
+    return found
+
+
 def reference(repeat: int) -> Rows:
     """Random rays through the whole lens on one thread, with and without a picture; what four reflections cost."""
     found = []
@@ -450,6 +465,7 @@ def main(arguments: list[str] | None = None) -> None:
         "art": lambda: art(asked.repeat),
         "built": lambda: built(asked.repeat),
         "scatter": lambda: scatter(asked.repeat),
+        "ringing": lambda: ringing(asked.repeat),
         "reference": lambda: reference(asked.repeat),
         "design": lambda: design(lambda work: median_seconds(work, asked.repeat, 0.2), row),
         "startup": lambda: startup(asked.repeat),

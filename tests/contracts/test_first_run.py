@@ -67,12 +67,13 @@ def test_a_cold_command_writes_what_a_warm_one_writes(tmp_path):
 @pytest.mark.parametrize(
     ("words", "unused"),
     [
-        (("render", *SMALL, "-o"), {"matrices", "fan wings"}),
+        (("render", *SMALL, "-o"), {"matrices", "fan wings", "draw ringing"}),
         (("render", *SMALL, "--blades", "0", "--quality", "draft", "-o"), {"draw", "densities", "blade wings"}),
         (("render", *SMALL, "--scatter", "abg", "--quality", "draft", "-o"), {"draw", "densities", "fan wings"}),
         (("ghosts", "heliar-tronnier", "--light", "12,7", "--json"), {"matrices", "blade wings", "fan wings"}),
+        (("render", *SMALL, "--fstop", "16", "--ringing", "collins", "-o"), {"matrices", "fan wings"}),
     ],
-    ids=["final", "draft", "scatter", "ghosts"],
+    ids=["final", "draft", "scatter", "ghosts", "ringing"],
 )
 def test_roots_are_called_with_the_types_that_the_table_says(words, unused, tmp_path):
     roots, _ = watched(*words, *([tmp_path / "a.exr"] if words[-1] == "-o" else []))

@@ -197,6 +197,13 @@ def render(
     paths: Annotated[
         str | None, typer.Option(help="Ghost paths: all, or same-side of the stop.", rich_help_panel=_WORK)
     ] = None,
+    ringing: Annotated[
+        str | None,
+        typer.Option(
+            help="Rings inside ghosts: off; collins, exact paraxial diffraction; frft, Hullin's estimate.",
+            rich_help_panel=_WORK,
+        ),
+    ] = None,
     mute: Annotated[
         list[str] | None,
         typer.Option(
@@ -307,7 +314,7 @@ def render(
         colorspace=colorspace, half=half, mute=mute or [], solo=solo or [], gain=gain or [], physical=physical,
         orders=orders, order4_limit=order4_limit,
         seed=seed, error=error, error_of=error_of, samples=samples, resumed=None if state is None else state.project,
-        scatter=scatter, surface_roughness=surface_roughness, cleanliness=cleanliness,
+        ringing=ringing, scatter=scatter, surface_roughness=surface_roughness, cleanliness=cleanliness,
         zoom=zoom, filter_plate=filter_plate, imperfection=imperfection, ghost_offset=ghost_offset,
         cover_glass=cover_glass, sensor_reflectance=sensor_reflectance, squeeze=squeeze, desqueeze=desqueeze,
     )  # fmt: skip

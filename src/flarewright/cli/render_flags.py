@@ -90,6 +90,7 @@ class Flags:
     quality: str | None
     wavelengths: int | None
     paths: str | None
+    ringing: str | None
     layers: str | None
     brightest: int | None
     no_starburst: bool
@@ -211,6 +212,7 @@ def _sections(flags: Flags) -> dict[str, dict[str, Any]]:
             "paths": flags.paths,
             "orders": flags.orders,
             "order4_limit": flags.order4_limit,
+            "ringing": flags.ringing,
             "seed": flags.seed,
             "reference_error": flags.error,
             "reference_error_of": flags.error_of,

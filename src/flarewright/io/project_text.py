@@ -45,6 +45,7 @@ ABOUT = {
     "quality.paths": '"all" or "same-side" of the stop',
     "quality.orders": "4 also draws ghosts of four reflections (final)",
     "quality.order4_limit": "of those, what carries more than this part of the two-reflection light",
+    "quality.ringing": '"off", "collins": diffraction in ghosts, "frft": Hullin\'s estimate of it',
     "quality.seed": "begins the random numbers",
     "quality.reference_error": "where reference quality ends: relative standard error of the ghosts",
     "quality.reference_error_of": '"total": of their flux in the picture, "blocks": of blocks of 16 x 16 pixels',

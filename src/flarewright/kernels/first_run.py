@@ -40,6 +40,11 @@ ROOTS = {
     "prepass": ("prepass.find_box", f"{_GEOMETRY}, f8[::1], f8[:,::1], f8, f8, f8, i8, f8, f8, f8[::1], i8, i8", 3.0),
     "draw": ("bundle.draw_bundle", f"{_BUNDLE}, f8[::1], i8, f8[:,::1], none, f8, {_CANVAS}, i8", 4.8),
     "draw masked": ("bundle.draw_bundle", f"{_BUNDLE}, f8[::1], i8, f8[:,::1], f8[:,::1], f8, {_CANVAS}, i8", 6.5),
+    "draw ringing": (
+        "ringing.draw_ringing",
+        f"{_BUNDLE}, f8[::1], i8, f4[::1], f8[:,::1], f8[:,::1], f8[::1], f8, f8[::1], f4[:,:,:,::1], i8",
+        5.0,
+    ),
     "densities": ("bundle.node_densities", _BUNDLE, 0.3),
     "measure": ("bundle.measure_bundle", f"{_BUNDLE}, i8, f8[:,::1], f8[:,::1], i8", 0.6),
     "matrices": (

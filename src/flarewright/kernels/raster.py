@@ -105,6 +105,45 @@ def _fill_strip(flat, blocks, row, depth, xl0, xl1, xr0, xr1, start, gx, density
             flat[at + np.uint64(2 * BLOCK)] += blue * value
 
 
+@inlined
+def pattern_value(texture, k, column, row):
+    """Interpolate a texture's k-th pattern; beyond its border, which is 0, it is 0."""
+    patterns, table = texture[0], texture[1]
+    columns = np.int64(table[k, 2])
+    column = min(max(column, 0.0), table[k, 2] - 1.001)
+    row = min(max(row, 0.0), table[k, 1] - 1.001)
+    c, r = np.int64(column), np.int64(row)
+    fx, fy = column - c, row - r
+    at = np.int64(table[k, 0]) + r * columns + c
+    upper = patterns[at] * (1.0 - fx) + patterns[at + 1] * fx
+    lower = patterns[at + columns] * (1.0 - fx) + patterns[at + columns + 1] * fx
+    return upper * (1.0 - fy) + lower * fy
+
+
+@inner
+def _weave_strip(flat, blocks, row, depth, xl0, xl1, xr0, xr1, start, gx, density_low, density_high, rgb, texture):
+    """Add a strip of a polygon, its light multiplied at each pixel's centre by the patterns of a texture."""
+    la, lb = min(xl0, xl1), max(xl0, xl1)
+    ra, rb = min(xr0, xr1), max(xr0, xr1)
+    l_inverse, r_inverse = 0.5 / max(lb - la, 1e-9), 0.5 / max(rb - ra, 1e-9)
+    places = texture[2]
+    y = row + 0.5
+    for c in range(int(la), min(int(rb), blocks * BLOCK - 1) + 1):
+        x = c + 0.5
+        value = min(max(start + gx * x, density_low), density_high) * depth
+        value *= _share(float(c), la, lb, l_inverse, ra, rb, r_inverse)
+        for k in range(places.shape[0]):
+            column = places[k, 0] + places[k, 1] * x + places[k, 2] * y
+            line = places[k, 3] + places[k, 4] * x + places[k, 5] * y
+            # a pixel's centre may lie beside the polygon
+            column = min(max(column, places[k, 6]), places[k, 7])
+            value *= pattern_value(texture, k, column, min(max(line, places[k, 8]), places[k, 9]))
+        at = (row * blocks + c // BLOCK) * _FLOATS + c % BLOCK
+        flat[at] += rgb[0] * value
+        flat[at + BLOCK] += rgb[1] * value
+        flat[at + 2 * BLOCK] += rgb[2] * value
+
+
 @inner
 def _mark_strip(flat, width, row, depth, xl0, xl1, xr0, xr1, density, rgb):
     """Add a strip of even density to a picture of differences along its rows: only the pixels at its edges change."""
@@ -155,7 +194,7 @@ def sum_rows(differences):
 
 
 @compiled
-def fill_polygon(polygon, count, density, gx, gy, density_low, density_high, rgb, plane):
+def fill_polygon(polygon, count, density, gx, gy, density_low, density_high, rgb, plane, texture=None):
     """Add a convex polygon with linearly varying density to a picture.
 
     Parameters
@@ -171,6 +210,9 @@ def fill_polygon(polygon, count, density, gx, gy, density_low, density_high, rgb
     plane : ndarray, shape (H, B, 3, BLOCK), float32, or (H, W, 3), float64
         Added to. In the second form the density is even, and only the differences along the rows are marked, which
         costs no more for large polygons than for small ones; `sum_rows` turns them into the picture.
+    texture : tuple of ndarray, or None
+        Patterns that multiply the light (`kernels.ringing`), for a picture in blocks; what draws without does not
+        compile it.
 
     Notes
     -----
@@ -218,6 +260,11 @@ def fill_polygon(polygon, count, density, gx, gy, density_low, density_high, rgb
             xr0, xr1 = xr + (y - yr) * right_slope, xr + (y_next - yr) * right_slope
             if plane.ndim == 3:
                 _mark_strip(flat, plane.shape[1], row, y_next - y, xl0, xl1, xr0, xr1, density, rgb)
+            elif texture is not None:
+                _weave_strip(
+                    flat, plane.shape[1], row, y_next - y, xl0, xl1, xr0, xr1, density + gy * (row + 0.5), gx,
+                    density_low, density_high, rgb, texture,
+                )  # fmt: skip
             else:
                 base = density + gy * (row + 0.5)
                 _fill_strip(

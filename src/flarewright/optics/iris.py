@@ -15,7 +15,7 @@ from flarewright.model.iris import Iris
 
 Floats = NDArray[np.float64]
 
-__all__ = ["blade_edges", "outline", "transmission"]
+__all__ = ["blade_edges", "coverage", "outline", "resampled", "softened", "transmission"]
 
 
 def blade_edges(iris: Iris, semi_diameter: float) -> Floats:
@@ -131,12 +131,87 @@ def transmission(
     if mask is not None:
         px, py = np.broadcast_arrays(px, py)
         return _look_up(mask, iris.rotation_deg, px / semi_diameter, py / semi_diameter)
-    worst = _border_value(blade_edges(iris, semi_diameter), px, py)
+    return coverage(blade_edges(iris, semi_diameter), px, py, footprint)
+
+
+def coverage(edges: Floats, x: Floats, y: Floats, footprint: float) -> Floats:
+    """Share of a footprint that lies within equal blades.
+
+    Parameters
+    ----------
+    edges : ndarray, shape (B, 4)
+        From `blade_edges`.
+    x, y : ndarray
+        Points in the stop plane, mm; they broadcast.
+    footprint : float
+        As in `transmission`.
+
+    Returns
+    -------
+    ndarray of float64
+        0 to 1.
+    """
+    worst = _border_value(edges, x, y)
     if footprint <= 0.0:
         return np.where(worst <= 0.0, 1.0, 0.0)
     worst *= -1.0 / footprint
     worst += 0.5
     return np.clip(worst, 0.0, 1.0, out=worst)
+
+
+def softened(ramp: Floats) -> Floats:
+    """Turn borders that are linear ramps, a box's integral, into a triangle's; in place.
+
+    Parameters
+    ----------
+    ramp : ndarray
+        From `coverage` with a footprint; changed, for it is large.
+
+    Returns
+    -------
+    ndarray
+        The same array.
+    """
+    border = (ramp > 0.0) & (ramp < 1.0)
+    t = ramp[border]
+    ramp[border] = np.where(t < 0.5, 2.0 * t**2, 1.0 - 2.0 * (1.0 - t) ** 2)
+    return ramp
+
+
+def resampled(image: NDArray[np.floating], half: float, x: Floats, y: Floats) -> Floats:
+    """Average an image over triangles two samples wide.
+
+    Parameters
+    ----------
+    image : ndarray, shape (rows, columns)
+        Row 0 up; it spans [-half, half] squared, is linear between its pixels' centres and dark outside.
+    half : float
+    x, y : ndarray, shapes (Nx,) and (Ny,)
+        Evenly spaced, rising.
+
+    Returns
+    -------
+    ndarray, shape (Ny, Nx)
+    """
+    across = _triangles(x / half, image.shape[1])
+    down = _triangles(y / half, image.shape[0])[:, ::-1]
+    mean: Floats = down @ np.asarray(image, dtype=np.float64) @ across.T
+    return mean
+
+
+def _triangles(at: Floats, pixels: int) -> Floats:
+    """Weights of the pixels of a line over [-1, 1] for samples of it, shape (N, pixels)."""
+    parts = 16
+    step = float(at[1] - at[0])
+    weights = np.zeros((len(at), pixels + 2))
+    rows = np.arange(len(at))
+    for part in (np.arange(2 * parts) + 0.5) / parts - 1.0:
+        place = np.clip(0.5 * (at + part * step + 1.0) * pixels + 0.5, 0.0, pixels + 1.0)
+        low = np.minimum(place.astype(np.intp), pixels)
+        share = (1.0 - abs(part)) / parts
+        weights[rows, low] += share * (1.0 - (place - low))
+        weights[rows, low + 1] += share * (place - low)
+    return weights[:, 1:-1]
 
 
 def _border_value(edges: Floats, x: Floats, y: Floats) -> Floats:

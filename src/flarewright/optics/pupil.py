@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ..model.iris import Iris
 from .dirt import Elements, rasterise
-from .iris import blade_edges, transmission
+from .iris import blade_edges, softened, transmission
 
 Floats = NDArray[np.float64]
 
@@ -147,11 +147,7 @@ def _blades(iris: Iris, at: Floats, spacing: float, radius_mm: float) -> Floats:
     ramp = transmission(iris, 1.0, at, at[:, None], footprint=2.0 * spacing)
     if iris.roughness_um > 0.0:
         _roughen(ramp, iris, at, spacing, radius_mm)
-    # The linear ramp is a box's integral; this is the triangle's.
-    border = (ramp > 0.0) & (ramp < 1.0)
-    t = ramp[border]
-    ramp[border] = np.where(t < 0.5, 2.0 * t**2, 1.0 - 2.0 * (1.0 - t) ** 2)
-    return ramp
+    return softened(ramp)
 
 
 def _roughen(ramp: Floats, iris: Iris, at: Floats, spacing: float, radius_mm: float) -> None:

@@ -24,6 +24,7 @@ _H, _C, _KB = 6.62607015e-34, 299792458.0, 1.380649e-23  # exact SI values
 __all__ = [
     "FIRST_NM",
     "LAST_NM",
+    "band_contents",
     "band_weights",
     "cie_1931",
     "planck",
@@ -199,6 +200,32 @@ def band_weights(spectrum: Spectrum, wavelengths_nm: ArrayLike, colorspace: Colo
     hats = np.stack([np.interp(wave, nodes, row) for row in identity])
     weights: Floats = hats @ xyz @ xyz_to_rgb_matrix(colorspace).T
     return weights
+
+
+def band_contents(spectrum: Spectrum, wavelengths_nm: ArrayLike) -> tuple[tuple[Floats, Floats], ...]:
+    """Tell what light each traced wavelength stands for in `band_weights`.
+
+    Parameters
+    ----------
+    spectrum : Spectrum
+    wavelengths_nm : array_like, shape (N,)
+        The traced wavelengths, rising.
+
+    Returns
+    -------
+    tuple of (ndarray, ndarray), each of shape (L,)
+        For each of the N: the wavelengths in its band, and their shares of the sum of X, Y and Z, which is 1 in all.
+        A wavelength that stands for no light has itself.
+    """
+    nodes = np.atleast_1d(np.asarray(wavelengths_nm, dtype=np.float64))
+    wave, xyz = _stimulus(spectrum)
+    found = []
+    for node, row in zip(nodes, np.eye(nodes.size), strict=True):
+        share = np.interp(wave, nodes, row) * xyz.sum(axis=1)
+        lit = share > 1e-4 * share.max()
+        held = (wave[lit], share[lit] / share[lit].sum()) if share.max() > 0.0 else (np.array([node]), np.ones(1))
+        found.append(held)
+    return tuple(found)
 
 
 def _table_nm() -> Floats:

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import sqrt
 from threading import Event
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,12 +20,15 @@ from numpy.typing import NDArray
 from ..kernels.bundle import draw_bundle, measure_bundle, node_densities
 from ..kernels.trace import ALIVE, REL, X, Y
 from ..model import Quality
-from ..optics.bundle import Region, find_region, trace_bundle, trace_grid
+from ..optics.bundle import Bundle, Region, find_region, trace_bundle, trace_grid
 from ..optics.paths import LightPath
 from .art import PLAIN, Frame, PathArt
 from .canvas import Canvas, blank, merge
 from .grade import coarseness, finish
 from .shot import Shot
+
+if TYPE_CHECKING:
+    from .ringing import Rings
 
 Floats = NDArray[np.float64]
 
@@ -33,8 +37,10 @@ BRIDGE_PX = 2.0
 SHIFT_QUANTILE = 0.9
 # ghosts fainter than these parts of the picture's mean are drawn at a half and a quarter of the resolution
 DETAIL_CONTRAST = (1.5e-2, 4e-3)
-# a step of colour fainter than this part of the picture's mean is not seen
+# a step of colour or a ring fainter than this part of the picture's mean is not seen
 STEP_CONTRAST = 2e-3
+# patterns fade where the iris would cut: a grid of their zone need not follow a rim
+RING_FLUX = 1e-3
 # never more drawings than this between two traced wavelengths
 MOST_BRIDGES = 32
 
@@ -176,19 +182,48 @@ def draw_final(
     )  # fmt: skip
     count = len(shot.packed.wavelengths_nm)
     traced = [trace_bundle(shot.packed, w, bundle, tilt) for w in range(count)]
+    rings = None
+    if shot.ringing is not None and visibility >= STEP_CONTRAST:
+        pixels_per_mm = (float(to_pixels[2]), float(to_pixels[3]))
+        nearness = shot.packed.nearness / shot.incidence.tilt_cosine
+        rings = shot.ringing.of(shot.packed, path, shot.light, traced, pixels_per_mm, nearness)
+        if rings is not None:
+            bundle, traced = _with_shadow(item, rings, quality, scale)
     pieces = _bridges(traced, item.view_radius, scale, visibility) if quality.bridge else [1] * (count - 1)
     steps = [(w, k / n) for w, n in enumerate(pieces) for k in range(n)] + [(count - 1, 0.0)]
     fine_nm = np.interp([w + part for w, part in steps], np.arange(count), shot.packed.wavelengths_nm)
-    for (w, part), rgb in zip(steps, shot.weights(fine_nm) * item.art.rgb, strict=True):
+    patterns = None if rings is None else rings.textures(fine_nm)
+    for k, ((w, part), rgb) in enumerate(zip(steps, shot.weights(fine_nm) * item.art.rgb, strict=True)):
         if stop is not None and stop.is_set():
             return
-        if rgb.any():
-            data = traced[w] if part == 0.0 else _between(traced[w], traced[w + 1], part)
-            draw_bundle(
-                data, bundle.pupil, bundle.triangles, node_densities(data, bundle.pupil, bundle.triangles),
-                path.stop_crossings, opening.blades, opening.mask, opening.half, shot.incidence.axes,
-                to_pixels, shot.gain, rgb, canvas.plane(detail), bundle.halves,
+        if not rgb.any():
+            continue
+        data = traced[w] if part == 0.0 else _between(traced[w], traced[w + 1], part)
+        densities = node_densities(data, bundle.pupil, bundle.triangles)
+        plane = canvas.plane(detail)
+        if patterns is not None:
+            patterns.draw(
+                k, data, bundle.pupil, bundle.triangles, densities, shot.incidence.axes, to_pixels, shot.gain, rgb,
+                plane, bundle.halves,
             )  # fmt: skip
+        else:
+            draw_bundle(
+                data, bundle.pupil, bundle.triangles, densities, path.stop_crossings, opening.blades, opening.mask,
+                opening.half, shot.incidence.axes, to_pixels, shot.gain, rgb, plane, bundle.halves,
+            )  # fmt: skip
+
+
+def _with_shadow(item: FinalPass, rings: Rings, quality: Quality, scale: float) -> tuple[Bundle, list[Floats]]:
+    """Trace a path anew, beyond the iris too: as far as its diffraction throws light."""
+    shot, opening, tilt = item.shot, item.shot.opening, item.shot.incidence.tilt
+    region = find_region(shot.packed, item.path, tilt, rings.reach, item.view_radius) or item.region
+    # fringes are as fine as an edge wherever they run
+    inner = max(0.0, opening.inner - (rings.reach - opening.radius))
+    bundle = trace_grid(
+        shot.packed, item.path, tilt, (rings.reach, inner), region,
+        tolerance=quality.tolerance_px, scale=scale, view_radius=item.view_radius, flux_tolerance=RING_FLUX,
+    )  # fmt: skip
+    return bundle, [trace_bundle(shot.packed, w, bundle, tilt) for w in range(len(shot.packed.wavelengths_nm))]
 
 
 def draw_alone(items: Sequence[FinalPass], quality: Quality, canvas: Canvas, stop: Event | None = None) -> None:

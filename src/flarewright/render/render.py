@@ -100,6 +100,13 @@ def render(
     if soil is not None and project.dirt.in_ghosts:
         dirty = soiled_opening(opening, settled.iris, settled.order.stop_semi_diameter, soil)
         seen = tuple(replace(shot, opening=dirty) for shot in shots)
+    if project.quality.ringing != "off" and project.quality.mode == "final":
+        from .ringing import Ringing
+
+        rings = Ringing(
+            project.quality.ringing, seen[0].opening, settled.order.stop_semi_diameter, settled.order.f_number
+        )
+        seen = tuple(replace(shot, ringing=rings) for shot in seen)
     if project.quality.mode == "reference":
         drawn = _reference(settled, mask, run, threads, progress)
     else:
@@ -247,6 +254,9 @@ def _remarks(settled: Settled, shots: tuple[Shot, ...]) -> tuple[str, ...]:
         told.append(f"{of}: a disc {blur_px:.1f} pixels wide")
     if settled.project.quality.mode == "draft" and ideal(settled.lens) != settled.lens:
         told.append("draft quality draws the lens as designed, without decentre, tilt and figure errors")
+    quality = settled.project.quality
+    if quality.ringing != "off" and quality.mode != "final":
+        told.append(f"{quality.mode} quality traces rays alone: quality.ringing is for final quality")
     return tuple(told)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from math import sqrt
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,9 @@ from ..optics.iris import blade_edges, outline, transmission
 from ..optics.pack import PackedLens, facing, pack_lens, resolve_coatings
 from ..optics.spectrum import band_weights, traced_wavelengths
 from .prepare import Settled
+
+if TYPE_CHECKING:
+    from .ringing import Ringing
 
 Floats = NDArray[np.float64]
 
@@ -74,6 +78,8 @@ class Shot:
         Column and row of the axis, pixels per mm across and down.
     size_px : tuple of int
     colorspace : {"rec709", "acescg"}
+    ringing : Ringing or None
+        How ghosts show the diffraction at the iris; None: not at all.
     """
 
     light: Light
@@ -83,6 +89,7 @@ class Shot:
     to_pixels: Floats
     size_px: tuple[int, int]
     colorspace: Colorspace
+    ringing: Ringing | None = None
 
     @property
     def gain(self) -> float:

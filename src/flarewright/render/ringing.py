@@ -1,0 +1,383 @@
+"""Rings inside ghosts: what the iris' diffraction makes of a path, drawn in the iris' place.
+
+For every crossing of the stop whose edge is lit, a pattern takes the iris' place in the ghost (`optics.ringing`). It is
+averaged over the light that each drawn wavelength stands for, and over the light's disc. Ghosts whose rings nobody
+could see are left to the plain pass, pixel for pixel.
+"""
+
+from __future__ import annotations
+
+import math
+import threading
+from collections import OrderedDict
+from collections.abc import Hashable, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..kernels.ringing import draw_ringing
+from ..kernels.trace import ALIVE, REL, STOP_X
+from ..model import Light
+from ..model.light import Lines
+from ..optics.iris import coverage, resampled, softened
+from ..optics.pack import PackedLens
+from ..optics.paths import LightPath
+from ..optics.ringing import (
+    SHADOW,
+    FresnelGrid,
+    StopToSensor,
+    crop,
+    disc_blurred,
+    fresnel_grid,
+    fresnel_intensity,
+    frft_fresnel_number,
+    halved,
+    stop_to_sensor,
+)
+from ..optics.spectrum import band_contents
+
+if TYPE_CHECKING:
+    from .shot import Opening
+
+Floats = NDArray[np.float64]
+Singles = NDArray[np.float32]
+Pattern = tuple[Singles, tuple[float, float]]
+Octaves = tuple[tuple[float, float], tuple[float, float]]
+
+LEAST_FRESNEL_NUMBER = 1.0
+"""Below it a ghost is smaller than its own diffraction, and its rays no longer tell where the light goes."""
+
+LEAST_FRINGE_PX = 0.15
+"""Edges whose scale sqrt(lambda L / 2) is less than this on the sensor show no rings: the first is two thirds of it."""
+
+WIDEST_RADII = 2.0
+"""Neither a shadow nor the blur of a light's disc is followed farther than this from the opening."""
+
+NODE_STEP = 0.08
+"""Patterns are computed at Fresnel areas this part apart and shared by all ghosts; cubics run between them.
+
+The first fringe errs by a thousandth of its height then, the third by a tenth at worst; a line's are exact.
+"""
+
+OCTAVES = 1.5
+"""A grid serves Fresnel areas up to this many octaves apart: those of one ghost at all colours."""
+
+TEXEL_PX = 0.7
+"""Patterns are no finer than this on the sensor, in pixels."""
+
+TEXELS_A_DISC = 5.0
+"""Nor finer than this part of the radius of the light's disc."""
+
+KEPT_BYTES = 400_000_000
+KEPT_GRID_BYTES = 100_000_000
+# a crossing is lit where rays come as near to its edge as this part of the circle within it
+LIT = 0.95
+
+
+class _Kept:
+    """The last things that were made, by key, up to a size; threads may share it.
+
+    What it holds depends on the order of the work, what it returns does not.
+    """
+
+    def __init__(self, most: int) -> None:
+        self._most, self._size = most, 0
+        self._held: OrderedDict[Hashable, tuple[Any, int]] = OrderedDict()
+        self._lock = threading.Lock()
+
+    def get(self, key: Hashable) -> Any:
+        with self._lock:
+            if key not in self._held:
+                return None
+            self._held.move_to_end(key)
+            return self._held[key][0]
+
+    def put(self, key: Hashable, value: Any, size: int) -> None:
+        with self._lock:
+            if key in self._held:
+                return
+            self._held[key] = (value, size)
+            self._size += size
+            while self._size > self._most and len(self._held) > 1:
+                _, (_, freed) = self._held.popitem(last=False)
+                self._size -= freed
+
+
+@dataclass(frozen=True)
+class Ringing:
+    """How an iris diffracts, for all ghosts of a picture.
+
+    Attributes
+    ----------
+    mode : {"collins", "frft"}
+    opening : Opening
+    radius : float
+        Of the round opening, mm.
+    f_number : float
+    """
+
+    mode: Literal["collins", "frft"]
+    opening: Opening
+    radius: float
+    f_number: float
+    _grids: _Kept = field(default_factory=lambda: _Kept(KEPT_GRID_BYTES), compare=False, repr=False)
+    _patterns: _Kept = field(default_factory=lambda: _Kept(KEPT_BYTES), compare=False, repr=False)
+
+    def of(
+        self,
+        packed: PackedLens,
+        path: LightPath,
+        light: Light,
+        traced: Sequence[Floats],
+        pixels_per_mm: tuple[float, float],
+        nearness: float = 0.0,
+    ) -> Rings | None:
+        """Decide whether a ghost shows rings.
+
+        Parameters
+        ----------
+        packed : PackedLens
+        path : LightPath
+        light : Light
+        traced : sequence of ndarray, shape (N, 5 + 2 C)
+            Its bundle at the traced wavelengths.
+        pixels_per_mm : tuple of float
+            Across and down on the sensor.
+        nearness : float
+            1 / distance of the light from the first vertex along the axis, 1/mm; 0 for a distant one.
+
+        Returns
+        -------
+        Rings or None
+            None where the edge of the iris is not lit, where its fringes are far below a pixel, and where the Fresnel
+            number is below `LEAST_FRESNEL_NUMBER`: the plain picture is right then.
+        """
+        return _rings(self, packed, path, light, traced, pixels_per_mm, nearness)
+
+    def sample(self, x: Floats, y: Floats) -> tuple[Floats, Floats]:
+        """Sample the opening at x, shape (Nx,), and y, shape (Ny, 1): amplitude and transmittance (`fresnel_grid`)."""
+        opening = self.opening
+        light = softened(coverage(opening.blades, x, y, 2.0 * float(x[1] - x[0])))
+        if opening.mask is None:
+            return light, light
+        wave = resampled(np.sqrt(opening.mask), opening.half, x, y[:, 0])
+        return light * wave, light * resampled(opening.mask, opening.half, x, y[:, 0])
+
+    def grid(self, octaves: Octaves) -> FresnelGrid:
+        """Return the grid for Fresnel areas from 2 ** low to 2 ** high mm^2, in x and in y."""
+        found = self._grids.get(octaves)
+        if found is None:
+            least, most = (tuple(2.0 ** pair[end] for pair in octaves) for end in (0, 1))
+            found = fresnel_grid(
+                self.sample, self.opening.radius, self.radius, (least[0], least[1]), (most[0], most[1])
+            )
+            self._grids.put(octaves, found, found.spectrum.nbytes)
+        kept: FresnelGrid = found
+        return kept
+
+    def pattern(self, octaves: Octaves, area: tuple[float, float], half: tuple[float, float]) -> Pattern:
+        """Return the opening's pattern at a Fresnel area, over a part of the stop at least as wide as asked for."""
+        key = (octaves, area, half)
+        found = self._patterns.get(key)
+        if found is None:
+            grid = self.grid(octaves)
+            found = crop(grid, fresnel_intensity(grid, area), half)
+            self._patterns.put(key, found, found[0].nbytes)
+        kept: Pattern = found
+        return kept
+
+    def sharp(self, step: float) -> Pattern:
+        """Return the opening itself as a pattern."""
+        reach = self.opening.radius + 2.0 * step
+        count = min(2 * math.ceil(reach / step), 2048)
+        step = 2.0 * reach / count
+        at = np.asarray((np.arange(count) - 0.5 * (count - 1)) * step, dtype=np.float64)
+        _, light = self.sample(at, at[:, None])
+        light[0], light[-1], light[:, 0], light[:, -1] = 0.0, 0.0, 0.0, 0.0
+        return np.ascontiguousarray(light, dtype=np.float32), (reach, reach)
+
+
+@dataclass(frozen=True)
+class _Crossing:
+    """The pattern of one crossing of the stop, up to its wavelength.
+
+    Attributes
+    ----------
+    area : ndarray, shape (W, 2)
+        lambda L at the traced wavelengths, mm^2.
+    disc : ndarray, shape (2,)
+        Half the size of the light's disc in the stop, mm.
+    octaves, half
+        As `Ringing.pattern`.
+    halvings : tuple of int
+        How often its resolution may be halved in x and in y.
+    """
+
+    area: Floats
+    disc: Floats
+    octaves: Octaves
+    half: tuple[float, float]
+    halvings: tuple[int, int]
+
+    @property
+    def reach(self) -> float:
+        """How far out in the stop there is light, mm."""
+        return float(max(side + more for side, more in zip(self.half, self.disc, strict=True)))
+
+
+@dataclass(frozen=True)
+class Rings:
+    """What takes the iris' place in one path.
+
+    Attributes
+    ----------
+    ringing : Ringing
+    light : Light
+    wavelengths_nm : ndarray, shape (W,)
+        As traced.
+    crossings : tuple of _Crossing or Pattern
+        One a crossing of the stop; a pattern where the edge is sharp.
+    """
+
+    ringing: Ringing
+    light: Light
+    wavelengths_nm: Floats
+    crossings: tuple[_Crossing | Pattern, ...]
+
+    @property
+    def reach(self) -> float:
+        """How far out in the stop light is looked for, mm."""
+        return max(item.reach for item in self.crossings if isinstance(item, _Crossing))
+
+    def textures(self, drawn_nm: Floats) -> Textures:
+        """Prepare for drawing at some wavelengths."""
+        return Textures(self, band_contents(self.light.spectrum, drawn_nm))
+
+    def texture(self, waves: Floats, shares: Floats) -> tuple[Singles, Floats]:
+        """Return the patterns for some light and their table, as `kernels.ringing` takes them."""
+        found = [self._average(item, waves, shares) if isinstance(item, _Crossing) else item for item in self.crossings]
+        first = np.cumsum([0, *(values.size for values, _ in found)])
+        table = np.array([[at, *values.shape, *half] for at, (values, half) in zip(first[:-1], found, strict=True)])
+        return np.concatenate([values.ravel() for values, _ in found]), table.astype(np.float64)
+
+    def _average(self, item: _Crossing, waves: Floats, shares: Floats) -> Pattern:
+        """Average a crossing's pattern over the light of a band and over the light's disc."""
+        sides = [np.interp(waves, self.wavelengths_nm, side / self.wavelengths_nm) * waves for side in item.area.T]
+        middle = len(self.wavelengths_nm) // 2
+        ratio = float(item.area[middle, 1] / item.area[middle, 0])
+        parts: dict[tuple[float, float], float] = {}
+        for x, y, share in zip(*sides, shares, strict=True):
+            if isinstance(self.light.spectrum, Lines):
+                parts[(float(x), float(y))] = parts.get((float(x), float(y)), 0.0) + float(share)
+                continue
+            place = math.log(abs(x)) / NODE_STEP
+            low = math.floor(place)
+            for node, part in zip(range(low - 1, low + 3), _cubic(place - low), strict=True):
+                at = math.exp(node * NODE_STEP)
+                parts[(at, at * ratio)] = parts.get((at, at * ratio), 0.0) + part * float(share)
+        total: Singles | None = None
+        half = item.half
+        for area, share in parts.items():
+            values, half = self.ringing.pattern(item.octaves, area, item.half)
+            total = values * np.float32(share) if total is None else total + values * np.float32(share)
+        assert total is not None
+        return disc_blurred(*halved(total, half, item.halvings), (float(item.disc[0]), float(item.disc[1])))
+
+
+@dataclass(frozen=True)
+class Textures:
+    """What takes the iris' place at the wavelengths that are drawn.
+
+    Attributes
+    ----------
+    rings : Rings
+    bands : tuple of (ndarray, ndarray)
+        What light each drawn wavelength stands for.
+    """
+
+    rings: Rings
+    bands: tuple[tuple[Floats, Floats], ...]
+
+    def draw(self, k: int, data: Floats, pupil: Floats, triangles: NDArray[np.int64], *rest: Any) -> None:
+        """Draw a bundle at the k-th wavelength; `rest` is what `draw_ringing` takes besides the patterns."""
+        densities, *place = rest
+        crossings = len(self.rings.crossings)
+        draw_ringing(data, pupil, triangles, densities, crossings, *self.rings.texture(*self.bands[k]), *place)
+
+
+def _cubic(t: float) -> tuple[float, float, float, float]:
+    """Weights of Lagrange's cubic through four neighbours at t between the second and the third."""
+    a, b, c, d = t + 1.0, t, t - 1.0, t - 2.0
+    return -b * c * d / 6.0, a * c * d / 2.0, -a * b * d / 2.0, a * b * c / 6.0
+
+
+def _rings(
+    ringing: Ringing,
+    packed: PackedLens,
+    path: LightPath,
+    light: Light,
+    traced: Sequence[Floats],
+    pixels_per_mm: tuple[float, float],
+    nearness: float,
+) -> Rings | None:
+    ways = stop_to_sensor(packed, path, nearness)
+    lit = _lit(traced, path.stop_crossings, ringing.opening)
+    found: list[_Crossing | None] = [
+        _crossing(ringing, packed.wavelengths_nm, way, light, pixels_per_mm) if shines else None
+        for way, shines in zip(ways, lit, strict=True)
+    ]
+    if all(item is None for item in found):
+        return None
+    middle = len(packed.wavelengths_nm) // 2
+    steps = [0.5 / max(float(np.max(np.abs(way.magnification[middle]) * pixels_per_mm)), 1e-9) for way in ways]
+    crossings = [ringing.sharp(step) if item is None else item for item, step in zip(found, steps, strict=True)]
+    return Rings(ringing, light, packed.wavelengths_nm, tuple(crossings))
+
+
+def _lit(traced: Sequence[Floats], crossings: int, opening: Opening) -> list[bool]:
+    """Tell for each crossing whether light that passes everything else comes to the edge of the iris."""
+    # an image may have edges anywhere
+    inner = 0.0 if opening.mask is not None else LIT * opening.inner
+    lit = [False] * crossings
+    for data in traced:
+        radius = np.hypot(data[:, STOP_X::2], data[:, STOP_X + 1 :: 2])
+        passing = (data[:, ALIVE] > 0.0) & (data[:, REL] <= 1.0) & (radius <= opening.radius * (1.0 + 1e-9)).all(axis=1)
+        for c in range(crossings):
+            lit[c] = lit[c] or bool((radius[passing, c] >= inner).any())
+    return lit
+
+
+def _crossing(
+    ringing: Ringing, wavelengths_nm: Floats, way: StopToSensor, light: Light, pixels_per_mm: tuple[float, float]
+) -> _Crossing | None:
+    """Describe a crossing's pattern; None when there is nothing to see of it."""
+    middle = len(wavelengths_nm) // 2
+    if ringing.mode == "frft":
+        area = ringing.radius**2 / frft_fresnel_number(wavelengths_nm, ringing.f_number)[:, None] * np.ones(2)
+        disc = np.zeros(2)
+    else:
+        area = 1e-6 * wavelengths_nm[:, None] * way.length
+        disc = np.abs(way.turn[middle]) * math.radians(0.5 * light.diameter_deg)
+    magnified = np.abs(way.magnification[middle]) * pixels_per_mm
+    if not np.isfinite(area).all() or not np.abs(area).max() <= ringing.radius**2 / LEAST_FRESNEL_NUMBER:
+        return None
+    fringe = np.sqrt(0.5 * np.abs(area))
+    # opposite signs at two wavelengths: somewhere between, the sensor sees the iris itself
+    crosses = bool((np.sign(area) != np.sign(area[0])).any())
+    if crosses or not (fringe.min(axis=0) * magnified).max() >= LEAST_FRINGE_PX:
+        return None
+    # the rings of a line are not averaged, so finer ones are seen: twice the samples
+    finer = 2.0 if isinstance(light.spectrum, Lines) else 0.0
+    # half octaves, so that ghosts alike share their patterns; light beyond the traced wavelengths belongs to the ends
+    low = [math.floor(2.0 * math.log2(0.92 * side)) / 2.0 for side in np.abs(area).min(axis=0)]
+    most = [math.log2(1.12 * side) for side in np.abs(area).max(axis=0)]
+    high = [max(start + OCTAVES, math.ceil(2.0 * end) / 2.0) for start, end in zip(low, most, strict=True)]
+    octaves = ((low[0] - finer, high[0]), (low[1] - finer, high[1]))
+    # no finer than pixels show, nor than the light's disc leaves
+    enough = np.maximum(TEXEL_PX / np.maximum(magnified, 1e-9), disc / TEXELS_A_DISC)
+    halvings = [int(np.clip(math.log2(side / ringing.grid(octaves).step), 0, 6)) for side in enough]
+    widest = WIDEST_RADII * ringing.radius
+    half = [ringing.opening.radius + min(SHADOW * math.sqrt(0.5 * 2.0**top), widest) for top in high]
+    return _Crossing(area, np.minimum(disc, widest), octaves, (half[0], half[1]), (halvings[0], halvings[1]))

@@ -1,0 +1,294 @@
+"""Fresnel diffraction of the iris: the analytic knife edge, disc and far field, Parseval, and both its limits."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from scipy.special import fresnel, j1
+
+from flarewright.model import Iris
+from flarewright.model.light import BlackBody, Lines
+from flarewright.optics.iris import blade_edges, coverage, resampled, softened
+from flarewright.optics.pack import pack_lens
+from flarewright.optics.paraxial import first_order, flare_matrices
+from flarewright.optics.paths import ghost_paths
+from flarewright.optics.ringing import (
+    FRFT_FILL,
+    FRFT_SAMPLES,
+    SHADOW,
+    crop,
+    disc_blurred,
+    fresnel_grid,
+    fresnel_intensity,
+    frft_fresnel_number,
+    halved,
+    stop_to_sensor,
+)
+from flarewright.optics.spectrum import band_contents
+from flarewright.render.prepare import load_lens
+
+RADIUS = 2.0
+
+
+def blades(iris):
+    edges = blade_edges(iris, RADIUS)
+
+    def opening(x, y):
+        light = softened(coverage(edges, x, y, 2.0 * float(x[1] - x[0])))
+        return light, light
+
+    return opening
+
+
+def square(half):
+    """A square opening: four blades."""
+    edges = blade_edges(Iris(blades=4), RADIUS)
+    edges[:, 2] = half
+    edges[:, :2] = np.round(edges[:, :2])
+
+    def opening(x, y):
+        light = softened(coverage(edges, x, y, 2.0 * float(x[1] - x[0])))
+        return light, light
+
+    return opening
+
+
+def diffracted(opening, fresnel_number, reach=1.7 * RADIUS, finer=9.0):
+    """A pattern and the scale of its fringes; a grid for areas down to a ninth has 24 samples a fringe, not 8."""
+    area = RADIUS**2 / fresnel_number
+    grid = fresnel_grid(opening, reach, RADIUS, (abs(area) / finer,) * 2, (abs(area),) * 2)
+    return grid, fresnel_intensity(grid, (area, area)), math.sqrt(abs(area) / 2.0)
+
+
+def slit_field(at, half, scale):
+    """Analytic wave behind a slit: the difference of two Fresnel integrals."""
+    (s1, c1), (s2, c2) = fresnel((at + half) / scale), fresnel((at - half) / scale)
+    return ((c1 - c2) + 1j * (s1 - s2)) * np.exp(-0.25j * math.pi) / math.sqrt(2.0)
+
+
+def unlike_slits(fresnel_number, finer):
+    """Root mean square and largest error of a square opening's pattern: the product of two slits."""
+    grid, found, scale = diffracted(square(1.5), fresnel_number, 1.5, finer)
+    x, y = (np.abs(slit_field(at, 1.5, scale)) ** 2 for at in grid.at)
+    seen = np.abs(grid.at[0]) < 1.5 + 4.0 * scale
+    error = (found - y[:, None] * x)[np.ix_(seen, seen)]
+    return math.sqrt(np.mean(error**2)), np.abs(error).max()
+
+
+@pytest.mark.parametrize(
+    ("fresnel_number", "mean", "most"), [(3.0, 3e-4, 4e-3), (40.0, 8e-4, 5e-3), (-40.0, 8e-4, 5e-3)]
+)
+def test_square_is_the_product_of_two_analytic_slits(fresnel_number, mean, most):
+    error = unlike_slits(fresnel_number, 9.0)
+    assert error[0] < mean
+    assert error[1] < most
+
+
+def test_grids_of_a_picture_leave_out_the_finest_ripples_only():
+    # eight samples a fringe do not tell ripples that a sixteenth of one turns around
+    assert unlike_slits(40.0, 1.0)[0] < 0.03
+    assert unlike_slits(700.0, 1.0)[0] < 0.03
+    assert unlike_slits(700.0, 9.0)[0] < 0.5 * unlike_slits(700.0, 1.0)[0] + 0.002
+
+
+def test_edge_of_a_wide_opening_is_the_analytic_knife_edge():
+    grid, found, scale = diffracted(square(RADIUS), 2000.0, RADIUS)
+    middle = len(grid.at[1]) // 2
+    w = (RADIUS - grid.at[0]) / scale
+    s, c = fresnel(w)
+    edge = 0.5 * ((c + 0.5) ** 2 + (s + 0.5) ** 2)
+    near = (w > -5.0) & (w < 8.0)
+    # the three other edges ripple too: by 1 / (pi w) of the wave, w = 45 scales away and more
+    ripple = 2.0 * sum(math.sqrt(0.5) / math.pi / (far / scale) for far in (RADIUS, RADIUS, 2.0 * RADIUS))
+    row, w = (0.5 * (found[middle] + found[middle - 1]))[::-1], w[::-1]
+    near = near[::-1]
+    assert np.abs(row - edge[::-1])[near].max() < ripple
+    # the textbook's numbers: a quarter at the edge, 1.37 at the first maximum, w = 1.217
+    assert np.interp(0.0, w, row) == pytest.approx(0.25, abs=0.5 * ripple)
+    assert row[near].max() == pytest.approx(1.370, abs=ripple)
+    assert w[near][np.argmax(row[near])] == pytest.approx(1.217, abs=0.1)
+
+
+@pytest.mark.parametrize("fresnel_number", [2.0, 3.0, 7.5, 30.0])
+def test_middle_of_a_disc_is_its_closed_form(fresnel_number):
+    """4 sin^2(pi N_F / 2): dark for even Fresnel numbers, four times the open light for odd ones."""
+    grid, found, _ = diffracted(blades(Iris()), fresnel_number)
+    k = len(grid.at[0]) // 2
+    middle = found[k - 1 : k + 1, k - 1 : k + 1].mean()
+    assert middle == pytest.approx(4.0 * math.sin(0.5 * math.pi * fresnel_number) ** 2, abs=0.07)
+
+
+def test_small_fresnel_numbers_tend_to_the_airy_disc():
+    number = 0.1
+    grid, found, _ = diffracted(blades(Iris()), number, RADIUS, 1.0)
+    r = np.hypot(grid.at[0], grid.at[1][:, None]) / RADIUS
+    v = 2.0 * math.pi * number * r
+    airy = (math.pi * number) ** 2 * (2.0 * j1(v) / v) ** 2
+    near = r < 1.5 / number
+    # the wave's own curvature over the opening is pi N_F, of which the intensity feels the square
+    assert np.abs(found - airy)[near].max() < 0.02 * airy.max()
+    # first zero at 1.22 lambda L / (2 h): 0.61 / N_F radii
+    row = found[len(found) // 2]
+    ring = (grid.at[0] > 0.4 * RADIUS / number) & (grid.at[0] < 0.9 * RADIUS / number)
+    assert grid.at[0][ring][np.argmin(row[ring])] == pytest.approx(0.61 * RADIUS / number, rel=0.02)
+
+
+@pytest.mark.parametrize("iris", [Iris(), Iris(blades=5, rotation_deg=11), Iris(blades=6, rounding=0.4)])
+@pytest.mark.parametrize("fresnel_number", [1.5, 60.0, 5000.0])
+def test_parseval_and_what_is_kept(iris, fresnel_number):
+    opening = blades(iris)
+    grid, found, scale = diffracted(opening, fresnel_number)
+    _, light = opening(grid.at[0], grid.at[1][:, None])
+    # the light of the opening, whatever its wave does
+    assert found.sum(dtype=float) == pytest.approx(light.sum(), rel=0.01)
+    again = fresnel_intensity(grid, (0.3 * RADIUS**2 / fresnel_number,) * 2)
+    assert found.sum(dtype=float) == pytest.approx(again.sum(dtype=float), rel=1e-5)
+    assert light.sum() * grid.step**2 == pytest.approx(math.pi * RADIUS**2, rel=2e-3)
+    reach = 1.7 * RADIUS + min(SHADOW * scale, 2.0 * RADIUS)
+    kept, half = crop(grid, found, (reach, reach))
+    # what the crop leaves out, it gives back; little of it
+    assert kept.sum(dtype=float) == pytest.approx(light.sum(), rel=1e-5)
+    assert half[0] >= reach or half[0] >= 0.5 * len(grid.at[0]) * grid.step * (1 - 1e-9)
+    middle = len(kept) // 2, len(found) // 2
+    assert kept[middle[0], middle[0]] / found[middle[1], middle[1]] == pytest.approx(
+        1.0, abs=0.06 if fresnel_number < 2 else 0.02
+    )
+    for times in ((1, 0), (2, 3)):
+        coarse, wide = halved(kept, half, times)
+        cell = 4.0 * wide[0] * wide[1] / coarse.size
+        assert coarse.sum(dtype=float) * cell == pytest.approx(light.sum() * grid.step**2, rel=1e-5)
+        assert max(coarse[0].max(), coarse[-1].max(), coarse[:, 0].max(), coarse[:, -1].max()) == 0.0
+
+
+def test_large_fresnel_numbers_tend_to_the_geometric_shadow():
+    """Where fringes are finer than what looks at them, nothing is left of them."""
+    opening, errors = blades(Iris(blades=6)), []
+    for number in (30.0, 300.0, 3000.0):
+        grid, found, _ = diffracted(opening, number)
+        _, light = opening(grid.at[0], grid.at[1][:, None])
+        kept, half = crop(grid, found, (3.0 * RADIUS,) * 2)
+        shadow, _ = crop(grid, np.asarray(light, dtype=np.float32), (3.0 * RADIUS,) * 2)
+        look = [disc_blurred(pattern, half, (0.1 * RADIUS,) * 2)[0] for pattern in (kept, shadow)]
+        errors.append(float(np.abs(look[0] - look[1]).mean()) / float(look[1].mean()))
+    # what is moved about in fringes of width 1 / sqrt(N_F) is of that order
+    assert errors[1] < 0.5 * errors[0]
+    assert errors[2] < 0.4 * errors[1]
+    assert errors[2] < 0.01
+
+
+def test_either_sign_is_the_same_light():
+    opening = blades(Iris(blades=5))
+    grid, one, _ = diffracted(opening, 100.0)
+    np.testing.assert_allclose(fresnel_intensity(grid, (-(RADIUS**2) / 100.0,) * 2), one, atol=1e-4)
+
+
+def test_two_meridians_are_two_slits():
+    area = (RADIUS**2 / 50.0, -(RADIUS**2) / 400.0)
+    grid = fresnel_grid(square(1.5), 1.5, RADIUS, (abs(area[0]), abs(area[1])), (abs(area[0]), abs(area[1])))
+    found = fresnel_intensity(grid, area)
+    x, y = (np.abs(slit_field(at, 1.5, math.sqrt(abs(a) / 2.0))) ** 2 for at, a in zip(grid.at, area, strict=True))
+    assert np.sqrt(np.mean((found - y[:, None] * x) ** 2)) < 0.012
+
+
+def test_a_disc_of_light_adds_points():
+    """Second method: the average of shifted patterns."""
+    grid, found, scale = diffracted(square(1.5), 60.0, 1.5)
+    kept, half = crop(grid, found, (2.4, 2.4))
+    blurred, wide = disc_blurred(kept, half, (0.3, 0.3))
+    assert blurred.sum(dtype=float) == pytest.approx(kept.sum(dtype=float), rel=1e-4)
+    k = np.arange(400) + 0.5
+    radius, angle = 0.3 * np.sqrt(k / 400), 2.399963 * k
+    at = np.linspace(-1.4, 1.4, 57)
+    for y in (0.0, 1.3):
+        expected = np.mean(
+            [
+                np.abs(slit_field(at + r * np.cos(t), 1.5, scale)) ** 2
+                * np.abs(slit_field(np.array(y + r * np.sin(t)), 1.5, scale)) ** 2
+                for r, t in zip(radius, angle, strict=True)
+            ],
+            axis=0,
+        )
+        step = 2.0 * wide[0] / blurred.shape[1]
+        row = blurred[round((y + wide[1]) / step - 0.5)]
+        seen = np.interp(at, (np.arange(len(row)) + 0.5) * step - wide[0], row)
+        np.testing.assert_allclose(seen, expected, atol=0.02)
+
+
+def test_frft_is_the_fractional_fourier_transform():
+    """Second method: the transform's own integral in Ozaktas' plane, and Hullin's order."""
+    wave, f_number = 550.0, 16.0
+    phi = 0.5 * math.pi * 0.15 * (wave / 400.0) * (f_number / 18.0)
+    n = FRFT_SAMPLES
+    half = 0.5 * FRFT_FILL * math.sqrt(n)  # of the slit, in the plane's units
+    u = np.linspace(-half, half, 40001)
+    at = np.linspace(-1.2, 1.2, 201) * half  # in the opening; the transform lies at cos(phi) times it
+    image = at * math.cos(phi)
+    kernel = np.exp(1j * math.pi * (u**2 / math.tan(phi) - 2.0 * u * image[:, None] / math.sin(phi)))
+    transform = np.trapezoid(kernel, u, axis=1) / math.sqrt(math.sin(phi))
+    expected = np.abs(transform) ** 2 * math.cos(phi)
+    number = float(frft_fresnel_number(np.array([wave]), f_number)[0])
+    field = slit_field(at / half, 1.0, math.sqrt(0.5 / number))
+    np.testing.assert_allclose(np.abs(field) ** 2, expected, atol=2e-3)
+    # longer wavelengths and smaller openings ring more
+    numbers = frft_fresnel_number(np.array([400.0, 700.0]), f_number)
+    assert numbers[0] > numbers[1] > frft_fresnel_number(np.array([700.0]), 22.0)[0]
+    assert frft_fresnel_number(np.array([700.0]), 250.0)[0] == 1.0
+
+
+def test_matrices_of_a_ghost_tell_its_fresnel_length():
+    """Second method: the ghost's matrices behind the stop, and its rays there."""
+    lens = load_lens("heliar-tronnier")
+    order = first_order(lens, 8.0)
+    packed = pack_lens(lens, order, (None,) * len(lens.rows), np.array([486.0, 587.56]))
+    for path in ghost_paths(lens, "all"):
+        for nearness in (0.0, 1e-3):
+            way = stop_to_sensor(packed, path, nearness)[0]
+            Ma, Ms = flare_matrices(lens, path, 587.56, packed.sensor_z)
+            # a ray of the light at height 1 in the first plane
+            y, slope = Ma @ (1.0, nearness)
+            A, B = Ms[0]
+            magnification = A + B * slope / y
+            assert way.magnification[1] == pytest.approx(np.full(2, magnification), rel=1e-6)
+            # the stop stands in air
+            assert way.length[1] == pytest.approx(np.full(2, B / magnification), rel=1e-6)
+
+
+def test_turn_is_how_rays_move():
+    lens = load_lens("tessar-brendel")
+    order = first_order(lens, 8.0)
+    packed = pack_lens(lens, order, (None,) * len(lens.rows), np.array([587.56]))
+    for path in ghost_paths(lens, "all"):
+        way = stop_to_sensor(packed, path)[0]
+        Ma, Ms = flare_matrices(lens, path, 587.56, packed.sensor_z)
+        # rays through the middle of the stop, of light at 0 and at 1e-3 rad
+        ray = np.linalg.solve(Ma, (0.0, 1.0))
+        at_stop = Ma @ (ray * (1e-3 / ray[1]))
+        assert at_stop[0] == pytest.approx(0.0, abs=1e-12)
+        moved = (Ms @ at_stop)[0] / way.magnification[0, 1]
+        assert moved == pytest.approx(1e-3 * way.turn[0, 1], rel=1e-6)
+
+
+def test_bands_share_out_all_light():
+    nodes = np.array([440.0, 500.0, 560.0, 650.0])
+    bands = band_contents(BlackBody(temperature_k=4000.0), nodes)
+    for node, (waves, shares) in zip(nodes, bands, strict=True):
+        assert shares.sum() == pytest.approx(1.0)
+        assert waves.min() <= node <= waves.max()
+    # inside, a band ends at its neighbours
+    assert bands[1][0].min() > 440.0
+    assert bands[1][0].max() < 560.0
+    lines = Lines(lines=((500.0, 1.0), (560.0, 3.0)))
+    for (waves, shares), wave in zip(band_contents(lines, np.array([500.0, 560.0])), (500.0, 560.0), strict=True):
+        assert (waves.tolist(), shares.tolist()) == ([wave], [1.0])
+
+
+def test_an_image_resampled_keeps_its_light_and_its_side():
+    image = np.zeros((6, 8))
+    image[0, 7] = 1.0  # up and right
+    at = (np.arange(400) + 0.5) * 0.01 - 2.0
+    found = resampled(image, 1.5, at, at)
+    assert found.sum() * 0.01**2 == pytest.approx((3.0 / 8) * (3.0 / 6), rel=1e-3)
+    assert found[at > 1.0][:, at > 1.1].max() == pytest.approx(1.0, abs=0.1)
+    assert found[at < 0.5].max() == 0.0

@@ -1,0 +1,171 @@
+"""Rings inside ghosts: a ghost is Collins' integral, no light is lost, and what has no rings stays as it is."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from scipy.special import fresnel
+
+from flarewright.model import Art, Camera, Dirt, Iris, Light, Lines, Output, Project, Quality, Rule
+from flarewright.optics.paraxial import flare_matrices
+from flarewright.optics.paths import ghost_paths
+from flarewright.render.prepare import settle
+from flarewright.render.render import render
+from flarewright.render.ringing import Ringing
+
+LENS, WAVE = "heliar-tronnier", 560.0
+GREEN = Lines(lines=((WAVE, 1.0),))
+
+
+def project(ghost=None, ringing="collins", **changes):
+    """One ghost of a lens, or all of them."""
+    rules = () if ghost is None else (Rule(select="all", enable=False), Rule(select=ghost, enable=True))
+    fields = {
+        "lens": LENS,
+        "f_number": 16.0,
+        "iris": Iris(blades=4),
+        "lights": (Light(field_deg=(0.0, 0.0), spectrum=GREEN),),
+        "camera": Camera(size_px=(400, 400), sensor_mm=(20.0, 20.0)),
+        "output": Output(starburst=False, layers="passes"),
+        "quality": Quality(ringing=ringing, wavelengths=5),
+        "art": Art(rules=rules),
+    }
+    return Project.model_validate({**fields, **changes})
+
+
+def picture(wanted, **options):
+    layer = {layer.name: layer for layer in render(wanted, **options).layers}["ghosts"]
+    width, height = wanted.camera.size_px
+    pixels = np.zeros((height, width, 3))
+    x, y, w, h = layer.window
+    pixels[y : y + h, x : x + w] = layer.pixels
+    return pixels
+
+
+def luminance(pixels):
+    return pixels @ (0.2126, 0.7152, 0.0722)
+
+
+def slit(at, half, scale):
+    (s1, c1), (s2, c2) = fresnel((at + half) / scale), fresnel((at - half) / scale)
+    return 0.5 * ((c1 - c2) ** 2 + (s1 - s2) ** 2)
+
+
+@pytest.mark.parametrize(("ghost", "width"), [("2-1", 20.0), ("4-1", 36.0), ("8-6", 36.0)])
+def test_a_ghost_on_the_axis_is_collins_integral(ghost, width):
+    """Second method: the ghost's matrices and the analytic slit, pixel by pixel over a square ghost."""
+    camera = Camera(size_px=(400, 400), sensor_mm=(width, width))
+    wanted = project(ghost, camera=camera)
+    settled = settle(wanted)
+    path = next(path for path in ghost_paths(settled.lens, "all") if path.name == ghost)
+    z = sum(row.thickness for row in settled.lens.rows[:-1]) + settled.order.sensor_distance
+    Ma, Ms = flare_matrices(settled.lens, path, WAVE, z)
+    magnification = abs(Ms[0, 0] + Ms[0, 1] * Ma[1, 0] / Ma[0, 0])
+    scale = math.sqrt(abs(1e-6 * WAVE * Ms[0, 1] / magnification) / 2.0)
+    half = 0.5 * math.sqrt(math.pi) * settled.order.stop_semi_diameter
+    sharp = luminance(picture(project(ghost, "off", camera=camera)))
+    found = luminance(picture(wanted))
+    # aberrations make the sharp square a little larger than matrices say: take its edge from the picture
+    pixel, row = width / 400, sharp[200]
+    first = int(np.flatnonzero(row > 0.01 * row.max())[0])
+    size = pixel * (200.0 - (first + 1.0 - row[first] / row[first + 2]))
+    assert size == pytest.approx(half * magnification, rel=0.02)
+    fine = (np.arange(400 * 16) + 0.5) / 16 - 200.0
+    # with it comes the third order: x = M xi (1 + c xi^2) lands on the edge at xi = half
+    stop = np.linspace(-1.2 * half, 1.2 * half, 4001)
+    bend = (size / (half * magnification) - 1.0) / half**2
+    at = np.interp(fine * pixel, magnification * stop * (1.0 + bend * stop**2), stop)
+    across = slit(at, half, scale).reshape(400, 16).mean(axis=1)
+    # the light of the sharp ghost, which is not quite even, times the pattern, in a strip across the middle
+    inside = np.abs(np.arange(400) + 0.5 - 200.0) < size / pixel - 1.5
+    strip = slice(195, 205)
+    ripples = (found[strip].mean(axis=0) / np.maximum(sharp[strip].mean(axis=0), 1e-12))[inside]
+    expected = across[inside] * across[strip].mean()
+    assert expected.std() > 0.03
+    assert np.sqrt(np.mean((ripples - expected) ** 2)) < min(0.02, 0.5 * expected.std())
+
+
+@pytest.mark.parametrize("mode", ["collins", "frft"])
+@pytest.mark.parametrize("diameter", [0.0, 0.3])
+def test_no_light_is_lost(mode, diameter):
+    light = (Light(field_deg=(3.0, 2.0), diameter_deg=diameter),)
+    sharp, found = (
+        picture(project("2-1", ringing, lights=light, iris=Iris(blades=7, rotation_deg=5))) for ringing in ("off", mode)
+    )
+    assert np.abs(found - sharp).max() > 0.1 * sharp.max()
+    assert found.sum() == pytest.approx(sharp.sum(), rel=2e-3)
+    # the ghost stays where it was
+    for axis in (0, 1):
+        line = np.arange(400)
+        a, b = (luminance(p).sum(axis=axis) for p in (sharp, found))
+        assert (a * line).sum() / a.sum() == pytest.approx((b * line).sum() / b.sum(), abs=0.3)
+
+
+def test_a_disc_takes_the_rings_away_and_lines_show_more_than_white():
+    def ripple(**light):
+        found = luminance(picture(project("2-1", lights=(Light(field_deg=(0.0, 0.0), **light),))))
+        # along the edge, where the first fringes run
+        profile = found[180:220, 86:150].mean(axis=0)
+        return profile.std() / profile.mean()
+
+    green, white, sun = ripple(spectrum=GREEN), ripple(), ripple(diameter_deg=0.53)
+    assert green > 1.2 * white > 1.2 * 3.0 * sun
+
+
+def test_where_there_are_no_rings_the_picture_is_the_plain_one():
+    # pixels of 4 mm, fringes of a tenth of one
+    coarse = Camera(size_px=(24, 24), sensor_mm=(96.0, 96.0))
+    assert np.array_equal(picture(project("2-1", camera=coarse)), picture(project("2-1", "off", camera=coarse)))
+    assert not np.array_equal(picture(project("2-1")), picture(project("2-1", "off")))
+
+
+def test_an_edge_that_is_not_lit_does_not_ring():
+    """Wide open, rims cut some ghosts before the iris does; a light that the iris does not see makes no rings."""
+    wanted = project(f_number=4.5, iris=Iris(), lights=(Light(field_deg=(14.0, 0.0)),))
+    settled = settle(wanted)
+    assert settled.order.f_number == 4.5
+    unlit = []
+    real = Ringing.of
+
+    def watched(self, packed, path, light, traced, *rest):
+        rings = real(self, packed, path, light, traced, *rest)
+        inner = self.opening.inner
+        nearest = 0.0
+        for data in traced:
+            radius = np.hypot(data[:, 5::2], data[:, 6::2])
+            passing = (data[:, 4] > 0) & (data[:, 3] <= 1) & (radius <= inner).all(axis=1)
+            nearest = max(nearest, float(radius[passing].max(initial=0.0)))
+        if nearest < 0.9 * inner:
+            unlit.append(rings)
+        return rings
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Ringing, "of", watched)
+        picture(wanted)
+    assert unlit
+    assert all(rings is None for rings in unlit)
+
+
+def test_the_same_pixels_on_any_number_of_threads():
+    wanted = project(
+        lights=(Light(field_deg=(6.0, 4.0)),),
+        camera=Camera(size_px=(160, 90)),
+        quality=Quality(ringing="collins", wavelengths=3),
+    )
+    one, four = (picture(wanted, threads=n) for n in (1, 4))
+    assert np.array_equal(one, four)
+
+
+def test_dirt_in_ghosts_diffracts_too():
+    dirt = Dirt(dust_per_mm2=0.3, dust_um=(200.0, 400.0), seed=2, in_ghosts=True)
+    sharp, found = (picture(project("2-1", ringing, dirt=dirt)) for ringing in ("off", "collins"))
+    middle = (slice(120, 280), slice(120, 280))
+    assert np.abs(found - sharp)[middle].max() > 0.2 * sharp.max()
+    assert found.sum() == pytest.approx(sharp.sum(), rel=0.01)
+
+
+def test_draft_says_that_it_has_no_rings():
+    quality = Quality(mode="draft", ringing="collins")
+    assert any("quality.ringing" in told for told in render(project(quality=quality)).remarks)
