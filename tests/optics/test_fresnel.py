@@ -178,6 +178,26 @@ def test_large_fresnel_numbers_tend_to_the_geometric_shadow():
     assert errors[2] < 0.01
 
 
+def test_white_patterns_are_the_fringes_that_a_band_of_colours_leaves():
+    opening, scale = square(1.5), math.sqrt(RADIUS**2 / 60.0 / 2.0)
+    grid = fresnel_grid(opening, 1.5, RADIUS, (RADIUS**2 / 600.0,) * 2, (RADIUS**2 / 40.0,) * 2)
+    row = len(grid.at[1]) // 2
+    areas = RADIUS**2 / 60.0 * np.linspace(0.87, 1.13, 53)
+    weights = 1.0 - np.abs(np.linspace(-1.0, 1.0, 53))
+    band = [
+        sum(w * fresnel_intensity(grid, (a, a), white=white)[row] for w, a in zip(weights, areas, strict=True))
+        / weights.sum()
+        for white in (False, True)
+    ]
+    assert np.abs(band[1] - band[0]).max() < 0.02
+    # of one colour the fringes near an edge stay, those far from it go
+    one, faded = (fresnel_intensity(grid, (areas[26],) * 2, white=white)[row] for white in (False, True))
+    near = np.abs(np.abs(grid.at[0]) - 1.5) < 2.0 * scale
+    assert np.sqrt(np.mean((faded - one)[near] ** 2)) < 0.25 * np.std(one[near])
+    middle = np.abs(grid.at[0]) < 3.0 * scale
+    assert np.std(faded[middle]) < 0.6 * np.std(one[middle])
+
+
 def test_either_sign_is_the_same_light():
     opening = blades(Iris(blades=5))
     grid, one, _ = diffracted(opening, 100.0)

@@ -42,6 +42,9 @@ MOST_SAMPLES = 2048
 SHADOW = 6.0
 """How far into the shadow a pattern goes, in sqrt(lambda L / 2): to 1 / (2 pi^2 6^2) = 0.14 % of the open light."""
 
+FADE = (5.0, 7.0)
+"""White light's fringes end between these distances from an edge, in sqrt(lambda L / 2): the sixth and the twelfth."""
+
 FRFT_SAMPLES = 512
 """Samples across the texture that Hullin's fractional Fourier transform sees; the paper does not say how many."""
 
@@ -237,7 +240,7 @@ def _fast_size(least: int) -> int:
         found += 2
 
 
-def fresnel_intensity(grid: FresnelGrid, area: tuple[float, float]) -> Singles:
+def fresnel_intensity(grid: FresnelGrid, area: tuple[float, float], *, white: bool = False) -> Singles:
     """Diffract an opening.
 
     Parameters
@@ -246,11 +249,13 @@ def fresnel_intensity(grid: FresnelGrid, area: tuple[float, float]) -> Singles:
         Made for this Fresnel area.
     area : tuple of float
         lambda L in x and in y, mm^2; of either sign.
+    white : bool
+        Leave out the fine fringes that no band of colours leaves: those between `FADE`.
 
     Returns
     -------
     ndarray, shape (Ny, Nx), float32
-        |U|^2, 1 in the middle of a wide opening. Its sum does not depend on the area (Parseval).
+        |U|^2, 1 in the middle of a wide opening. Its sum does not depend on the area (Parseval), unless `white`.
 
     Notes
     -----
@@ -261,6 +266,12 @@ def fresnel_intensity(grid: FresnelGrid, area: tuple[float, float]) -> Singles:
     fy = np.fft.fftfreq(len(grid.at[1]), grid.step)
     turn = np.exp(-1j * math.pi * area[1] * fy**2)[:, None].astype(np.complex64)
     turn = turn * np.exp(-1j * math.pi * area[0] * fx**2).astype(np.complex64)
+    if white:
+        w = np.abs(2.0 * area[1]) * (fy**2)[:, None].astype(np.float32) + np.abs(2.0 * area[0]) * (fx**2).astype(
+            np.float32
+        )
+        fade = np.clip((FADE[1] - np.sqrt(w, dtype=np.float32)) / (FADE[1] - FADE[0]), 0.0, 1.0)
+        turn *= fade * fade * (3.0 - 2.0 * fade)
     shape = (len(grid.at[1]), len(grid.at[0]))
     real = np.fft.irfft2(grid.spectrum * turn.real, shape)
     imaginary = np.fft.irfft2(grid.spectrum * turn.imag, shape)

@@ -177,13 +177,15 @@ class Ringing:
         kept: FresnelGrid = found
         return kept
 
-    def pattern(self, octaves: Octaves, area: tuple[float, float], half: tuple[float, float]) -> Pattern:
+    def pattern(
+        self, octaves: Octaves, area: tuple[float, float], half: tuple[float, float], *, white: bool
+    ) -> Pattern:
         """Return the opening's pattern at a Fresnel area, over a part of the stop at least as wide as asked for."""
-        key = (octaves, area, half)
+        key = (octaves, area, half, white)
         found = self._patterns.get(key)
         if found is None:
             grid = self.grid(octaves)
-            found = crop(grid, fresnel_intensity(grid, area), half)
+            found = crop(grid, fresnel_intensity(grid, area, white=white), half)
             self._patterns.put(key, found, found[0].nbytes)
         kept: Pattern = found
         return kept
@@ -267,9 +269,10 @@ class Rings:
         sides = [np.interp(waves, self.wavelengths_nm, side / self.wavelengths_nm) * waves for side in item.area.T]
         middle = len(self.wavelengths_nm) // 2
         ratio = float(item.area[middle, 1] / item.area[middle, 0])
+        white = not isinstance(self.light.spectrum, Lines)
         parts: dict[tuple[float, float], float] = {}
         for x, y, share in zip(*sides, shares, strict=True):
-            if isinstance(self.light.spectrum, Lines):
+            if not white:
                 parts[(float(x), float(y))] = parts.get((float(x), float(y)), 0.0) + float(share)
                 continue
             place = math.log(abs(x)) / NODE_STEP
@@ -280,7 +283,7 @@ class Rings:
         total: Singles | None = None
         half = item.half
         for area, share in parts.items():
-            values, half = self.ringing.pattern(item.octaves, area, item.half)
+            values, half = self.ringing.pattern(item.octaves, area, item.half, white=white)
             total = values * np.float32(share) if total is None else total + values * np.float32(share)
         assert total is not None
         return disc_blurred(*halved(total, half, item.halvings), (float(item.disc[0]), float(item.disc[1])))
