@@ -17,6 +17,7 @@ from . import (
     coating_plot,
     design_benchmark,
     design_colors,
+    design_edit,
     design_identify,
     design_scratch,
     design_solve,
@@ -67,6 +68,8 @@ design_app.command("solve", epilog=design_solve.EPILOG)(design_solve.solve)
 design_app.command("resume")(design_solve.resume)
 design_app.command("scratch", epilog=design_scratch.EPILOG)(design_scratch.scratch)
 design_app.command("colors", epilog=design_colors.EPILOG)(design_colors.colors)
+design_app.command("resize")(design_edit.resize)
+design_app.command("move-stop")(design_edit.move_stop)
 design_app.command("benchmark", epilog=design_benchmark.EPILOG)(design_benchmark.benchmark)
 design_app.command("identify", epilog=design_identify.EPILOG)(design_identify.identify)
 
