@@ -7,10 +7,10 @@ import pytest
 
 from flarewright.errors import ProjectError
 from flarewright.io.reference_state import read_state, write_state
-from flarewright.model import BlackBody, Camera, Iris, Light, Output, Project, Quality
+from flarewright.model import BlackBody, Camera, Iris, Light, Output, Project, Quality, Scatter, Surface
 from flarewright.optics.color import luminance_weights
 from flarewright.render import reference as reference_pass
-from flarewright.render.prepare import settle
+from flarewright.render.prepare import load_lens, settle
 from flarewright.render.reference import FEWEST, ReferenceRun
 from flarewright.render.render import render
 from flarewright.render.shot import make_opening, make_shots
@@ -199,6 +199,24 @@ def test_ledger_sums_to_one(mode):
     shares = rendering.summary["ledger"]["shares"]
     assert len(shares) == 12
     assert all(share >= 0.0 for share in shares.values())
+
+
+@pytest.mark.parametrize("mode", ["final", "reference"])
+def test_scatter_has_its_line_in_the_ledger(mode):
+    """Six surfaces that scatter 2 % each leave 0.98^6 of the direct light; the rest stays as it was."""
+    plain = render(project(mode=mode), ledger=True).summary["ledger"]
+    dusty = project(mode=mode).replace(scatter=Scatter(model="chaumond", share=0.02))
+    ledger = render(dusty, ledger=True).summary["ledger"]
+    clear, shares = plain["shares"], ledger["shares"]
+    surfaces = sum(isinstance(row, Surface) for row in load_lens("triplet-pestrecov").rows)
+    direct = clear["direct.in_picture"] + clear["direct.beside"]
+    assert direct > 0.1
+    assert shares["scatter"] == pytest.approx(direct * (1.0 - 0.98**surfaces), rel=1e-9)
+    assert sum(shares.values()) == pytest.approx(plain["sum"], abs=1e-12)
+    assert ledger["sum"] == plain["sum"]
+    assert {name for name, share in clear.items() if share != shares[name]} <= {"direct.in_picture", "direct.beside"}
+    assert "scatter" not in clear
+    assert ledger["standard_errors"]["scatter"] > 0.0
 
 
 def test_ledger_agrees_with_final_quality():

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import islice
 from math import sqrt
 from typing import Any
@@ -31,6 +31,9 @@ _ENDS = (
     ("six or more, in the picture", "ghosts.order6+.in_picture", IN_PICTURE + 3),
     ("six or more, beside it", "ghosts.order6+.beside", BESIDE + 3),
 )
+
+
+SCATTERED = "scattered out of the direct light"
 
 
 @dataclass(frozen=True)
@@ -105,6 +108,32 @@ def ledger_of(sums: Sums) -> Ledger:
     balance = line("sum", "sum", BALANCE)
     total = LedgerLine("sum", "sum", (1.0 if entered > 0.0 else 0.0) + balance.share, balance.standard_error)
     return Ledger(entered, tuple(line(*end) for end in _ENDS), total)
+
+
+def with_scatter(ledger: Ledger, kept: float) -> Ledger:
+    """Take from the direct light what the surfaces scatter of it.
+
+    Parameters
+    ----------
+    ledger : Ledger
+        Of random rays, which do not scatter.
+    kept : float
+        Part of the direct light that is not scattered, by the surfaces' totals (`render.scatter.dimmed`).
+
+    Returns
+    -------
+    Ledger
+        With a line for what they scatter, wherever it ends; the sum stays.
+    """
+    direct = [line for line in ledger.lines if line.name.startswith("direct.")]
+    lost = (1.0 - kept) * sum(line.share for line in direct)
+    error = (1.0 - kept) * sqrt(sum(line.standard_error**2 for line in direct))
+    lines = [
+        replace(line, share=kept * line.share, standard_error=kept * line.standard_error) if line in direct else line
+        for line in ledger.lines
+    ]
+    lines.insert(1 + ledger.lines.index(direct[-1]), LedgerLine(SCATTERED, "scatter", lost, error))
+    return replace(ledger, lines=tuple(lines))
 
 
 def trace_ledger(shots: Sequence[Shot], seed: int, *, threads: int | None = None) -> Ledger:

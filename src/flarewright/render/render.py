@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from math import isfinite, pi
 from typing import TYPE_CHECKING, Any
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ..io.mask_image import read_mask
 from ..model import Layer, Project
 from ..optics.bundle import incidence
+from ..optics.color import luminance_weights
 from ..optics.pack import facing
 from ..optics.paths import ghost_paths
 from ..optics.shape import ideal
@@ -114,13 +115,13 @@ def render(
     images = [direct_image(settled.lens, shot) for shot in shots]
     passes = list(drawn.passes)
     scattered: dict[str, Any] = {}
+    kept = 1.0
     told: tuple[str, ...] = ()
     if tables is not None:
         passes.append(render_scatter(settled, shots, images, tables, threads=threads))
-        images = dimmed(images, tables)
+        whole_light, images = _luminous(shots, images), dimmed(images, tables)
+        kept = _luminous(shots, images) / whole_light if whole_light > 0.0 else 1.0
         facts, told = scatter_facts(settled, tables)
-        if ledger or project.quality.mode == "reference":
-            told = (*told, "random rays do not scatter: the ledger is that of surfaces without scatter")
         scattered = {"scatter": facts}
     if project.output.starburst:
         passes.insert(0, starburst_of(settled, shots, images, mask, soil))
@@ -133,6 +134,10 @@ def render(
         from .ledger import trace_ledger
 
         account = trace_ledger(shots, project.quality.seed, threads=threads)
+    if account is not None and tables is not None:
+        from .ledger import with_scatter
+
+        account = with_scatter(account, kept)
     summary = {**_summary(settled, shots, images, art), **drawn.facts, **scattered}
     return Rendering(
         settled.project,
@@ -141,6 +146,15 @@ def render(
         (*settled.remarks, *drawn.remarks, *told, *_remarks(settled, shots)),
         account if ledger else None,
     )
+
+
+def _luminous(shots: Sequence[Shot], images: Sequence[DirectImage]) -> float:
+    """Luminous flux of the direct images."""
+    flux = 0.0
+    for shot, image in zip(shots, images, strict=True):
+        per_wavelength = shot.weights(shot.packed.wavelengths_nm) @ luminance_weights(shot.colorspace)
+        flux += shot.light.intensity * float(per_wavelength @ image.throughput_mm2)
+    return flux
 
 
 @dataclass(frozen=True)
