@@ -132,15 +132,15 @@ def test_a_shipped_lens():
     compare_systems(from_lens(a_lens), a_lens, (6.0, 4.0), samples=2000)
 
 
-@pytest.mark.parametrize("several", [2, pytest.param(8, marks=pytest.mark.slow)])
-def test_four_reflections(several):
+@pytest.mark.slow
+def test_four_reflections():
     """The brightest ghosts of four reflections: flux, place and size, bare."""
     a_lens = load_lens("triplet-pestrecov")
     s, field = from_lens(a_lens), (6.0, 4.0)
     listed = [row for row in analyse(a_lens, field, orders=4, order4_limit=3e-4).ghosts if row.later_reflections]
-    assert len(listed) > 8
+    assert len(listed) >= 8
     wrong = []
-    for row in listed[:several]:
+    for row in listed[:8]:
         path = (row.first_reflection, row.second_reflection, *row.later_reflections)
         assert row.name == "-".join(map(str, path))
 
