@@ -214,9 +214,7 @@ def test_a_lens_out_of_true_agrees():
 def test_lenses_agree_block_by_block(lens, stopped):
     widest = load_lens(lens).f_number
     f_number = (4.0 if widest < 2.0 else 2.8) * widest if stopped else None
-    # a zoom spreads its light over so many paths that each is known less well
-    batches = 256 if len(load_lens(lens).rows) > 20 else 64
-    judged = judge(scene(lens, LENSES[lens], f_number), batches=batches, side=192 if stopped else 128)
+    judged = judge(scene(lens, LENSES[lens], f_number), batches=64, side=192 if stopped else 128)
     everywhere, worst = probabilities(judged)
     final, mean, error = judged.total
     print(
