@@ -148,17 +148,12 @@ def _final(
     meter: _Meter,
 ) -> GhostPass:
     others, faintest = levels
-    # what reaches the stop is common to all paths whose mirrors stand behind it
-    way_in = next((path.entry for path in paths if path.entry is not None), None)
-    entries = [None if way_in is None else find_entry(shot, way_in) for shot in shots]
+    look = _look(shots, paths, art)
 
     def find(path: LightPath) -> list[FinalPass]:
         if meter.cancelled.is_set():
             return []
-        changed = art.get(path.name, PLAIN)
-        inside = entries if path.entry is not None else [None] * len(shots)
-        looked = (find_final(shot, path, changed, entry) for shot, entry in zip(shots, inside, strict=True))
-        found = [item for item in looked if item is not None]
+        found = look(path)
         meter.step("looking for ghosts")
         return found
 
@@ -255,6 +250,23 @@ def _rank_draft(shots: Sequence[Shot], paths: Sequence[LightPath], art: Mapping[
     return [int(k) for k in np.argsort(-flux, kind="stable")]
 
 
+def _look(
+    shots: Sequence[Shot], paths: Sequence[LightPath], art: Mapping[str, PathArt]
+) -> Callable[[LightPath], list[FinalPass]]:
+    """Return what looks for the ghost of a path, one of `paths`, by every light."""
+    # what reaches the stop is common to all paths whose mirrors stand behind it
+    way_in = next((path.entry for path in paths if path.entry is not None), None)
+    entries = [None if way_in is None else find_entry(shot, way_in) for shot in shots]
+
+    def look(path: LightPath) -> list[FinalPass]:
+        changed = art.get(path.name, PLAIN)
+        inside = entries if path.entry is not None else [None] * len(shots)
+        looked = (find_final(shot, path, changed, entry) for shot, entry in zip(shots, inside, strict=True))
+        return [item for item in looked if item is not None]
+
+    return look
+
+
 def plain_level(shots: Sequence[Shot], paths: Sequence[LightPath], threads: int | None = None) -> float:
     """Tell the level (`GhostPass.level`) of ghosts as they are without art direction.
 
@@ -270,7 +282,7 @@ def plain_level(shots: Sequence[Shot], paths: Sequence[LightPath], threads: int 
     float
     """
     with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
-        found = list(pool.map(lambda path: [item for shot in shots if (item := find_final(shot, path))], paths))
+        found = list(pool.map(_look(shots, paths, {}), paths))
     return _level(found)
 
 
