@@ -40,10 +40,13 @@ if TYPE_CHECKING:
     from .model import Medium as Medium
     from .model import Output as Output
     from .model import PerRow as PerRow
+    from .model import Polygon as Polygon
     from .model import Preset as Preset
     from .model import Project as Project
     from .model import Quality as Quality
     from .model import QuarterWave as QuarterWave
+    from .model import Rectangle as Rectangle
+    from .model import Rgb as Rgb
     from .model import RowScatter as RowScatter
     from .model import Rule as Rule
     from .model import Scatter as Scatter
@@ -62,8 +65,9 @@ _HOMES = {
     ".errors": ("FlarewrightError", "GlassError", "LensError", "OutputError", "ProjectError"),
     ".model": (
         "D65", "Art", "AsLens", "Bare", "BlackBody", "Camera", "EqualEnergy", "Everywhere", "Film", "Iris", "Layer",
-        "Lens", "Light", "Lines", "Medium", "Output", "PerRow", "Preset", "Project", "Quality", "QuarterWave",
-        "RowScatter", "Rule", "Scatter", "Stack", "Standard", "Stop", "Surface", "Tabulated",
+        "Lens", "Light", "Lines", "Medium", "Output", "PerRow", "Polygon", "Preset", "Project", "Quality",
+        "QuarterWave", "Rectangle", "Rgb", "RowScatter", "Rule", "Scatter", "Stack", "Standard", "Stop", "Surface",
+        "Tabulated",
     ),
     ".io.exr": ("write_exr",),
     ".io.project_file": ("read_project",),

@@ -22,6 +22,8 @@ EPILOG = (
     "flarewright render canon-28-80 --light -8,3 --light 2,6 --intensity 1 --intensity 0.2 --spectrum black-body:3200 "
     "--fstop 8 --blades 7 --coating quarter-wave:550 --size 1920x1080 --layers ghosts --brightest 30 --half "
     "-o shot.exr\n\n"
+    "flarewright render heliar-tronnier --light sun@10,5 --light -12,2 --light-size 3x2 --distance inf --distance 900 "
+    "--spectrum d65 --spectrum rgb:1,0.6,0.2 -o room.exr\n\n"
     "flarewright render --project shot.toml --quality draft -o test.exr"
 )
 
@@ -41,7 +43,9 @@ def render(
     light: Annotated[
         list[str] | None,
         typer.Option(
-            metavar="X,Y", help="Field angles in degrees, right and up; may be repeated.", rich_help_panel=_LIGHT
+            metavar="X,Y",
+            help="Field angles in degrees, right and up, or sun@X,Y for a disc of 0.53 degrees; may be repeated.",
+            rich_help_panel=_LIGHT,
         ),
     ] = None,
     intensity: Annotated[
@@ -51,13 +55,18 @@ def render(
     spectrum: Annotated[
         list[str] | None,
         typer.Option(
-            help="d65, equal-energy, black-body:K, lines:NM,NM*POWER or a .csv: once for all, or once per light.",
+            help="d65, equal-energy, black-body:K, lines:NM,NM*POWER, rgb:R,G,B (linear Rec.709) or a .csv: once for "
+            "all, or once per light.",
             rich_help_panel=_LIGHT,
         ),
     ] = None,
     light_diameter: Annotated[
         list[float] | None,
         typer.Option(help="Degrees across the light's disc, 0.53 for the sun; 0 is a point.", rich_help_panel=_LIGHT),
+    ] = None,
+    light_size: Annotated[
+        list[str] | None,
+        typer.Option(metavar="WxH", help="Degrees across an evenly bright rectangle.", rich_help_panel=_LIGHT),
     ] = None,
     distance: Annotated[
         list[float] | None,
@@ -306,9 +315,9 @@ def render(
     flags = Flags(
         lens=lens, project=project, light=light or [], intensity=intensity or [], spectrum=spectrum or [],
         fstop=fstop, blades=blades, rotation=rotation, rounding=rounding, iris_image=iris_image, coating=coating,
-        light_diameter=light_diameter or [], distance=distance or [], roughness=roughness, dust=dust,
-        scratches=scratches, fingerprint=fingerprint, dirt_image=dirt_image, cats_eye=cats_eye,
-        starburst_size=starburst_size,
+        light_diameter=light_diameter or [], light_size=light_size or [], distance=distance or [],
+        roughness=roughness, dust=dust, scratches=scratches, fingerprint=fingerprint, dirt_image=dirt_image,
+        cats_eye=cats_eye, starburst_size=starburst_size,
         focus=focus, size=size, sensor=sensor, sensor_distance=sensor_distance, quality=quality,
         wavelengths=wavelengths, paths=paths, layers=layers, brightest=brightest, no_starburst=no_starburst,
         colorspace=colorspace, half=half, mute=mute or [], solo=solo or [], gain=gain or [], physical=physical,

@@ -15,6 +15,7 @@ from ..io.project_file import ProjectFileError, explain, parse_coating_choice, r
 from ..io.spectrum_text import parse_spectrum
 from ..model import Art, Iris, Light, Project, Rule, Scatter
 from ..model.art import PASSES
+from ..model.light import SUN_DEG
 from .common import field_angles, pair
 
 # Where a finding about a project belongs when flags made the project.
@@ -35,6 +36,9 @@ _FLAG_OF = {
     "scatter.cleanliness_level": "--cleanliness",
     "diameter_deg": "--light-diameter",
     "distance": "--distance",
+    "shape.rectangle.size_deg": "--light-size",
+    "shape.size_deg": "--light-size",
+    "shape": "--light-size",
     "quality.ringing": "--ringing",
     "camera.size_px": "--size",
     "camera.sensor_mm": "--sensor",
@@ -69,6 +73,7 @@ class Flags:
     intensity: list[float]
     spectrum: list[str]
     light_diameter: list[float]
+    light_size: list[str]
     distance: list[float]
     fstop: float | None
     blades: int | None
@@ -238,16 +243,13 @@ def _sections(flags: Flags) -> dict[str, dict[str, Any]]:
 
 def _lights(flags: Flags, base: tuple[Light, ...]) -> list[dict[str, Any]]:
     """Return the lights: those of the flags, else those of the project, with intensities and spectra of the flags."""
-    lights: list[dict[str, Any]]
-    if flags.light:
-        lights = [{"field_deg": field_angles(text)} for text in flags.light]
-    else:
-        lights = [dict(light) for light in base]
+    lights = [_light(text) for text in flags.light] if flags.light else [dict(light) for light in base]
     spectra = [parse_spectrum(text) for text in flags.spectrum]
     for name, values in (
         ("intensity", flags.intensity),
         ("spectrum", spectra),
         ("diameter_deg", flags.light_diameter),
+        ("shape", [{"kind": "rectangle", "size_deg": _size(text)} for text in flags.light_size]),
         ("distance", [None if distance == float("inf") else distance for distance in flags.distance]),
     ):
         flag = _FLAG_OF.get(name, f"--{name}")
@@ -258,8 +260,25 @@ def _lights(flags: Flags, base: tuple[Light, ...]) -> list[dict[str, Any]]:
             )
         for k, light in enumerate(lights):
             if values:
+                if name == "shape":
+                    light["diameter_deg"] = 0.0
                 light[name] = values[k % len(values)]
     return lights
+
+
+def _light(text: str) -> dict[str, Any]:
+    """Return what `--light` says: X,Y or sun@X,Y."""
+    word, at, place = text.rpartition("@")
+    if at and word.strip().lower() != "sun":
+        raise ProjectError(f"--light {text!r}: there is no {word.strip()!r}; write --light 10,5 or --light sun@10,5")
+    if text.strip().lower() == "sun":
+        raise ProjectError("--light sun does not say where the sun is; write --light sun@10,5 (degrees right and up)")
+    found: dict[str, Any] = {"field_deg": field_angles(place)}
+    return {**found, "name": "sun", "diameter_deg": SUN_DEG} if at else found
+
+
+def _size(text: str) -> tuple[float, float]:
+    return pair(text, "--light-size", "4x3 (degrees wide and high)", "x")
 
 
 def _iris(flags: Flags, lens: Any, base: Project | None) -> dict[str, Any] | None:

@@ -335,10 +335,11 @@ _SECTIONS: dict[str, tuple[type[BaseModel], ...]] = {
     "quality": (Quality,),
     "output": (Output,),
     "lights": (lights.Light,),
+    "shape": (lights.Rectangle, lights.Polygon),
     "filter": (Plate,),
     "cover_glass": (Plate,),
     "imperfection": (Imperfection,),
-    "spectrum": (lights.EqualEnergy, lights.D65, lights.BlackBody, lights.Lines, lights.Tabulated),
+    "spectrum": (lights.EqualEnergy, lights.D65, lights.BlackBody, lights.Lines, lights.Tabulated, lights.Rgb),
     "coating": (
         choices.Preset, choices.Everywhere, choices.PerRow, coatings.QuarterWave, coatings.Film, coatings.Standard,
     ),

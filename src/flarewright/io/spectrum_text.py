@@ -7,6 +7,7 @@
 | `black-body:3200` | Planck's law at 3200 K |
 | `lines:589.0,589.6` | spectral lines of equal power, nm |
 | `lines:589.0*0.5,589.6*1` | spectral lines with their relative powers |
+| `rgb:1,0.5,0.1` | a smooth spectrum of that colour, linear Rec.709; only ratios count |
 | `lamp.csv` | a table: wavelength in nm and relative power in each line |
 """
 
@@ -18,10 +19,10 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from ..errors import ProjectError
-from ..model.light import D65, BlackBody, EqualEnergy, Lines, Spectrum, Tabulated
+from ..model.light import D65, BlackBody, EqualEnergy, Lines, Rgb, Spectrum, Tabulated
 from .text_file import read_text
 
-_KNOWN = "d65, equal-energy, black-body:KELVIN, lines:NM,NM*POWER,... or a .csv file"
+_KNOWN = "d65, equal-energy, black-body:KELVIN, lines:NM,NM*POWER,..., rgb:R,G,B or a .csv file"
 
 
 def parse_spectrum(text: str, *, folder: Path | None = None) -> Spectrum:
@@ -56,13 +57,16 @@ def parse_spectrum(text: str, *, folder: Path | None = None) -> Spectrum:
             return BlackBody(temperature_k=_number(rest.strip().removesuffix("K").removesuffix("k"), text))
         if word == "lines":
             return Lines(lines=tuple(_line(part, text) for part in rest.split(",")))
+        if word == "rgb":
+            return Rgb.model_validate({"rgb": [_number(part, text) for part in rest.split(",")]})
     except ValidationError as error:
         reason = {
             "black-body": "a black body has between 500 and 100000 K",
             "lines": "spectral lines lie between 360 and 830 nm and have powers of 0 or more",
+            "rgb": "a colour is three numbers of 0 or more, not all 0",
         }[word]
         raise ProjectError(f"the spectrum {text!r} is out of range: {reason}") from error
-    near = difflib.get_close_matches(word, ["d65", "equal-energy", "black-body", "lines"], 1)
+    near = difflib.get_close_matches(word, ["d65", "equal-energy", "black-body", "lines", "rgb"], 1)
     hint = f"did you mean {near[0]!r}? Known forms are " if near else "use "
     raise ProjectError(f"the spectrum {text!r} is unknown; {hint}{_KNOWN}")
 
@@ -76,6 +80,8 @@ def spectrum_text(spectrum: Spectrum) -> str | None:
             return f"black-body:{spectrum.temperature_k:.12g}"
         case Lines():
             return "lines:" + ",".join(f"{nm:.12g}*{power:.12g}" for nm, power in spectrum.lines)
+        case Rgb():
+            return "rgb:" + ",".join(f"{value:.12g}" for value in spectrum.rgb)
     return None
 
 

@@ -10,7 +10,7 @@ from .imperfection import Imperfection
 from .iris import Iris
 from .layer import Layer
 from .lens import Element, Lens, Position, Row, Stop, Surface
-from .light import D65, BlackBody, EqualEnergy, Light, Lines, Spectrum, Tabulated
+from .light import D65, BlackBody, EqualEnergy, Light, Lines, Polygon, Rectangle, Rgb, Spectrum, Tabulated
 from .plate import Plate
 from .project import AsLens, CoatingChoice, Everywhere, Output, PerRow, Preset, Project, Quality
 from .scatter import RowScatter, Scatter
@@ -45,11 +45,14 @@ __all__ = [
     "Output",
     "PerRow",
     "Plate",
+    "Polygon",
     "Position",
     "Preset",
     "Project",
     "Quality",
     "QuarterWave",
+    "Rectangle",
+    "Rgb",
     "Row",
     "RowScatter",
     "Rule",

@@ -53,7 +53,58 @@ class Tabulated(Frozen):
         return self
 
 
-Spectrum = Annotated[EqualEnergy | D65 | BlackBody | Lines | Tabulated, Field(discriminator="kind")]
+class Rgb(Frozen):
+    """A smooth spectrum of a colour: linear Rec.709, any scale, for its colour alone counts.
+
+    D65 times a smooth curve, so white is D65 (`optics.uplift`).
+    """
+
+    kind: Literal["rgb"] = "rgb"
+    rgb: tuple[Annotated[float, Field(ge=0.0)], Annotated[float, Field(ge=0.0)], Annotated[float, Field(ge=0.0)]]
+
+    @model_validator(mode="after")
+    def _is_lit(self) -> Rgb:
+        if max(self.rgb) <= 0.0:
+            raise ValueError("black has no colour; give red, green or blue above 0")
+        return self
+
+
+Spectrum = Annotated[EqualEnergy | D65 | BlackBody | Lines | Tabulated | Rgb, Field(discriminator="kind")]
+
+SUN_DEG = 0.53
+"""Angle across the sun's disc, degrees."""
+
+
+class Rectangle(Frozen):
+    """A bright rectangle, parallel to the sensor.
+
+    Attributes
+    ----------
+    size_deg : tuple of float
+        Width and height in degrees of field angle.
+    rotation_deg : float
+        Counter-clockwise in the picture.
+    """
+
+    kind: Literal["rectangle"] = "rectangle"
+    size_deg: tuple[Annotated[float, Field(gt=0.0, le=120.0)], Annotated[float, Field(gt=0.0, le=120.0)]]
+    rotation_deg: float = Field(0.0, ge=-360.0, le=360.0)
+
+
+class Polygon(Frozen):
+    """A bright polygon, parallel to the sensor; it may be concave but must not cross itself.
+
+    Attributes
+    ----------
+    corners_deg : tuple of tuple of float
+        Right and up from the light's own field angles, degrees.
+    """
+
+    kind: Literal["polygon"] = "polygon"
+    corners_deg: tuple[tuple[float, float], ...] = Field(min_length=3, max_length=256)
+
+
+Shape = Annotated[Rectangle | Polygon, Field(discriminator="kind")]
 
 
 class Light(Frozen):
@@ -72,8 +123,9 @@ class Light(Frozen):
         the middle of the entrance pupil.
     spectrum : Spectrum
     diameter_deg : float
-        Angle across the light's round disc, 0.53 for the sun, 0 for a point; blurs the starburst and the rings in
-        ghosts.
+        Angle across the light's round disc, 0.53 for the sun, 0 for a point.
+    shape : Rectangle or Polygon or None
+        What else the light is than a point or a disc. Its radiance is even, and `intensity` is all of it together.
     """
 
     name: str = "light"
@@ -85,3 +137,15 @@ class Light(Frozen):
     intensity: float = Field(1.0, ge=0.0)
     spectrum: Spectrum = D65()
     diameter_deg: float = Field(0.0, ge=0.0, le=60.0)
+    shape: Shape | None = None
+
+    @model_validator(mode="after")
+    def _one_shape(self) -> Light:
+        if self.shape is not None and self.diameter_deg > 0.0:
+            raise ValueError("a light is a disc (diameter_deg) or has a shape, not both; keep one")
+        return self
+
+    @property
+    def extended(self) -> bool:
+        """Whether the light is more than a point."""
+        return self.diameter_deg > 0.0 or self.shape is not None

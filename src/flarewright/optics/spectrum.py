@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from flarewright.errors import FlarewrightError
 from flarewright.model.camera import Colorspace
-from flarewright.model.light import D65, BlackBody, EqualEnergy, Lines, Spectrum
+from flarewright.model.light import D65, BlackBody, EqualEnergy, Lines, Rgb, Spectrum
 
 from .cie1931 import D65_POWER, FIRST_NM, STEP_NM, X_BAR, Y_BAR, Z_BAR
 from .color import xyz_to_rgb_matrix
@@ -102,6 +102,11 @@ def spectral_power(spectrum: Spectrum, wavelength_nm: ArrayLike) -> Floats:
         return planck(wave, spectrum.temperature_k)
     if isinstance(spectrum, Lines):
         raise ValueError("spectral lines have power but no power per nm; use band_weights")
+    if isinstance(spectrum, Rgb):
+        # few lights have a colour, and fitting it needs this module
+        from .uplift import smooth_curve, uplift
+
+        return spectral_power(D65(), wave) * smooth_curve(uplift(spectrum.rgb), wave)
     return np.interp(wave, spectrum.wavelength_nm, spectrum.power, left=0.0, right=0.0)
 
 

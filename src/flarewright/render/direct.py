@@ -117,19 +117,21 @@ def defocus_mm(lens: Lens, shot: Shot) -> float:
     return 2.0 * height * abs(float(total[0, 0] + nearness * total[0, 1]))
 
 
-def traced_spot(lens: Lens, shot: Shot) -> Floats | None:
+def traced_spot(lens: Lens, shot: Shot, offset: tuple[float, float] = (0.0, 0.0)) -> Floats | None:
     """Draw the direct image of a point as its rays land, without diffraction.
 
     Parameters
     ----------
     lens : Lens
     shot : Shot
+    offset : tuple of float
+        Columns and rows.
 
     Returns
     -------
     ndarray, shape (2 a + 1, 2 b + 1), or None
-        Part of the flux per pixel of the picture, at the middle wavelength; its centroid lies in the middle of the
-        middle pixel. None when no light passes.
+        Part of the flux per pixel of the picture, at the middle wavelength; its centroid lies `offset` from the middle
+        of the middle pixel. None when no light passes.
     """
     path, packed, opening = direct_path(lens), shot.packed, shot.opening
     region = find_region(packed, path, shot.incidence.tilt, opening.radius)
@@ -147,10 +149,11 @@ def traced_spot(lens: Lens, shot: Shot) -> Floats | None:
     across, along = -(axes @ np.array([x, y]))
     far = float(np.hypot(sums[5] + abs(across), max(sums[7] - along, along - sums[6])))
     sides = zip(shot.to_pixels[2:], shot.size_px, strict=True)
-    reach = [int(min(np.ceil(far * zoom) + 1, 2 * side)) for zoom, side in sides]
+    reach = [int(min(np.ceil(far * zoom) + 2, 2 * side)) for zoom, side in sides]
     plane = blank_plane(2 * reach[0] + 1, 2 * reach[1] + 1)
     view = np.array([0.0, 0.0, *shot.to_pixels[2:]])
-    view[0], view[1] = reach[0] + 0.5 - x * view[2], reach[1] + 0.5 + y * view[3]
+    view[0] = reach[0] + 0.5 + offset[0] - x * view[2]
+    view[1] = reach[1] + 0.5 + offset[1] + y * view[3]
     draw_bundle(
         data, bundle.pupil, bundle.triangles, node_densities(data, bundle.pupil, bundle.triangles), crossings,
         opening.blades, opening.mask, opening.half, axes, view, 1.0, np.array([1.0, 0.0, 0.0]), plane, bundle.halves,

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import os
 import threading
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import product
 
 import numpy as np
@@ -19,14 +20,17 @@ from ..optics.paths import LightPath
 from .art import PLAIN, PathArt
 from .canvas import DETAILS, Plane, blank, merge, to_layer
 from .ghosts_draft import draft_alone, draw_draft, draw_draft_by_hand
-from .ghosts_final import FinalPass, contrast, draw_alone, draw_final, find_entry, find_final
+from .ghosts_final import FinalPass, contrast, detail_of, draw_alone, draw_final, find_entry, find_final
 from .shot import Shot
+from .sources import halvings, motion, spread_corners
 
 Progress = Callable[[float, str], None]
 
 # pictures drawn side by side before they are added: fixed by size, never by threads, so sums round alike everywhere
 _CHUNKS = ((1_100_000, 8), (2_500_000, 4))
 _PATHS_A_CHUNK = 16
+# and of ghosts that are spread together
+_MOST_CHUNKS = 8
 
 
 @dataclass(frozen=True)
@@ -171,16 +175,18 @@ def _final(
 
     def draw(group: list[int]) -> list[Plane | None]:
         canvas = blank(shots[0].size_px)
-        # blurring is linear, so ghosts of one blur are blurred together
-        alike: dict[float, list[FinalPass]] = {}
+        # blurring is linear, so ghosts of one blur or one spread are blurred together
+        alike: dict[object, list[FinalPass]] = {}
         for k in group:
             if meter.cancelled.is_set():
                 break
             for item in found[k]:
+                if item.source is not None and k not in alone:
+                    continue
                 if item.region.seen_flux > 0.0 and item.art.ramps:
                     draw_alone([item], quality, canvas, meter.cancelled)
-                elif item.region.seen_flux > 0.0 and item.art.blur:
-                    alike.setdefault(item.art.blur, []).append(item)
+                elif item.region.seen_flux > 0.0 and item.alone:
+                    alike.setdefault(item.alone, []).append(item)
                 elif item.region.seen_flux > 0.0:
                     # a layer of its own may be graded up, so it is drawn in full
                     visibility = float("inf") if k in alone else contrast(item, level)
@@ -190,8 +196,17 @@ def _final(
             draw_alone(together, quality, canvas, meter.cancelled)
         return canvas.planes
 
+    def draw_spread(groups: list[list[FinalPass]]) -> list[Plane | None]:
+        canvas = blank(shots[0].size_px)
+        for group in groups:
+            if not meter.cancelled.is_set():
+                draw_alone(group, quality, canvas, meter.cancelled)
+        return canvas.planes
+
     named = [found[k][0].path for k in order]
-    total, layers = _collect(shots, order, named, singles, art, draw, pool)
+    wide = _alike([item for k in order if k not in alone for item in found[k]], level)
+    jobs = [partial(draw_spread, wide[k::_MOST_CHUNKS]) for k in range(min(len(wide), _MOST_CHUNKS))]
+    total, layers = _collect(shots, order, named, singles, art, draw, pool, jobs)
     share = float(flux[~keep].sum() / flux.sum()) if flux.sum() > 0.0 else 0.0
     names = tuple(path.name for path in named)
     return GhostPass(total, layers, len(order), len(paths) - len(found), int((~keep).sum()), share, 0, names, own)
@@ -205,11 +220,13 @@ def _draft(
     pool: ThreadPoolExecutor,
     meter: _Meter,
 ) -> GhostPass:
+    points, wide = ([s for s in shots if (s.corners is None) == point] for point in (True, False))
+
     def draw(group: list[int]) -> list[Plane | None]:
         width, height = shots[0].size_px
         picture = np.zeros((height, width, 3))
         by_hand = [(paths[k], art[paths[k].name]) for k in group if paths[k].name in art]
-        for shot in shots:
+        for shot in points:
             draw_draft(shot, [paths[k] for k in group if paths[k].name not in art], picture)
             for path, changed in by_hand:
                 if not changed.alone:
@@ -217,12 +234,14 @@ def _draft(
         sum_rows(picture)
         # blurring is linear, so ghosts of one blur are blurred together
         alike: dict[object, list[tuple[Shot, LightPath, PathArt]]] = {}
-        for number, (shot, (path, changed)) in enumerate(product(shots, by_hand)):
+        for number, (shot, (path, changed)) in enumerate(product(points, by_hand)):
             if changed.alone:
                 key = ("ramp", number) if changed.ramps else changed.blur
                 alike.setdefault(key, []).append((shot, path, changed))
         for together in alike.values():
             picture += draft_alone([(shot, path) for shot, path, _ in together], [art for *_, art in together])
+        for spread in _spread_drafts(wide, [paths[k] for k in group], art):
+            picture += spread
         for k in group:
             meter.step(f"ghost {paths[k].name}")
         return [picture]
@@ -231,6 +250,26 @@ def _draft(
     named = [paths[k] for k in order]
     total, layers = _collect(shots, order, named, singles, art, draw, pool)
     return GhostPass(total, layers, len(paths), None, 0, 0.0, 0)
+
+
+def _spread_drafts(
+    shots: Sequence[Shot], paths: Sequence[LightPath], art: Mapping[str, PathArt]
+) -> Iterator[NDArray[np.float64]]:
+    """Draw paraxial ghosts of area lights, those of one spread together."""
+    for shot in shots:
+        alike: dict[object, list[tuple[LightPath, PathArt, NDArray[np.float64]]]] = {}
+        for path in paths:
+            changed, moved = art.get(path.name, PLAIN), motion(shot, path, draft=True)
+            if moved is not None:
+                corners = spread_corners(shot, moved[0], shot.to_pixels * [1.0, 1.0, changed.scale, changed.scale])
+                key = (path.name if changed.ramps else None, changed.blur, corners.tobytes())
+                alike.setdefault(key, []).append((path, changed, corners))
+        for together in alike.values():
+            source = together[0][2]
+            halved = halvings(source, float("inf"), DETAILS - 1)
+            yield draft_alone(
+                [(shot, path) for path, *_ in together], [changed for _, changed, _ in together], source, halved
+            )
 
 
 def _rank_draft(shots: Sequence[Shot], paths: Sequence[LightPath], art: Mapping[str, PathArt]) -> list[int]:
@@ -295,6 +334,17 @@ def _level(found: Sequence[Sequence[FinalPass]], *, plain: bool = False) -> floa
     return float(seen / (np.pi * items[0].shot.view_radius ** 2))
 
 
+def _alike(items: list[FinalPass], level: float) -> list[list[FinalPass]]:
+    """Collect the ghosts of area lights that can be spread together, of all paths and of all parts."""
+    groups: dict[object, list[FinalPass]] = {}
+    for number, item in enumerate(items):
+        if item.source is not None and item.region.seen_flux > 0.0:
+            # what is faint may lose as much detail as a point's ghost does
+            seen = replace(item, detail=max(item.detail, detail_of(contrast(item, level))))
+            groups.setdefault((seen.alone, number if item.art.ramps else None), []).append(seen)
+    return list(groups.values())
+
+
 def _worth_drawing(flux: NDArray[np.float64], cull: float) -> NDArray[np.bool_]:
     """Keep the brightest paths so that those left out carry no more than `cull` of all flux."""
     keep = np.ones(len(flux), dtype=np.bool_)
@@ -312,8 +362,9 @@ def _collect(
     art: Mapping[str, PathArt],
     draw: Callable[[list[int]], list[Plane | None]],
     pool: ThreadPoolExecutor,
+    jobs: Sequence[Callable[[], list[Plane | None]]] = (),
 ) -> tuple[Layer, tuple[Layer, ...]]:
-    """Draw the first `singles` items by themselves and the others in a fixed number of groups; add all in order."""
+    """Draw the first `singles` items by themselves, the others in a fixed number of groups, then jobs; add in order."""
     shot = shots[0]
     width, height = shot.size_px
     pixel_area = 1.0 / float(shot.to_pixels[2] * shot.to_pixels[3])
@@ -336,6 +387,8 @@ def _collect(
         # the layer has its own copy by now
         totals = _added(totals, planes)
     for planes in pool.map(draw, [group for group in rest if group]):
+        totals = _added(totals, planes)
+    for planes in pool.map(lambda job: job(), jobs):
         totals = _added(totals, planes)
     total = merge(totals, shot.size_px)
     return to_layer("ghosts", total, pixel_area, {}), tuple(layers)

@@ -20,6 +20,7 @@ from .art import Frame, PathArt
 from .canvas import DETAILS, Plane, merge
 from .grade import coarseness, finish
 from .shot import Shot
+from .spread import polygon_kernel, spread_within
 
 Floats = NDArray[np.float64]
 
@@ -77,15 +78,21 @@ def draw_draft_by_hand(shot: Shot, path: LightPath, art: PathArt, differences: F
     draw_draft(replace(shot, to_pixels=placed), [path], differences, art.rgb)
 
 
-def draft_alone(ghosts: Sequence[tuple[Shot, LightPath]], art: Sequence[PathArt]) -> Floats:
-    """Draw ghosts on a plane of their own, ramped and blurred.
+def draft_alone(
+    ghosts: Sequence[tuple[Shot, LightPath]], art: Sequence[PathArt], source: Floats | None = None, halved: int = 0
+) -> Floats:
+    """Draw ghosts on a plane of their own, spread, ramped and blurred.
 
     Parameters
     ----------
     ghosts : sequence of (Shot, LightPath)
-        One with a ramp, or any number without that share a blur: blurring is linear.
+        One with a ramp, or any number without that share a blur and a source: both are linear.
     art : sequence of PathArt
         One a ghost.
+    source : ndarray, shape (N, 2), or None
+        What the extent of an area light spreads them over: columns and rows.
+    halved : int
+        How often the resolution may be halved because they are spread.
 
     Returns
     -------
@@ -93,19 +100,29 @@ def draft_alone(ghosts: Sequence[tuple[Shot, LightPath]], art: Sequence[PathArt]
         Flux per pixel.
     """
     shot, first = ghosts[0][0], art[0]
-    detail = coarseness(first, shot.to_pixels)
+    detail = max(halved, coarseness(first, shot.to_pixels) if first.blur > 0.0 else 0)
     own = shot.to_pixels / 2.0**detail
     width, height = (-(-side // 2**detail) for side in shot.size_px)
     mx, my = first.margin(own)
+    kernel = None if source is None else polygon_kernel(source / 2.0**detail)
+    if kernel is not None:
+        mx, my = mx + kernel.shape[1] // 2, my + kernel.shape[0] // 2
     sheet = np.zeros((height + 2 * my, width + 2 * mx, 3))
     frames = [_frame(shot, path) if each.framed else None for (shot, path), each in zip(ghosts, art, strict=True)]
     places = [each.place(shot.to_pixels, frame) / 2.0**detail for each, frame in zip(art, frames, strict=True)]
     for (lit, path), each, placed in zip(ghosts, art, places, strict=True):
         draw_draft(replace(lit, to_pixels=placed + np.array([mx, my, 0.0, 0.0])), [path], sheet, each.rgb)
     sum_rows(sheet)
+    if kernel is not None:
+        sheet = spread_within(sheet, kernel)
     planes: list[Plane | None] = [None] * DETAILS
     planes[detail] = finish(sheet, first, frames[0], places[0], own)
     return np.asarray(merge(planes, shot.size_px), dtype=np.float64)
+
+
+def draft_centre(shot: Shot, path: LightPath) -> Floats:
+    """Compute where a ghost's middle lands by matrices, upright, mm, shape (2,)."""
+    return np.array(_frame(shot, path).centre)
 
 
 def _frame(shot: Shot, path: LightPath) -> Frame:

@@ -23,9 +23,11 @@ from ..model import Quality
 from ..optics.bundle import Bundle, Region, find_region, trace_bundle, trace_grid
 from ..optics.paths import LightPath
 from .art import PLAIN, Frame, PathArt
-from .canvas import Canvas, blank, merge
+from .canvas import DETAILS, Canvas, blank, merge
 from .grade import coarseness, finish
 from .shot import Shot
+from .sources import NARROW_PX, halvings, motion, spread_corners
+from .spread import polygon_kernel, spread_within
 
 if TYPE_CHECKING:
     from .ringing import Rings
@@ -62,6 +64,10 @@ class FinalPass:
     art : PathArt
     frame : Frame or None
         The ghost's own centre and size, where `art` asks for them.
+    source : ndarray, shape (N, 2), or None
+        What the extent of an area light spreads it over: columns and rows from its place.
+    detail : int
+        How often the resolution may be halved because it is spread.
     """
 
     shot: Shot
@@ -71,6 +77,15 @@ class FinalPass:
     view_radius: float
     art: PathArt
     frame: Frame | None
+    source: Floats | None = None
+    detail: int = 0
+
+    @property
+    def alone(self) -> tuple[object, ...]:
+        """What ghosts on one plane of their own must share; empty when it needs none."""
+        if self.source is None and not self.art.alone:
+            return ()
+        return (self.detail, None if self.source is None else self.source.tobytes(), self.art.blur)
 
     @property
     def gain(self) -> float:
@@ -101,11 +116,20 @@ def find_final(shot: Shot, path: LightPath, art: PathArt = PLAIN, entry: Region 
         if whole is None:
             return None
         frame = _frame(shot, path, whole)
-    view_radius = art.view_radius(shot.view_radius, frame)
+    view_radius, source, detail = art.view_radius(shot.view_radius, frame), None, 0
+    to_pixels = art.place(shot.to_pixels, frame)
+    if shot.corners is not None:
+        moved = motion(shot, path)
+        if moved is not None:
+            corners = spread_corners(shot, moved[0], to_pixels)
+            if np.abs(corners).max() > NARROW_PX:
+                zoom = float(to_pixels[2:].min())
+                source, detail = corners, halvings(corners, moved[1] * zoom, DETAILS - 1)
+                view_radius += float(np.hypot(*corners.T).max()) / zoom
     region = find_region(lens, path, tilt, iris_radius, view_radius, within)
     if region is None:
         return None
-    return FinalPass(shot, path, region, art.place(shot.to_pixels, frame), view_radius, art, frame)
+    return FinalPass(shot, path, region, to_pixels, view_radius, art, frame, source, detail)
 
 
 def find_entry(shot: Shot, way_in: LightPath) -> Region | None:
@@ -155,6 +179,11 @@ def contrast(item: FinalPass, level: float) -> float:
     return item.region.brightness * item.gain / item.art.scale**2 / level if level > 0.0 else float("inf")
 
 
+def detail_of(visibility: float) -> int:
+    """Return how often the resolution may be halved for a ghost of this `contrast`."""
+    return sum(visibility < limit for limit in DETAIL_CONTRAST)
+
+
 def draw_final(
     item: FinalPass, quality: Quality, canvas: Canvas, visibility: float = float("inf"), stop: Event | None = None
 ) -> None:
@@ -171,7 +200,7 @@ def draw_final(
     stop : Event, optional
         Set to leave off between two wavelengths.
     """
-    detail = sum(visibility < limit for limit in DETAIL_CONTRAST)
+    detail = detail_of(visibility)
     shot, path = item.shot, item.path
     tilt, opening = shot.incidence.tilt, shot.opening
     to_pixels = item.to_pixels / 2.0**detail
@@ -227,28 +256,36 @@ def _with_shadow(item: FinalPass, rings: Rings, quality: Quality, scale: float) 
 
 
 def draw_alone(items: Sequence[FinalPass], quality: Quality, canvas: Canvas, stop: Event | None = None) -> None:
-    """Draw ghosts on a plane of their own, ramp and blur it, and add it to a canvas.
+    """Draw ghosts on a plane of their own, spread, ramp and blur it, and add it to a canvas.
 
     Parameters
     ----------
     items : sequence of FinalPass
-        One with a ramp, or any number without that share a blur: blurring is linear.
+        One with a ramp, or any number without that share a blur and a spread (`FinalPass.alone`): both are linear.
     quality : Quality
     canvas : Canvas
         Added to.
     stop : Event, optional
         Set to leave off between two wavelengths.
     """
-    art, shot, frame = items[0].art, items[0].shot, items[0].frame
-    detail = coarseness(art, shot.to_pixels)
+    art, shot, frame, source = items[0].art, items[0].shot, items[0].frame, items[0].source
+    detail = max(items[0].detail, coarseness(art, shot.to_pixels) if art.blur > 0.0 else 0)
     own = shot.to_pixels / 2.0**detail
     mx, my = art.margin(own)
+    kernel = None if source is None else polygon_kernel(source / 2.0**detail)
+    if kernel is not None:
+        mx, my = mx + kernel.shape[1] // 2, my + kernel.shape[0] // 2
     width, height = (-(-side // 2**detail) for side in canvas.size_px)
     sheet = blank((width + 2 * mx, height + 2 * my))
     for item in items:
         shifted = item.to_pixels / 2.0**detail + np.array([mx, my, 0.0, 0.0])
         draw_final(replace(item, to_pixels=shifted), quality, sheet, stop=stop)
     pixels = merge(sheet.planes, sheet.size_px)
+    if kernel is not None:
+        pixels = spread_within(pixels, kernel)
+    if not art.alone:
+        canvas.add(pixels, detail)
+        return
     canvas.add(finish(pixels, art, frame, items[0].to_pixels / 2.0**detail, own), detail)
 
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from threading import Event
 from typing import Any
 
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ..kernels.montecarlo import BESIDE, ENTERED, IN_PICTURE, TALLIES, trace_batch
 from ..optics.bundle import front_box
 from ..optics.color import luminance_weights
-from .shot import Shot
+from .shot import Shot, moved
 
 Floats = NDArray[np.float64]
 Batch = dict[str, NDArray[Any]]
@@ -24,6 +24,8 @@ Batch = dict[str, NDArray[Any]]
 HEROES = 4
 # reflections to follow, on average, while a ray of high order crosses the lens once
 FOLLOWED = 0.5
+# directions squared into which a batch divides its points for an area light
+AIMS = 8
 # side of the blocks for which errors are kept, pixels
 BLOCK = 16
 # figures behind the kernel's tallies: what all ends of light differ by from what entered, and all ghosts in the picture
@@ -39,11 +41,18 @@ class RaySource:
     shot : Shot
     before, behind : tuple
         What the kernel takes before and behind the number of the batch.
+    seed, side, light : int
+    followed : tuple of float
+        As given to `ray_source`.
     """
 
     shot: Shot
     before: tuple[Any, ...]
     behind: tuple[Any, ...]
+    seed: int
+    side: int
+    light: int
+    followed: tuple[float, float]
 
 
 def ray_source(
@@ -92,7 +101,45 @@ def ray_source(
     )  # fmt: skip
     opening = shot.opening
     behind = (light, opening.blades, opening.mask, opening.half, shot.to_pixels, shot.size_px)
-    return RaySource(shot, before, behind)
+    return RaySource(shot, before, behind, seed, side, light, followed)
+
+
+def _aimed(source: RaySource, batch: int) -> Iterator[RaySource]:
+    """Yield a light as one batch sees it: of an area light some directions at random, each with its part of the points.
+
+    Every batch has directions of its own, so the variance over batches knows of them.
+    """
+    shot = source.shot
+    if shot.corners is None:
+        yield source
+        return
+    rng = np.random.default_rng([source.seed, batch, source.light])
+    here = np.tan(np.radians(shot.light.field_deg))
+    aims = AIMS if source.side % AIMS == 0 else 1
+    for k, offset in enumerate(_points_within(shot.corners, aims * aims, rng)):
+        # even radiance: by solid angle
+        share = ((1.0 + here @ here) / (1.0 + (here + offset) @ (here + offset))) ** 1.5 / aims**2
+        there = moved(shot, here + offset)
+        there = replace(there, light=there.light.replace(intensity=shot.light.intensity * share))
+        # numbers of points stay apart from those of parts
+        number = (source.light + 1) * 4096 + k
+        yield ray_source(there, source.seed, side=source.side // aims, light=number, followed=source.followed)
+
+
+def _points_within(corners: Floats, count: int, rng: np.random.Generator) -> Floats:
+    """Draw points evenly from a polygon, shape (count, 2)."""
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    x0, y0 = corners.T
+    x1, y1 = np.roll(corners, -1, axis=0).T
+    found = np.empty((0, 2))
+    while len(found) < count:
+        x, y = (low + (high - low) * rng.random((4 * count, 2))).T[:, :, None]
+        between = (y0 > y) != (y1 > y)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            left = x < x0 + (y - y0) / (y1 - y0) * (x1 - x0)
+        inside = (between & left).sum(axis=1) % 2 == 1
+        found = np.concatenate([found, np.hstack([x, y])[inside]])
+    return found[:count]
 
 
 def run_batch(sources: Sequence[RaySource], batch: int, *, picture: bool, fours: int = 0) -> Batch:
@@ -122,7 +169,7 @@ def run_batch(sources: Sequence[RaySource], batch: int, *, picture: bool, fours:
     planes = np.zeros((2, 3, height if picture else 0, width if picture else 0), dtype=np.float32)
     figures, paths = np.zeros(TALLIES + 2), np.zeros((2, rows, rows))
     notes = []
-    for source in sources:
+    for source in (aimed for each in sources for aimed in _aimed(each, batch)):
         room = np.empty((fours, 2))
         noted = trace_batch(*source.before, batch, *source.behind, planes, figures[:TALLIES], paths, room)
         if 0 < fours < noted:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from itertools import groupby
 from math import isfinite, pi
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..io.mask_image import read_mask
-from ..model import Layer, Project
+from ..model import Layer, Light, Project
 from ..optics.bundle import incidence
 from ..optics.color import luminance_weights
 from ..optics.pack import facing
@@ -309,16 +310,26 @@ def _summary(settled: Settled, shots: tuple[Shot, ...], images: list[DirectImage
         "wavelengths_nm": [float(w) for w in shots[0].packed.wavelengths_nm],
         "scene_irradiance_per_radiance": _scene_scale(settled, shots[0]),
         "lights": [
-            {
-                "name": shot.light.name,
-                "field_deg": list(shot.light.field_deg),
-                **({} if shot.light.distance is None else {"distance_mm": shot.light.distance}),
-                "direct_position_mm": list(image.position_mm),
-                "direct_throughput_mm2": [float(flux) for flux in image.throughput_mm2],
-                "transmittance": image.transmittance,
-            }
-            for shot, image in zip(shots, images, strict=True)
+            _light_summary(project.lights[number], list(of_one))
+            for number, of_one in groupby(zip(shots, images, strict=True), lambda pair: pair[0].number)
         ],
+    }
+
+
+def _light_summary(light: Light, parts: list[tuple[Shot, DirectImage]]) -> dict[str, Any]:
+    """Tell where a light is imaged and how bright; of an area light the mean over its parts."""
+    throughput = np.sum([shot.share * image.throughput_mm2 for shot, image in parts], axis=0)
+    weights = np.array([shot.share * float(image.throughput_mm2.sum()) for shot, image in parts])
+    weights = weights / weights.sum() if weights.any() else np.full(len(parts), 1.0 / len(parts))
+    position = weights @ np.array([image.position_mm for _, image in parts])
+    return {
+        "name": light.name,
+        "field_deg": list(light.field_deg),
+        **({} if light.distance is None else {"distance_mm": light.distance}),
+        **({"parts": len(parts)} if light.extended else {}),
+        "direct_position_mm": [float(position[0]), float(position[1])],
+        "direct_throughput_mm2": [float(flux) for flux in throughput],
+        "transmittance": float(weights @ [image.transmittance for _, image in parts]),
     }
 
 

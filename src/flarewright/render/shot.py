@@ -18,6 +18,7 @@ from ..optics.diffraction import Soil
 from ..optics.dirt import lay_elements, rasterise
 from ..optics.iris import blade_edges, outline, transmission
 from ..optics.pack import PackedLens, facing, pack_lens, resolve_coatings
+from ..optics.source import parts
 from ..optics.spectrum import band_weights, traced_wavelengths
 from .prepare import Settled
 
@@ -70,6 +71,7 @@ class Shot:
     Attributes
     ----------
     light : Light
+        As it is drawn: of an area light one part, a point.
     incidence : Incidence
     packed : PackedLens
         At the wavelengths traced for this light.
@@ -80,6 +82,12 @@ class Shot:
     colorspace : {"rec709", "acescg"}
     ringing : Ringing or None
         How ghosts show the diffraction at the iris; None: not at all.
+    number : int
+        Which of the project's lights it is, or is a part of.
+    share : float
+        Its part of that light.
+    corners : ndarray, shape (N, 2), or None
+        Outline of the part in slopes (tan X, tan Y) from its own; None for a point.
     """
 
     light: Light
@@ -90,6 +98,9 @@ class Shot:
     size_px: tuple[int, int]
     colorspace: Colorspace
     ringing: Ringing | None = None
+    number: int = 0
+    share: float = 1.0
+    corners: Floats | None = None
 
     @property
     def gain(self) -> float:
@@ -105,6 +116,27 @@ class Shot:
     def weights(self, wavelengths_nm: Floats) -> Floats:
         """Return the RGB weights of wavelengths for this light, shape (N, 3)."""
         return _weights(self.light, tuple(wavelengths_nm), self.colorspace)
+
+
+def moved(shot: Shot, slope: Floats) -> Shot:
+    """Put a shot's light elsewhere.
+
+    Parameters
+    ----------
+    shot : Shot
+    slope : ndarray, shape (2,)
+        tan X and tan Y of the field angles.
+
+    Returns
+    -------
+    Shot
+        A point.
+    """
+    x, y = (float(angle) for angle in np.degrees(np.arctan(slope)))
+    light = shot.light.replace(field_deg=(x, y))
+    seen = incidence((x, y), light.distance, shot.packed.first_order.entrance_pupil_z)
+    packed = facing(shot.packed, seen.axes, seen.nearness)
+    return replace(shot, light=light, incidence=seen, packed=packed, corners=None)
 
 
 @lru_cache(maxsize=64)
@@ -190,7 +222,7 @@ def _straight(border: Floats) -> Floats:
 
 
 def make_shots(settled: Settled, opening: Opening) -> tuple[Shot, ...]:
-    """Prepare every light of a project.
+    """Prepare every light of a project; an area light in parts.
 
     Parameters
     ----------
@@ -214,9 +246,29 @@ def make_shots(settled: Settled, opening: Opening) -> tuple[Shot, ...]:
         if key not in packs:
             packs[key] = pack_lens(settled.lens, settled.order, coatings, wavelengths_nm, sensor=settled.sensor)
         colorspace = project.output.colorspace
-        seen = _seen(settled, packs[key], number, light)
-        packed = facing(packs[key], seen.axes, seen.nearness)
-        shots.append(Shot(light, seen, packed, opening, to_pixels, (width, height), colorspace))
+        for part in parts(light, project.quality.source_step_deg):
+            point, corners = light, None
+            if light.extended:
+                intensity = light.intensity * part.share
+                changes = {"field_deg": part.field_deg, "intensity": intensity, "diameter_deg": 0.0, "shape": None}
+                point, corners = light.replace(**changes), part.corners
+            seen = _seen(settled, packs[key], number, point)
+            packed = facing(packs[key], seen.axes, seen.nearness)
+            size = (width, height)
+            shots.append(
+                Shot(
+                    point,
+                    seen,
+                    packed,
+                    opening,
+                    to_pixels,
+                    size,
+                    colorspace,
+                    number=number,
+                    share=part.share,
+                    corners=corners,
+                )
+            )
     return tuple(shots)
 
 

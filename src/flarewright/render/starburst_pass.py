@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import groupby
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,10 +14,12 @@ from ..errors import ProjectError
 from ..io.mask_image import read_mask
 from ..model import Dirt, Iris, Layer, Lines, Starburst
 from ..optics.diffraction import BladeWings, Pattern, Soil, pupil_pattern
+from ..optics.paths import direct_path
 from .direct import PUPIL_SPAN, DirectImage, defocus_mm, traced_pupil, traced_spot
 from .prepare import Settled
 from .shot import Shot
-from .spread import disc_kernel, joined, spread
+from .sources import motion
+from .spread import covered, joined, spread
 from .starburst import NEAR_SPLIT, starburst_layer
 
 Floats = NDArray[np.float64]
@@ -75,7 +78,7 @@ def starburst_of(
     ----------
     settled : Settled
     shots, images : sequence
-        One a light.
+        One a light, or a part of an area light.
     mask : ndarray, shape (A, B), or None
         The iris as an image.
     soil : Soil or None
@@ -98,25 +101,31 @@ def starburst_of(
     scene = _Scene(settled, mask, soil, look)
     width, height = shots[0].size_px
     total = np.zeros((height, width, 3), dtype=np.float32)
-    for shot, image in zip(shots, images, strict=True):
-        picture = _one_light(scene, shot, image)
+    for _, of_one in groupby(zip(shots, images, strict=True), lambda pair: pair[0].number):
+        picture = _one_light(scene, list(of_one))
         if picture is not None:
             total += picture
     return Layer("starburst", total, (0, 0, width, height))
 
 
-def _one_light(scene: _Scene, shot: Shot, image: DirectImage) -> NDArray[np.floating] | None:
-    """Draw one light, its disc included; None when it is dark."""
+def _one_light(scene: _Scene, parts: list[tuple[Shot, DirectImage]]) -> NDArray[np.floating] | None:
+    """Draw one light, the parts of an area light together; None when it is dark."""
+    # the brightest part stands for the others: its place, and its pupil
+    shot, image = max(parts, key=lambda pair: _flux(*pair))
     fine_nm = _diffracted_wavelengths(shot)
-    flux = np.interp(fine_nm, shot.packed.wavelengths_nm, image.throughput_mm2) * shot.light.intensity
-    flux *= scene.look.intensity
+    throughput = sum(part.light.intensity * found.throughput_mm2 for part, found in parts)
+    flux = np.interp(fine_nm, shot.packed.wavelengths_nm, throughput) * scene.look.intensity
     if not flux.any():
         return None
     pixel = (1.0 / float(shot.to_pixels[2]), 1.0 / float(shot.to_pixels[3]))
     column = float(shot.to_pixels[0] + image.position_mm[0] * shot.to_pixels[2])
     row = float(shot.to_pixels[1] - image.position_mm[1] * shot.to_pixels[3])
     order = scene.settled.order
-    kernel = _kernel(scene, shot, pixel)
+    # a pattern is drawn into whole pixels: what spreads it knows where within its pixel it is
+    middle = (math.floor(column) + 0.5, math.floor(row) + 0.5)
+    kernel = _kernel(scene, parts, (shot, image), (column - middle[0], row - middle[1]))
+    if kernel is not None:
+        column, row = middle
     margin = (0, 0) if kernel is None else (kernel.shape[1] // 2, kernel.shape[0] // 2)
     width, height = shot.size_px
     size = (width + 2 * margin[0], height + 2 * margin[1])
@@ -148,18 +157,54 @@ def _one_light(scene: _Scene, shot: Shot, image: DirectImage) -> NDArray[np.floa
     return spread(picture, kernel)[margin[1] : margin[1] + height, margin[0] : margin[0] + width]
 
 
-def _kernel(scene: _Scene, shot: Shot, pixel: tuple[float, float]) -> Floats | None:
-    """Return what the direct image of a point is spread over besides diffraction: defocus, and the light's disc."""
-    settled = scene.settled
-    # the sun's image is efl times its angle across
-    radius = settled.order.efl * math.tan(0.5 * math.radians(shot.light.diameter_deg))
-    disc = disc_kernel((radius / pixel[0], radius / pixel[1])) if radius > 0.0 else None
-    if defocus_mm(settled.lens, shot) < OUT_OF_FOCUS_PX * min(pixel):
-        return disc
-    spot = traced_spot(settled.lens, shot)
-    if spot is None or disc is None:
-        return disc if spot is None else spot
-    return joined(spot, disc)
+def _flux(shot: Shot, image: DirectImage) -> float:
+    return shot.light.intensity * float(image.throughput_mm2.mean())
+
+
+def _kernel(
+    scene: _Scene,
+    parts: list[tuple[Shot, DirectImage]],
+    brightest: tuple[Shot, DirectImage],
+    offset: tuple[float, float],
+) -> Floats | None:
+    """Return what the direct image of a point is spread over besides diffraction: defocus, and the light's shape.
+
+    It is moved by `offset`, columns and rows.
+    """
+    settled, shot = scene.settled, brightest[0]
+    shape = _shape(settled, parts, brightest, offset) if shot.corners is not None else None
+    if defocus_mm(settled.lens, shot) < OUT_OF_FOCUS_PX / float(shot.to_pixels[2:].max()):
+        return shape
+    spot = traced_spot(settled.lens, shot, offset if shape is None else (0.0, 0.0))
+    if spot is None or shape is None:
+        return shape if spot is None else spot
+    return joined(spot, shape)
+
+
+def _shape(
+    settled: Settled,
+    parts: list[tuple[Shot, DirectImage]],
+    brightest: tuple[Shot, DirectImage],
+    offset: tuple[float, float],
+) -> Floats | None:
+    """Draw an area light as its parts are imaged, each with its own flux; the middle is the brightest part's place."""
+    drawn = []
+    zoom = brightest[0].to_pixels[2:] * [1.0, -1.0]
+    for shot, image in parts:
+        moved = motion(shot, direct_path(settled.lens)) if _flux(shot, image) > 0.0 else None
+        if moved is not None and shot.corners is not None:
+            place = np.array(image.position_mm) - np.array(brightest[1].position_mm)
+            drawn.append(((place + shot.corners @ moved[0].T) * zoom + offset, _flux(shot, image)))
+    if not drawn:
+        return None
+    reach = [int(np.ceil(max(np.abs(corners[:, k]).max() for corners, _ in drawn) + 0.5)) for k in (1, 0)]
+    size = (2 * reach[0] + 1, 2 * reach[1] + 1)
+    total = np.zeros(size)
+    for corners, flux in drawn:
+        part = np.abs(covered(corners + np.array([reach[1], reach[0]]) + 0.5, size))
+        area = float(part.sum())
+        total += part * (flux / area) if area > 0.0 else 0.0
+    return np.asarray(total / total.sum()) if total.any() else None
 
 
 def _patterns(scene: _Scene, shot: Shot, turns: Floats) -> list[Pattern | None]:

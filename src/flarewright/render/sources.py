@@ -1,0 +1,162 @@
+"""Area lights: how far each ghost moves over a part of a light, and what that spreads it over.
+
+A part of a light is traced as one direction. The other directions make the same ghost elsewhere: over a small part the
+motion is straight, so the part's ghost is the traced one spread over the part's outline, mapped to the sensor.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..kernels.bundle import measure_bundle
+from ..optics.bundle import find_region, trace_bundle, trace_grid
+from ..optics.paths import LightPath
+from .ghosts_draft import draft_centre
+from .shot import Shot, moved
+
+Floats = NDArray[np.float64]
+
+# what a spread may be rounded by: pixels, and part of its own size; ghosts of one rounded spread are spread together
+ROUND_PX, ROUND_PART = 0.3, 0.03
+# a spread narrower than this many pixels is not seen
+NARROW_PX = 0.35
+# coarse pixels that a spread and a ghost must keep across before either is drawn at half the resolution
+COARSE_PX = 6.0
+# largest relative error of a ghost's flux where only its centroid is asked for
+CENTRE_TOLERANCE = 3e-3
+
+
+def motion(shot: Shot, path: LightPath, *, draft: bool = False) -> tuple[Floats, float] | None:
+    """Measure how a ghost's centroid moves over the part of a light, on the unbounded sensor plane.
+
+    Parameters
+    ----------
+    shot : Shot
+        With corners.
+    path : LightPath
+    draft : bool
+        By matrices instead of rays.
+
+    Returns
+    -------
+    matrix : ndarray, shape (2, 2)
+        Upright mm per slope, from the part's left to its right and from its lower to its upper side.
+    size : float
+        The ghost's own root mean square radius, mm; infinite by matrices.
+
+    None when the path passes no light.
+    """
+    assert shot.corners is not None
+    here = np.tan(np.radians(shot.light.field_deg))
+    if shot.packed.symmetric and not draft:
+        return _turned(shot, path, here)
+    ends = [_ends(shot, path, here, axis, draft=draft) for axis in np.eye(2)]
+    known = [end for end in ends if end is not None]
+    if not known:
+        return None
+    columns = [np.zeros(2) if end is None else end[0] for end in ends]
+    return np.stack(columns, axis=1), float(np.mean([size for _, _, size in known]))
+
+
+def _turned(shot: Shot, path: LightPath, here: Floats) -> tuple[Floats, float] | None:
+    """Measure the motion towards the axis; across it, a lens of revolution turns its ghosts about the axis."""
+    slope = float(np.hypot(*here))
+    radial = here / slope if slope > 0.0 else np.array([1.0, 0.0])
+    found = _ends(shot, path, here, radial, draft=False)
+    if found is None:
+        return None
+    column, middle, size = found
+    along = float(column @ radial)
+    across = float(middle @ radial) / slope if slope > 1e-9 else along
+    outward = np.outer(radial, radial)
+    return along * outward + across * (np.eye(2) - outward), size
+
+
+def _ends(
+    shot: Shot, path: LightPath, here: Floats, axis: Floats, *, draft: bool
+) -> tuple[Floats, Floats, float] | None:
+    """Measure the motion between the ends of the part along an axis: mm per slope, the ghost's middle, its size."""
+    assert shot.corners is not None
+    along = shot.corners @ axis
+    found = [(float(d), _centre(shot, path, here + d * axis, draft=draft)) for d in (along.min(), along.max())]
+    lit = [(d, *centre) for d, centre in found if centre is not None]
+    if len(lit) == 1:
+        # dark at one end: from the other to the middle
+        middle = _centre(shot, path, here, draft=draft)
+        lit += [(0.0, *middle)] if middle is not None else []
+    if len(lit) < 2:
+        return None
+    (a, start, one), (b, stop, other) = lit
+    motion = (stop - start) / (b - a)
+    return motion, start - a * motion, 0.5 * (one + other)
+
+
+def _centre(shot: Shot, path: LightPath, slope: Floats, *, draft: bool) -> tuple[Floats, float] | None:
+    """Return a ghost's centroid and rms radius when the light stands elsewhere; upright, mm."""
+    elsewhere = moved(shot, slope)
+    if draft:
+        return draft_centre(elsewhere, path), float("inf")
+    packed, seen, opening = elsewhere.packed, elsewhere.incidence, shot.opening
+    region = find_region(packed, path, seen.tilt, opening.radius)
+    if region is None:
+        return None
+    bundle = trace_grid(
+        packed, path, seen.tilt, (opening.radius, opening.inner), region, tolerance=0.25, scale=1e-6,
+        flux_tolerance=CENTRE_TOLERANCE,
+    )  # fmt: skip
+    data = trace_bundle(packed, len(packed.wavelengths_nm) // 2, bundle, seen.tilt)
+    sums = measure_bundle(
+        data, bundle.pupil, bundle.triangles, path.stop_crossings, opening.blades, seen.axes, bundle.halves
+    )
+    if sums[0] <= 0.0:
+        return None
+    x, y = sums[1] / sums[0], sums[2] / sums[0]
+    return np.array([x, y]), float(np.sqrt(max(sums[3] / sums[0] - x * x - y * y, 0.0)))
+
+
+def spread_corners(shot: Shot, matrix: Floats, to_pixels: Floats) -> Floats:
+    """Map the outline of a part of a light to what its ghost is spread over.
+
+    Parameters
+    ----------
+    shot : Shot
+        With corners.
+    matrix : ndarray, shape (2, 2)
+        From `motion`; rounded a little, so that ghosts with much the same spread have the same.
+    to_pixels : ndarray, shape (4,)
+        The ghost's own.
+
+    Returns
+    -------
+    ndarray, shape (N, 2)
+        Columns and rows from the ghost's place.
+    """
+    assert shot.corners is not None
+    extent = 0.5 * (shot.corners.max(axis=0) - shot.corners.min(axis=0))
+    pixels = matrix * np.array([[to_pixels[2]], [-to_pixels[3]]]) * extent
+    largest = float(np.abs(pixels).max())
+    unit = 2.0 * ROUND_PX
+    while unit < ROUND_PART * largest:
+        unit *= 2.0
+    # rounded once more, so that parts of one shape have the same corners to the bit
+    return np.asarray(np.round((shot.corners / extent) @ (np.round(pixels / unit) * unit).T, 6) + 0.0)
+
+
+def halvings(corners_px: Floats, size_px: float, most: int) -> int:
+    """Return how often the resolution of a spread ghost may be halved before anyone can see it.
+
+    Parameters
+    ----------
+    corners_px : ndarray, shape (N, 2)
+        From `spread_corners`.
+    size_px : float
+        The ghost's own radius.
+    most : int
+
+    Returns
+    -------
+    int
+    """
+    wide = min(0.5 * float(np.ptp(corners_px, axis=0).min()), size_px)
+    return int(np.clip(np.floor(np.log2(max(wide, 1e-9) / COARSE_PX)), 0, most))

@@ -1,0 +1,222 @@
+"""Area lights: what they are the limit and the sum of."""
+
+import numpy as np
+import pytest
+from judge import judge, probabilities
+
+from flarewright.errors import ProjectError
+from flarewright.model import Camera, Light, Lines, Output, Polygon, Project, Quality, Rectangle
+from flarewright.optics.color import luminance_weights
+from flarewright.optics.source import outline, parts
+from flarewright.render.prepare import settle
+from flarewright.render.render import render
+from flarewright.render.shot import make_opening, make_shots
+from flarewright.render.spread import covered, polygon_kernel, spread, spread_within
+
+D_LINE = Lines(lines=((587.56, 1.0),))
+SIZE = (240, 160)
+L_SHAPE = Polygon(corners_deg=((0.0, 0.0), (3.0, 0.0), (3.0, 1.0), (1.0, 1.0), (1.0, 2.0), (0.0, 2.0)))
+
+
+def project(*lights, lens="heliar-tronnier", f_number=8.0, mode="final", step=2.0, size=SIZE, **parts_):
+    return Project(
+        lens=lens,
+        f_number=f_number,
+        lights=lights,
+        camera=Camera(size_px=size, **parts_.pop("camera", {})),
+        quality=Quality(mode=mode, wavelengths=1, bridge=False, source_step_deg=step),
+        output=Output(**parts_),
+    )
+
+
+def light(field=(6.0, 4.0), **how):
+    return Light(field_deg=field, spectrum=D_LINE, **how)
+
+
+def picture(made, name="ghosts"):
+    layer = next(layer for layer in render(made).layers if layer.name == name)
+    whole = np.zeros((made.camera.size_px[1], made.camera.size_px[0]))
+    x, y, w, h = layer.window
+    whole[y : y + h, x : x + w] = layer.pixels @ luminance_weights("rec709")
+    return whole
+
+
+def many(extended, step):
+    """Return the points that make an area light, one for each fine part."""
+    return [light(part.field_deg, intensity=part.share, distance=extended.distance) for part in parts(extended, step)]
+
+
+def _moments(pixels):
+    """Flux, then centroid and rms widths of what is bright, pixels: spikes end at the picture's border."""
+    lit = np.where(pixels > 0.03 * pixels.max(), pixels, 0.0)
+    rows, columns = np.indices(lit.shape)
+    middle = [float((lit * at).sum() / lit.sum()) for at in (rows, columns)]
+    widths = [
+        float(np.sqrt((lit * (at - m) ** 2).sum() / lit.sum())) for at, m in zip((rows, columns), middle, strict=True)
+    ]
+    return [float(pixels.sum()), *middle, *widths]
+
+
+SHAPES = {
+    "sun": {"diameter_deg": 0.53},
+    "disc": {"diameter_deg": 3.0},
+    "window": {"shape": Rectangle(size_deg=(5.0, 2.5), rotation_deg=20.0)},
+    "concave": {"shape": L_SHAPE},
+    "near lamp": {"diameter_deg": 2.0, "distance": 400.0},
+}
+
+
+@pytest.mark.parametrize("mode", ["final", "draft"])
+@pytest.mark.parametrize("name", SHAPES)
+def test_an_area_light_is_the_sum_of_its_points(name, mode):
+    """Ghosts and direct image; what is left is the sum's own steps and what `docs/sources.md` states."""
+    extended = light(**SHAPES[name])
+    one = project(extended, mode=mode)
+    fine = project(*many(extended, 0.05 if name == "sun" else 0.35), mode=mode)
+    area, points = picture(one), picture(fine)
+    assert area.sum() == pytest.approx(points.sum(), rel=2e-3)
+    assert np.abs(area - points).sum() < 0.02 * points.sum()
+    # the direct images of points are dots, so flux, place and widths are compared
+    area, points = (_moments(picture(made, "starburst")) for made in (one, fine))
+    assert area[0] == pytest.approx(points[0], rel=2e-3)
+    assert area[1:3] == pytest.approx(points[1:3], abs=0.1)
+    # each dot stands for a cell of four pixels, which has a width itself
+    assert area[3:] == pytest.approx(points[3:], rel=0.06, abs=0.12)
+
+
+def test_smaller_parts_come_closer_to_the_sum():
+    extended = light(shape=Rectangle(size_deg=(6.0, 4.0)))
+    points = picture(project(*many(extended, 0.4)))
+    errors = [np.abs(picture(project(extended, step=step)) - points).sum() / points.sum() for step in (6.0, 3.0, 1.5)]
+    assert errors[0] > 1.5 * errors[1] > 2.0 * errors[2]
+    assert errors[2] < 0.01
+
+
+def test_a_disc_of_no_size_is_a_point():
+    point, dot = (picture(project(light(**how))) for how in ({}, {"diameter_deg": 1e-6}))
+    # a direction that differs by rounding may halve a cell of the mesh more or less
+    assert np.abs(point - dot).sum() < 1e-3 * point.sum()
+
+
+def test_shares_go_by_solid_angle():
+    wide = light((0.0, 0.0), shape=Rectangle(size_deg=(80.0, 80.0)))
+    # so that the borders of parts run along the square of half the width
+    pieces = parts(wide, 2.01)
+    assert sum(part.share for part in pieces) == pytest.approx(1.0)
+    # the solid angle of a square of half width a at distance 1: 4 asin(a^2 / (1 + a^2))
+    a = np.tan(np.radians(40.0))
+    inner = [part.share for part in pieces if np.abs(part.slope + part.corners).max() < 0.5 * a * (1.0 + 1e-9)]
+    whole, half = (4.0 * np.arcsin(x * x / (1.0 + x * x)) for x in (a, 0.5 * a))
+    assert sum(inner) == pytest.approx(half / whole, rel=2e-3)
+
+
+def test_parts_tile_the_light():
+    for how in ({"diameter_deg": 9.0}, {"shape": L_SHAPE}, {"shape": Rectangle(size_deg=(7, 3), rotation_deg=33.0)}):
+        whole = light((10.0, -5.0), **how)
+        rim = outline(whole)
+        found = parts(whole, 1.0)
+        area = [0.5 * np.sum(p[:, 0] * np.roll(p[:, 1], -1) - np.roll(p[:, 0], -1) * p[:, 1]) for p in
+                [rim, *(part.corners for part in found)]]  # fmt: skip
+        assert sum(area[1:]) == pytest.approx(area[0], rel=1e-9)
+        assert all(np.ptp(part.corners, axis=0).max() <= np.tan(np.radians(1.0)) * (1 + 1e-9) for part in found)
+
+
+def test_the_direct_image_is_the_lights_picture():
+    """A window in front of a long lens: its image is efl tan wide, evenly lit, and as bright as it was given."""
+    made = project(light((2.0, 1.0), shape=Rectangle(size_deg=(4.0, 2.0))), size=(600, 400), f_number=8.0)
+    seen = picture(made, "starburst")
+    settled = settle(made)
+    pixel = 36.0 / 600
+    columns = settled.order.efl * np.tan(np.radians([0.0, 4.0])) / pixel + 300.0
+    rows = 200.0 - settled.order.efl * np.tan(np.radians([0.0, 2.0])) / pixel
+    inside = seen[int(rows[1]) + 4 : int(rows[0]) - 4, int(columns[0]) + 4 : int(columns[1]) - 4]
+    assert inside.std() < 0.02 * inside.mean()
+    flux = sum(render(made).summary["lights"][0]["direct_throughput_mm2"])
+    area = np.diff(columns)[0] * -np.diff(rows)[0] * pixel**2
+    assert inside.mean() == pytest.approx(flux / area, rel=0.02)
+    outside = seen.copy()
+    outside[int(rows[1]) - 6 : int(rows[0]) + 7, int(columns[0]) - 6 : int(columns[1]) + 7] = 0.0
+    assert outside.sum() < 0.02 * seen.sum()
+
+
+def test_a_light_beside_the_frame_has_its_ghosts_in_it():
+    made = project(light((16.0, 0.0), diameter_deg=2.0))
+    settled = settle(made)
+    image = render(made).summary["lights"][0]["direct_position_mm"]
+    assert image[0] - settled.order.efl * np.tan(np.radians(1.0)) > 0.5 * made.camera.sensor[0]
+    assert len(make_shots(settled, make_opening(settled, None))) == 4
+    assert picture(made).sum() > 0.0
+    points = picture(project(*many(light((16.0, 0.0), diameter_deg=2.0), 0.3)))
+    assert np.abs(picture(made) - points).sum() < 0.02 * points.sum()
+
+
+def test_final_quality_agrees_with_the_reference_on_an_area_light():
+    judged = judge(
+        project(light((7.0, 4.0), diameter_deg=3.0), f_number=5.6, layers="ghosts", starburst=False, step=1.0),
+        batches=96, side=64,
+    )  # fmt: skip
+    final, mean, error = judged.total
+    assert abs(final - mean) < 2e-3 * mean + 4.0 * error
+    # final quality takes parts for straight: half a percent of a block on top of what is stated for points
+    spread_ = np.sqrt(judged.variance + (0.01 * judged.mean) ** 2 + (1e-3 * judged.mean.mean()) ** 2)
+    assert np.abs((judged.final - judged.mean) / spread_).max() < 5.0
+    _, worst = probabilities(judged, judged.mean)
+    assert worst > 1e-4
+
+
+def test_a_single_ghost_is_spread_too():
+    """Its own layer, and with art on top: a gain, a ramp and a blur leave the flux what it is."""
+    made = project(light(diameter_deg=1.0), layers="ghosts", starburst=False)
+    layers = {layer.name: layer for layer in render(made).layers}
+    singles = [layer for name, layer in layers.items() if name.startswith("ghost.")]
+    total = sum(layer.pixels.sum(dtype=np.float64) for layer in singles)
+    assert total == pytest.approx(layers["ghosts"].pixels.sum(dtype=np.float64), rel=1e-4)
+    art = {"rules": [{"select": "4-1", "gain": 2.0, "blur_px": 2.0, "ramp": [[0, 1, 1, 1], [2, 1, 1, 1]]}]}
+    changed = {layer.name: layer for layer in render(made.replace(art=type(made.art).model_validate(art))).layers}
+    before, after = (found["ghost.4-1"].pixels.sum(dtype=np.float64) for found in (layers, changed))
+    assert after == pytest.approx(2.0 * before, rel=0.01)
+
+
+def test_the_same_pixels_whatever_the_threads():
+    made = project(light(shape=Rectangle(size_deg=(5.0, 3.0))))
+    one, three = (render(made, threads=n) for n in (1, 3))
+    for a, b in zip(one.layers, three.layers, strict=True):
+        assert a.pixels.tobytes() == b.pixels.tobytes()
+
+
+@pytest.mark.parametrize(
+    ("how", "words"),
+    [
+        ({"field": (80.0, 0.0), "diameter_deg": 30.0}, "beside or behind the camera"),
+        ({"shape": Polygon(corners_deg=((0, 0), (1, 1), (2, 2)))}, "has no area"),
+        ({"shape": Rectangle(size_deg=(120.0, 10.0)), "field": (60.0, 0.0)}, "beside or behind the camera"),
+    ],
+)
+def test_shapes_that_cannot_be(how, words):
+    with pytest.raises(ProjectError, match=words):
+        render(project(light(**how)))
+
+
+def test_coverage_is_exact():
+    square = np.array([[1.25, 2.5], [3.75, 2.5], [3.75, 4.0], [1.25, 4.0]])
+    found = covered(square, (6, 6))
+    assert abs(found.sum()) == pytest.approx(2.5 * 1.5)
+    assert np.abs(found[3]) == pytest.approx([0.0, 0.75, 1.0, 0.75, 0.0, 0.0])
+    assert np.abs(found[2]) == pytest.approx([0.0, 0.375, 0.5, 0.375, 0.0, 0.0])
+    # concave, either way round, and the mean place of its light
+    corners = np.tan(np.radians(np.array(L_SHAPE.corners_deg))) * 400.0
+    kernel = polygon_kernel(corners - corners.mean(axis=0))
+    assert kernel.sum() == pytest.approx(1.0)
+    assert kernel == pytest.approx(polygon_kernel((corners - corners.mean(axis=0))[::-1]))
+    # as good as no area: a line, a dot
+    assert polygon_kernel(np.zeros((4, 2)))[1, 1] == pytest.approx(1.0)
+
+
+def test_a_window_is_spread_like_the_whole():
+    rng = np.random.default_rng(4)
+    sheet = np.zeros((50, 60, 3))
+    sheet[0:9, 40:60] = rng.random((9, 20, 3))
+    kernel = polygon_kernel(np.array([[-4.0, -3.0], [6.0, -1.0], [2.0, 5.0]]))
+    a, b = (side // 2 for side in kernel.shape)
+    whole = spread(sheet, kernel)[a:-a, b:-b]
+    assert np.abs(spread_within(sheet, kernel) - whole).max() < 1e-12
