@@ -158,7 +158,7 @@ def test_the_gain_of_the_pass_is_theirs_too(plain):
 
 @pytest.mark.parametrize("name", ["4-1-2-3", "4-1-1-0", "4-1-20-3", "4-1-5-3", "4-1-3", "4-1-sensor-2"])
 def test_names_of_no_path_are_refused(name):
-    with pytest.raises(ProjectError, match="has no ghost|the sensor reflects"):
+    with pytest.raises(ProjectError, match=r"has no ghost|the sensor reflects"):
         render(project(Rule(select=name, gain=2.0)))
 
 
