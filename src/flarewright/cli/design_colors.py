@@ -11,7 +11,7 @@ from ..errors import ProjectError
 from .common import check_place, console, print_json, tell
 
 EPILOG = (
-    "Example, in the project:\n\n[[design.wishes]]\n\nghost = \"4-1\"\n\ncolor = [1.0, 0.4, 0.1]\n\n"
+    'Example, in the project:\n\n[[design.wishes]]\n\nghost = "4-1"\n\ncolor = [1.0, 0.4, 0.1]\n\n'
     "Then: flarewright design colors shot.toml -o coated.toml --films free"
 )
 
