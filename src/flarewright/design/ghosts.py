@@ -84,7 +84,7 @@ def evaluate(structure: Structure, many: Floats, entrance: float) -> Floats:
 
     Notes
     -----
-    Tested against `optics.paraxial` and the draft renderer in tests/design/test_ghosts.py.
+    Tested against `optics.paraxial` and the draft renderer in tests/design/test_design_ghosts.py.
     """
     values = np.empty((len(many), len(structure.pairs), kernel.COLUMNS))
     kernel.ghosts_of_many(np.ascontiguousarray(many), structure.stop, structure.mirrors, float(entrance), values)
