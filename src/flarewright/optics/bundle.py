@@ -20,10 +20,10 @@ Floats = NDArray[np.float64]
 
 # cells of the pre-pass over half the pupil: 64 across the whole
 PREPASS = (32, 64)
-# and of the scans of a part of it
-FINER = (12, 24)
-# and of its scans at other wavelengths, once the middle one has shown that no small spot is looked for: so many cells
-# of the whole front or of a part
+# and of the scans of a part of it; of what reaches the stop at least ENTRY, for a spot must be found at first
+FINER, ENTRY = (12, 24), (20, 40)
+# and of a part's scans at other wavelengths, once the middle one has shown that no small spot is looked for: so many
+# cells of the whole front or of a part
 COARSE = (8, 16)
 SPECK, SMALL_REGION = 16, 64
 # coarsest cells of a bundle's grid over half its region, and how often each may be halved; of a whole region twice as
@@ -249,7 +249,7 @@ def find_region(
     if within is not None:
         # as dense as on the whole front
         parts = (within[1::2] - within[0::2]) / (box[1::2] - box[0::2])
-        few = _cells(packed, FINER)
+        few = _cells(packed, ENTRY)
         cells = (max(ceil(cells[0] * parts[0]), few[0]), max(ceil(cells[1] * parts[1]), few[1]))
         box = within
     whole = True
