@@ -56,7 +56,7 @@ class LightPath:
         """How often the path crosses the stop: 1, 3 or 5."""
         return int(np.count_nonzero(self.actions == STOP))
 
-    @property
+    @cached_property
     def entry(self) -> LightPath | None:
         """The way in as far as the stop; None when a mirror comes first."""
         stop = int(np.argmax(self.actions == STOP))

@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..kernels import matrix
+from .fft_size import fast_size
 from .pack import PackedLens
 from .paths import LightPath
 
@@ -215,7 +216,8 @@ def fresnel_grid(
     ]
     step = max(finest, *coarsest)
     counts = [
-        _fast_size(math.ceil((width + 0.5 * large / step) / step)) for width, large in zip(open_part, most, strict=True)
+        fast_size(math.ceil((width + 0.5 * large / step) / step), even=True)
+        for width, large in zip(open_part, most, strict=True)
     ]
     x, y = (np.asarray((np.arange(count) - 0.5 * (count - 1)) * step, dtype=np.float64) for count in counts)
     amplitude, light = opening(x, y[:, None])
@@ -225,19 +227,6 @@ def fresnel_grid(
     per_sample = np.minimum(np.hypot(np.fft.rfftfreq(counts[0]), np.fft.fftfreq(counts[1])[:, None]), 0.5)
     spectrum = (spectrum / np.sinc(per_sample) ** 2).astype(np.complex64)
     return FresnelGrid((x, y), spectrum, float(light.sum()))
-
-
-def _fast_size(least: int) -> int:
-    """Return the next even number without prime factors above 5."""
-    found = least + least % 2
-    while True:
-        rest = found
-        for prime in (2, 3, 5):
-            while rest % prime == 0:
-                rest //= prime
-        if rest == 1:
-            return found
-        found += 2
 
 
 def fresnel_intensity(grid: FresnelGrid, area: tuple[float, float], *, white: bool = False) -> Singles:
@@ -366,7 +355,7 @@ def disc_blurred(
         return pattern, half
     more = (math.ceil(across[0]) + 2, math.ceil(across[1]) + 2)
     wide = np.pad(pattern, ((more[1], more[1]), (more[0], more[0])))
-    size = (_fast_size(wide.shape[0]), _fast_size(wide.shape[1]))
+    size = (fast_size(wide.shape[0], even=True), fast_size(wide.shape[1], even=True))
     transfer = _disc_transfer(size, (round(across[0], 9), round(across[1], 9)))
     spread = np.fft.irfft2(np.fft.rfft2(wide, size) * transfer, size)[: wide.shape[0], : wide.shape[1]]
     found = np.ascontiguousarray(np.maximum(spread, 0.0), dtype=np.float32)

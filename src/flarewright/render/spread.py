@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..optics.fft_size import fast_size
 from .canvas import lit_window
 
 Floats = NDArray[np.float64]
@@ -25,7 +26,7 @@ def spread(picture: NDArray[np.floating], kernel: Floats) -> Floats:
     """
     height, width = picture.shape[:2]
     reach = [side // 2 for side in kernel.shape]
-    rows, columns = _smooth_size(height + 2 * reach[0]), _smooth_size(width + 2 * reach[1])
+    rows, columns = fast_size(height + 2 * reach[0]), fast_size(width + 2 * reach[1])
     transfer = np.fft.rfft2(kernel, (rows, columns))
     out = np.empty(picture.shape)
     for c in range(picture.shape[2]):
@@ -75,22 +76,9 @@ def joined(one: Floats, other: Floats) -> Floats:
     ndarray
     """
     rows, columns = (one.shape[k] + other.shape[k] - 1 for k in (0, 1))
-    size = (_smooth_size(rows), _smooth_size(columns))
+    size = (fast_size(rows), fast_size(columns))
     both = np.fft.irfft2(np.fft.rfft2(one, size) * np.fft.rfft2(other, size), size)[:rows, :columns]
     return np.asarray(np.maximum(both, 0.0))
-
-
-def _smooth_size(least: int) -> int:
-    """Return the next length whose transform is fast."""
-    found = least
-    while True:
-        rest = found
-        for prime in (2, 3, 5):
-            while rest % prime == 0:
-                rest //= prime
-        if rest == 1:
-            return found
-        found += 1
 
 
 def polygon_kernel(corners_px: Floats) -> Floats:
