@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from ..errors import OutputError, ProjectError
 from .common import field_angles, pair
-from .design_solve import Json, Lenses, Searches, Threads, Time, check_time, search
+from .design_solve import Json, Lenses, Output, Searches, Seed, Threads, Time, check_time, search
 
 EPILOG = (
     "Examples:\n\nflarewright design scratch --light 10,5 --ghost 4,1.5 --ghost -6,0.8 --ghost -11,3 -o found\n\n"
@@ -18,7 +17,7 @@ EPILOG = (
 
 
 def scratch(
-    output: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="Folder for lenses and report.")],
+    output: Output,
     light: Annotated[str, typer.Option(metavar="X,Y", help="Field angles in degrees, right and up.")] = "5.45,5.45",
     ghost: Annotated[
         list[str] | None,
@@ -31,7 +30,7 @@ def scratch(
     stop_diameter: Annotated[float | None, typer.Option(help="Of the stop, mm; free when left out.")] = None,
     unsigned: Annotated[bool, typer.Option("--unsigned", help="Upright or upside down is the same.")] = False,
     time_s: Time = 60.0,
-    seed: Annotated[int, typer.Option(min=0, help="Begins the random numbers.")] = 0,
+    seed: Seed = 0,
     lenses: Lenses = 5,
     searches: Searches = None,
     threads: Threads = None,

@@ -24,6 +24,8 @@ EPILOG = (
     "flarewright design resume found --time 600\n\nflarewright render found/lens-1.toml --light 10,5 -o flare.exr"
 )
 
+Output = Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="Folder for lenses and report.")]
+Seed = Annotated[int, typer.Option(min=0, help="Begins the random numbers.")]
 Time = Annotated[float, typer.Option("--time", help="Seconds to search; Ctrl-C ends it earlier and keeps the best.")]
 Lenses = Annotated[int, typer.Option("--lenses", min=1, max=50, help="Write so many distinct lenses.")]
 Threads = Annotated[int | None, typer.Option(min=1, help="All cores when left out; the lenses do not depend on it.")]
@@ -33,9 +35,9 @@ Json = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
 
 def solve(
     project: Annotated[Path, typer.Argument(metavar="PROJECT", help="A project file with a [design].")],
-    output: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="Folder for lenses and report.")],
+    output: Output,
     time_s: Time = 60.0,
-    seed: Annotated[int, typer.Option(min=0, help="Begins the random numbers.")] = 0,
+    seed: Seed = 0,
     lenses: Lenses = 5,
     searches: Searches = None,
     threads: Threads = None,
