@@ -1,0 +1,238 @@
+"""Photographs of a light by a turning camera, and what they are merged into.
+
+Pixels: x to the right, y down, the top left corner of the picture is (0, 0), the middle of its first pixel (0.5, 0.5).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import cos, radians, sin
+from typing import Annotated, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, model_validator
+
+from .base import Frozen
+
+Kind = Literal["light", "dark", "flat"]
+Positive = Annotated[float, Field(gt=0.0)]
+Degrees = Annotated[float, Field(ge=-360.0, le=360.0)]
+
+
+class Capture(Frozen):
+    """One photograph: a line of captures.csv.
+
+    Attributes
+    ----------
+    file : str
+        From the folder of captures.csv.
+    constellation_deg : float or None
+        By how much the camera is turned away from the light; the light stands right of the axis in the upright picture
+        when positive (with `roll_deg` = 0). None only for dark frames and flats.
+    exposure_s, iso : float
+    f_number : float or None
+        None: unknown, the same for all.
+    roll_deg : float
+        In which direction of the upright picture the light goes as the constellation grows, counter-clockwise from the
+        right: 0 when the camera is turned along its horizon, 90 when it is held upright.
+    focal_mm : float or None
+    light_x_px, light_y_px : float or None
+        Where the light is, when a person knows better than the program.
+    kind : {"light", "dark", "flat"}
+        dark: taken with the cap on; flat: of an evenly lit surface.
+    """
+
+    file: str = Field(min_length=1)
+    constellation_deg: Degrees | None = None
+    exposure_s: Positive
+    iso: Positive = 100.0
+    f_number: Positive | None = None
+    roll_deg: Degrees = 0.0
+    focal_mm: Positive | None = None
+    light_x_px: float | None = None
+    light_y_px: float | None = None
+    kind: Kind = "light"
+
+    @model_validator(mode="after")
+    def _is_complete(self) -> Capture:
+        if self.kind == "light" and self.constellation_deg is None:
+            raise ValueError("constellation_deg is missing; only dark frames and flats have none")
+        if (self.light_x_px is None) != (self.light_y_px is None):
+            raise ValueError("light_x_px and light_y_px go together")
+        return self
+
+
+class CameraNoise(Frozen):
+    """How a camera turns light into numbers: `camera.json`.
+
+    What is None is read from the files or estimated from the captures.
+
+    Attributes
+    ----------
+    black_level, white_level : float or None
+        The number that darkness gives, and the least number that is clipped, in the units of the file.
+    electrons_per_unit : float or None
+        Electrons that raise the number by one, at `iso`.
+    read_noise : float or None
+        Standard deviation of one reading in the dark, electrons.
+    iso : float
+        For which `electrons_per_unit` holds; it falls as 1 / iso.
+    pitch_um : float or None
+        Of the pixels of the file, micrometres.
+    electrons_per_unit_error, read_noise_error : float or None
+        Their standard errors, when they were estimated.
+    """
+
+    schema_version: Literal[1] = 1
+    black_level: float | None = None
+    white_level: float | None = None
+    electrons_per_unit: Positive | None = None
+    read_noise: float | None = Field(None, ge=0.0)
+    iso: Positive = 100.0
+    pitch_um: Positive | None = None
+    electrons_per_unit_error: float | None = Field(None, ge=0.0)
+    read_noise_error: float | None = Field(None, ge=0.0)
+
+
+class FrameInfo(Frozen):
+    """What is known of one merged frame besides its pixels.
+
+    Attributes
+    ----------
+    file : str
+        The EXR file, from the run's folder.
+    constellation_deg : float
+        Angle between axis and light, the turntable's jitter taken out; its sign is that of `nominal_deg`.
+    nominal_deg, nominal_roll_deg : float
+        As the captures say.
+    roll_deg : float
+        Direction of growing constellation as found in the picture, counter-clockwise from the right.
+    light_px : tuple of float
+        (x, y) of the light; outside the picture, or where it could not be seen, as the others foretell.
+    light_error_px : float
+        Its standard error along each axis.
+    light_found : bool
+        Whether it was seen in this frame.
+    axis_px : tuple of float
+        (x, y) of the optical axis.
+    brightness : float
+        The light's brightness over the run's mean; the pixels are divided by it already.
+    exposures_s : tuple of float
+        That were merged.
+    iso, f_number, focal_mm : float or None
+    clipped_share : float
+        Part of the pixels that were clipped in every exposure.
+    """
+
+    file: str
+    constellation_deg: float
+    nominal_deg: float
+    roll_deg: float = 0.0
+    nominal_roll_deg: float = 0.0
+    light_px: tuple[float, float]
+    light_error_px: float = Field(0.0, ge=0.0)
+    light_found: bool = True
+    axis_px: tuple[float, float]
+    brightness: Positive = 1.0
+    exposures_s: tuple[Positive, ...] = ()
+    iso: Positive = 100.0
+    f_number: Positive | None = None
+    focal_mm: Positive | None = None
+    clipped_share: float = Field(0.0, ge=0.0, le=1.0)
+
+    @property
+    def horizon_deg(self) -> float:
+        """How far the mirror line is tilted against what the captures say, counter-clockwise."""
+        return (self.roll_deg - self.nominal_roll_deg + 180.0) % 360.0 - 180.0
+
+    @property
+    def direction(self) -> tuple[float, float]:
+        """Unit vector (x right, y down) along the mirror line, in which the light goes as the constellation grows."""
+        angle = radians(self.roll_deg)
+        return cos(angle), -sin(angle)
+
+
+class MergedRun(Frozen):
+    """The index of a merged run: `merged.json`.
+
+    Attributes
+    ----------
+    size_px : tuple of int
+        Width and height of every frame.
+    frames : tuple of FrameInfo
+        By rising roll and constellation.
+    axis_px, axis_error_px : tuple of float
+        The optical axis and its standard error in x and y.
+    px_per_rad : float
+        Distance of the light from the axis in pixels over its angle, near the axis; the focal length in pixels.
+    camera : CameraNoise
+        What was used, estimates filled in.
+    reference_iso, reference_f_number : float or None
+        Radiance 1 is what fills the sensor (white level) in one second at these.
+    white_balance : tuple of float
+        What red, green and blue were multiplied by.
+    remarks : tuple of str
+        What a person should know.
+    """
+
+    schema_version: Literal[1] = 1
+    size_px: tuple[int, int]
+    frames: tuple[FrameInfo, ...]
+    axis_px: tuple[float, float]
+    axis_error_px: tuple[float, float] = (0.0, 0.0)
+    px_per_rad: Positive
+    camera: CameraNoise = CameraNoise()
+    reference_iso: Positive = 100.0
+    reference_f_number: Positive | None = None
+    white_balance: tuple[Positive, Positive, Positive] = (1.0, 1.0, 1.0)
+    remarks: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class MergedFrame:
+    """One constellation: the mean of its exposures in linear light, and how well each pixel is known.
+
+    Attributes
+    ----------
+    info : FrameInfo
+    radiance : ndarray, shape (height, width, 3), float32
+        Linear, scene-referred; 1 fills the sensor in a second at the run's reference ISO. Noise may make it negative.
+    variance : ndarray, shape (height, width, 3), float32
+        Of `radiance`, pixel by pixel independent; infinite where every exposure was clipped.
+    """
+
+    info: FrameInfo
+    radiance: NDArray[np.float32]
+    variance: NDArray[np.float32]
+
+    @property
+    def valid(self) -> NDArray[np.bool_]:
+        """Where `radiance` was measured, shape (height, width, 3)."""
+        valid: NDArray[np.bool_] = np.isfinite(self.variance)
+        return valid
+
+    @property
+    def constellation_deg(self) -> float:
+        """Angle between axis and light."""
+        return self.info.constellation_deg
+
+    @property
+    def roll_deg(self) -> float:
+        """Direction of growing constellation, counter-clockwise from the right."""
+        return self.info.roll_deg
+
+    @property
+    def light_px(self) -> tuple[float, float]:
+        """(x, y) of the light."""
+        return self.info.light_px
+
+    @property
+    def axis_px(self) -> tuple[float, float]:
+        """(x, y) of the optical axis."""
+        return self.info.axis_px
+
+    @property
+    def horizon_deg(self) -> float:
+        """Tilt of the mirror line against what the captures say."""
+        return self.info.horizon_deg
