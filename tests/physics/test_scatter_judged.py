@@ -5,10 +5,25 @@ import pytest
 from scatter_rays import scattered_flux
 from scipy import stats
 
-from flarewright.model import Bare, Camera, Everywhere, Iris, Light, Lines, Project, Scatter
+from flarewright.model import (
+    Bare,
+    Camera,
+    Everywhere,
+    Iris,
+    Lens,
+    Light,
+    Lines,
+    Medium,
+    Project,
+    Scatter,
+    Stop,
+    Surface,
+)
 from flarewright.optics.color import luminance_weights
 from flarewright.render.direct import direct_image
-from flarewright.render.prepare import settle
+from flarewright.render.ledger import ledger_of
+from flarewright.render.montecarlo import Sums, ray_source, run_batch
+from flarewright.render.prepare import complete_lens, settle
 from flarewright.render.scatter import render_scatter, scatter_of
 from flarewright.render.shot import make_opening, make_shots
 
@@ -87,3 +102,56 @@ def test_blocks_agree(lens, f_number, field, model, density):
     assert stats.chi2.sf((stats.norm.isf(stats.t.sf(z, BATCHES - 1)) ** 2).sum(), z.size) > 1e-4
     # and it can tell: a tenth more or less is no chance
     assert abs(mine.sum() / mean.sum() - 1.0) < 0.02 + 4.0 * np.sqrt(variance.sum()) / mean.sum() < 0.1
+
+
+def random_rays(project, batches=24, side=64):
+    """Sums of the reference renderer's own random rays, at the wavelengths of final quality."""
+    settled = settle(project)
+    shots = make_shots(settled, make_opening(settled, None))
+    tables = scatter_of(settled, shots)
+    source = ray_source(shots[0], 0, side=side, light=0, scatter=tables[0])
+    sums = Sums(0, {}, {})
+    for batch in range(batches):
+        sums.add(run_batch([source], batch, picture=True))
+    return sums, settled, shots, tables
+
+
+@pytest.mark.parametrize("model", ["harvey-shack", "abg"])
+def test_the_reference_agrees(model):
+    told = Project(
+        lens="triplet-pestrecov", f_number=4.0, iris=Iris(blades=6), camera=Camera(size_px=SIZE),
+        lights=(Light(field_deg=(8.0, 4.0), spectrum=Lines(lines=((NM, 1.0),))),), scatter=Scatter(model=model),
+    )  # fmt: skip
+    sums, settled, shots, tables = random_rays(told)
+    image = direct_image(settled.lens, shots[0])
+    found = render_scatter(settled, shots, [image], tables).pixels.astype(np.float64)
+    mine = blocks(found @ luminance_weights("rec709")) / float(shots[0].to_pixels[2] * shots[0].to_pixels[3])
+    z = (mine - sums.mean("blocks")[2]) / np.sqrt(sums.variance("blocks")[2] + (STATED * mine) ** 2)
+    assert 2.0 * z.size * stats.t.sf(np.abs(z).max(), sums.batches - 1) > 1e-3
+    # the picture's own part of the ledger is the layer's sum
+    line = next(line for line in ledger_of(sums).lines if line.name == "scatter.in_picture")
+    assert mine.sum() == pytest.approx(
+        line.share * ledger_of(sums).entered_mm2, rel=STATED + 4.0 * line.standard_error / line.share
+    )
+
+
+def test_all_scattered_light_is_in_the_ledger():
+    """What lands on the unbounded plane and what is lost on the way is the total of every surface times its light."""
+    rows = (
+        Surface(curvature=0.004, thickness=4.0, medium=Medium(n_d=1.6, v_d=60.0), semi_diameter=8.0),
+        Surface(curvature=-0.004, thickness=4.0, semi_diameter=30.0),
+        Stop(thickness=100.0),
+    )
+    lens = complete_lens(Lens(name="weak", f_number=12.0, rows=rows))
+    polish = Scatter(model="harvey-shack", roughness_nm=10.0, correlation_um=20.0, slope=5.0)
+    light = Light(field_deg=(0.0, 0.0), spectrum=Lines(lines=((587.56, 1.0),)))
+    sums, *_ = random_rays(Project(lens=lens, lights=(light,), camera=Camera(size_px=SIZE), scatter=polish), side=32)
+    ledger = ledger_of(sums)
+    stray = [line for line in ledger.lines if line.name.startswith("scatter.")]
+    total = 1.0 - np.exp(-((2.0 * np.pi * 0.6 * 10.0 / 587.56) ** 2))
+    passed = 1.0 - (0.6 / 2.6) ** 2
+    expected = total * passed + total * (1.0 - total) * passed**2
+    error = np.sqrt(sum(line.standard_error**2 for line in stray))
+    assert abs(sum(line.share for line in stray) - expected) < 4.0 * error + 0.005 * expected
+    assert error < 0.01 * expected
+    assert abs(ledger.total.share - 1.0) < 1e-3

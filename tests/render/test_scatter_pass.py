@@ -200,6 +200,43 @@ def test_a_sensor_that_reflects_changes_nothing_here():
     np.testing.assert_array_equal(drawn(mirror)[0], drawn(project())[0])
 
 
+def test_the_reference_scatters_by_chance_and_the_ledger_tells_it():
+    quality = Quality(mode="reference", wavelengths=1, bridge=False, reference_samples=2 * 128**2)
+    found = render(project(quality=quality), ledger=True)
+    names = [kept.name for kept in found.layers]
+    assert names == [
+        "beauty", "starburst", "ghosts", "ghosts.order4+", "scatter",
+        "ghosts.variance", "ghosts.order4+.variance", "scatter.variance",
+    ]  # fmt: skip
+    mine = luminance(drawn(project())[0]).sum()
+    assert luminance(layer(found, "scatter")).sum() == pytest.approx(mine, rel=0.05)
+    final = render(project(), ledger=True)
+    for told in (found, final):
+        shares = {line.name: line.share for line in told.ledger.lines}
+        assert shares["scatter.in_picture"] > 0.0
+        assert shares["scatter.ended"] > 0.0
+        assert told.ledger.total.share == pytest.approx(1.0, abs=1e-3)
+    without = render(project(scatter=None), ledger=True)
+    assert not any("scatter" in line.name for line in without.ledger.lines)
+
+
+@pytest.mark.parametrize(
+    ("changes", "scale"),
+    [
+        ({"camera": Camera(size_px=(96, 64), sensor_reflectance=0.1)}, 1e-6),
+        # a small area light, whose scatter is that of its middle
+        ({"lights": (Light(field_deg=(8.0, 4.0), spectrum=GREEN, diameter_deg=0.5),)}, 0.05),
+    ],
+)
+def test_the_reference_scatters_alike(changes, scale):
+    """A sensor that reflects does not change what falls on it; an area light scatters as a light in its middle does."""
+    quality = Quality(mode="reference", wavelengths=1, bridge=False, reference_samples=2 * 128**2)
+    plain, other = (
+        layer(render(project(quality=quality, **more)), "scatter").astype(np.float64) for more in ({}, changes)
+    )
+    assert luminance(other).sum() == pytest.approx(luminance(plain).sum(), rel=scale)
+
+
 def test_single_layers_keep_it():
     found = render(project(output=Output(layers="beauty")))
     assert [kept.name for kept in found.layers] == ["beauty"]

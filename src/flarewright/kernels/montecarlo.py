@@ -13,6 +13,7 @@ from .intersect import intersect_conic
 from .mask import mask_value
 from .philox import refill
 from .shapes import cross_shape
+from .stray import scatter_once
 
 # what became of the light; in the picture and beside it by order of reflection 0, 2, 4 and more than 4
 ENTERED, AT_STOP, AT_BARREL, RETURNED, LOST, IN_PICTURE, BESIDE = 0, 1, 2, 3, 4, 5, 9
@@ -67,7 +68,7 @@ def _cross(curvature, conic, row, vertex, x, y, z, dx, dy, dz, heading, eta):
 def trace_batch(
     curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, rows, direction, axes, box, side,
     cumulative, luminances, rgbs, heroes, boosts, key, batch, light, blades, mask, half, to_pixels, size,
-    planes, tallies, paths, fours,
+    planes, tallies, paths, fours, scatter,
 ):  # fmt: skip
     """Trace one batch of points of the front, each at several wavelengths, through all orders of reflection.
 
@@ -118,6 +119,9 @@ def trace_batch(
     fours : ndarray, shape (N, 2)
         Filled with rays of four reflections that fell into the picture, as long as there is room: their rows as one
         number, the first times K^3 and so on, and their luminous flux. Of length 0 when nobody asks.
+    scatter : tuple of ndarray, or None
+        Tables, shape (S, K, 2, M), and amounts, shape (S, K, 2), of what rows scatter of the direct light, and what is
+        added to: `kernels.stray`'s strays and plane. None: nothing scatters.
 
     Returns
     -------
@@ -165,7 +169,7 @@ def trace_batch(
             noted = _trace_tree(
                 curvature, conic, z_vertex, inv_semi, n_gap[s], reflectance[s], sensor_z, rows[0], start,
                 amount, luminances[s], rgbs[s], boosts, stream, pool, stack, blades, mask, half, to_pixels, size,
-                planes, tallies, paths, fours, noted,
+                planes, tallies, paths, fours, noted, scatter, s,
             )  # fmt: skip
     return noted
 
@@ -174,7 +178,7 @@ def trace_batch(
 def _trace_tree(
     curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, stop_row, start,
     unit, luminance, rgb, boosts, stream, pool, stack, blades, mask, half, to_pixels, size, planes, tallies, paths,
-    fours, noted,
+    fours, noted, scatter, sample,
 ):  # fmt: skip
     """Follow one ray and everything that splits off it; return the number of rays of four reflections so far."""
     count = curvature.shape[0]
@@ -269,6 +273,16 @@ def _trace_tree(
                     waiting += 1
                 if on > 0.0:
                     weight *= on
+                    # a sensor that reflects is one row more, and scatters nothing
+                    if scatter is not None and order == 0 and row < scatter[0].shape[1]:
+                        weight *= 1.0 - scatter_once(
+                            curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, stop_row, row, x, y, z,
+                            tx, ty, tz, rx - dx, ry - dy, rz - dz, scatter[0][sample, row], scatter[1][sample, row],
+                            stream, pool, bright * weight, unit * weight, rgb, blades, mask, half, to_pixels, size,
+                            scatter[2], scatter[3],
+                        )  # fmt: skip
+                        # the pool's other numbers are of another block now
+                        drawn = 4
                     dx, dy, dz = tx, ty, tz
                     row += heading
                 elif up > 0.0:

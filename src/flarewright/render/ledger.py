@@ -5,13 +5,15 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from contextlib import closing
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import islice
 from math import sqrt
 from typing import Any
 
 from ..kernels.montecarlo import AT_BARREL, AT_STOP, BESIDE, ENTERED, IN_PICTURE, LOST, RETURNED
-from .montecarlo import BALANCE, Sums, batches_in_order, ray_source, run_batch
+from ..kernels.stray import STRAY_BESIDE, STRAY_ENDED, STRAY_IN_PICTURE
+from ..optics.scatter import ScatterTables
+from .montecarlo import BALANCE, STRAY, Sums, batches_in_order, ray_source, run_batch
 from .shot import Shot
 
 # random rays of a ledger without a picture: batches of so many points squared
@@ -31,9 +33,12 @@ _ENDS = (
     ("six or more, in the picture", "ghosts.order6+.in_picture", IN_PICTURE + 3),
     ("six or more, beside it", "ghosts.order6+.beside", BESIDE + 3),
 )
-
-
-SCATTERED = "scattered out of the direct light"
+# where surfaces scatter
+_STRAY_ENDS = (
+    ("scattered, in the picture", "scatter.in_picture", STRAY + STRAY_IN_PICTURE),
+    ("scattered, beside it", "scatter.beside", STRAY + STRAY_BESIDE),
+    ("scattered, then absorbed or reflected", "scatter.ended", STRAY + STRAY_ENDED),
+)
 
 
 @dataclass(frozen=True)
@@ -107,42 +112,25 @@ def ledger_of(sums: Sums) -> Ledger:
 
     balance = line("sum", "sum", BALANCE)
     total = LedgerLine("sum", "sum", (1.0 if entered > 0.0 else 0.0) + balance.share, balance.standard_error)
-    return Ledger(entered, tuple(line(*end) for end in _ENDS), total)
+    ends = (*_ENDS, *_STRAY_ENDS) if len(mean) > STRAY else _ENDS
+    return Ledger(entered, tuple(line(*end) for end in ends), total)
 
 
-def with_scatter(ledger: Ledger, kept: float) -> Ledger:
-    """Take from the direct light what the surfaces scatter of it.
-
-    Parameters
-    ----------
-    ledger : Ledger
-        Of random rays, which do not scatter.
-    kept : float
-        Part of the direct light that is not scattered, by the surfaces' totals (`render.scatter.dimmed`).
-
-    Returns
-    -------
-    Ledger
-        With a line for what they scatter, wherever it ends; the sum stays.
-    """
-    direct = [line for line in ledger.lines if line.name.startswith("direct.")]
-    lost = (1.0 - kept) * sum(line.share for line in direct)
-    error = (1.0 - kept) * sqrt(sum(line.standard_error**2 for line in direct))
-    lines = [
-        replace(line, share=kept * line.share, standard_error=kept * line.standard_error) if line in direct else line
-        for line in ledger.lines
-    ]
-    lines.insert(1 + ledger.lines.index(direct[-1]), LedgerLine(SCATTERED, "scatter", lost, error))
-    return replace(ledger, lines=tuple(lines))
-
-
-def trace_ledger(shots: Sequence[Shot], seed: int, *, threads: int | None = None) -> Ledger:
+def trace_ledger(
+    shots: Sequence[Shot],
+    seed: int,
+    *,
+    scatter: Sequence[ScatterTables] | None = None,
+    threads: int | None = None,
+) -> Ledger:
     """Make the ledger of some lights by random rays, without a picture.
 
     Parameters
     ----------
     shots : sequence of Shot
     seed : int
+    scatter : sequence of ScatterTables, optional
+        One a shot; None: nothing scatters.
     threads : int, optional
         None: all cores; the numbers do not depend on it.
 
@@ -150,7 +138,10 @@ def trace_ledger(shots: Sequence[Shot], seed: int, *, threads: int | None = None
     -------
     Ledger
     """
-    sources = [ray_source(shot, seed, side=SIDE, light=k) for k, shot in enumerate(shots)]
+    sources = [
+        ray_source(shot, seed, side=SIDE, light=k, scatter=None if scatter is None else scatter[k])
+        for k, shot in enumerate(shots)
+    ]
     sums = Sums(0, {}, {})
     at_once = min(threads or os.cpu_count() or 1, BATCHES)
     with closing(batches_in_order(lambda k: run_batch(sources, k, picture=False), 0, at_once)) as results:

@@ -13,8 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..kernels.montecarlo import BESIDE, ENTERED, IN_PICTURE, TALLIES, trace_batch
+from ..kernels.stray import STRAYS
 from ..optics.bundle import front_box
 from ..optics.color import luminance_weights
+from ..optics.scatter import ScatterTables
 from .shot import Shot, moved
 
 Floats = NDArray[np.float64]
@@ -30,6 +32,8 @@ AIMS = 8
 BLOCK = 16
 # figures behind the kernel's tallies: what all ends of light differ by from what entered, and all ghosts in the picture
 BALANCE, GHOSTS = TALLIES, TALLIES + 1
+# and behind these, where surfaces scatter, what became of that light (`kernels.stray`)
+STRAY = TALLIES + 2
 
 
 @dataclass(frozen=True)
@@ -43,6 +47,7 @@ class RaySource:
         What the kernel takes before and behind the number of the batch.
     seed, side, light : int
     followed : tuple of float
+    scatter : ScatterTables or None
         As given to `ray_source`.
     """
 
@@ -53,10 +58,17 @@ class RaySource:
     side: int
     light: int
     followed: tuple[float, float]
+    scatter: ScatterTables | None = None
 
 
 def ray_source(
-    shot: Shot, seed: int, *, side: int, light: int, followed: tuple[float, float] = (FOLLOWED, FOLLOWED)
+    shot: Shot,
+    seed: int,
+    *,
+    side: int,
+    light: int,
+    followed: tuple[float, float] = (FOLLOWED, FOLLOWED),
+    scatter: ScatterTables | None = None,
 ) -> RaySource:
     """Prepare a light for random rays.
 
@@ -101,7 +113,7 @@ def ray_source(
     )  # fmt: skip
     opening = shot.opening
     behind = (light, opening.blades, opening.mask, opening.half, shot.to_pixels, shot.size_px)
-    return RaySource(shot, before, behind, seed, side, light, followed)
+    return RaySource(shot, before, behind, seed, side, light, followed, scatter)
 
 
 def _aimed(source: RaySource, batch: int) -> Iterator[RaySource]:
@@ -123,7 +135,9 @@ def _aimed(source: RaySource, batch: int) -> Iterator[RaySource]:
         there = replace(there, light=there.light.replace(intensity=shot.light.intensity * share))
         # numbers of points stay apart from those of parts
         number = (source.light + 1) * 4096 + k
-        yield ray_source(there, source.seed, side=source.side // aims, light=number, followed=source.followed)
+        yield ray_source(
+            there, source.seed, side=source.side // aims, light=number, followed=source.followed, scatter=source.scatter
+        )
 
 
 def _points_within(corners: Floats, count: int, rng: np.random.Generator) -> Floats:
@@ -159,34 +173,42 @@ def run_batch(sources: Sequence[RaySource], batch: int, *, picture: bool, fours:
     -------
     dict of str to ndarray
         "figures", shape (15,): luminous flux by what became of it (`kernels.montecarlo`), then BALANCE and GHOSTS;
-        "paths", shape (2, K, K): of two reflections, in the picture and beside it. With a picture also "planes",
-        shape (2, 3, H, W), float32: flux per pixel after two reflections and after more; "blocks", shape (2, A, B):
-        luminous flux in blocks of 16 x 16 pixels, after two reflections and of all ghosts. With `fours` also "fours",
-        shape (N, 2): the rows of four reflections as one number, and luminous flux, ray by ray.
+        where surfaces scatter 3 more, STRAY. "paths", shape (2, K, K): of two reflections, in the picture and beside
+        it. With a picture also "planes", shape (2, 3, H, W), float32: flux per pixel after two reflections and after
+        more, and third what was scattered; "blocks", shape (2, A, B): luminous flux in blocks of 16 x 16 pixels, after
+        two reflections and of all ghosts, and third what was scattered. With `fours` also "fours", shape (N, 2): the
+        rows of four reflections as one number, and luminous flux, ray by ray.
     """
     width, height = sources[0].shot.size_px
     rows = len(sources[0].shot.packed.curvature)
     planes = np.zeros((2, 3, height if picture else 0, width if picture else 0), dtype=np.float32)
     figures, paths = np.zeros(TALLIES + 2), np.zeros((2, rows, rows))
+    strays, plane = np.zeros(STRAYS), np.zeros(planes.shape[1:], dtype=np.float32)
     notes = []
     for source in (aimed for each in sources for aimed in _aimed(each, batch)):
         room = np.empty((fours, 2))
-        noted = trace_batch(*source.before, batch, *source.behind, planes, figures[:TALLIES], paths, room)
+        table = source.scatter
+        scatter = None if table is None else (table.tables, table.amounts, strays, plane)
+        noted = trace_batch(*source.before, batch, *source.behind, planes, figures[:TALLIES], paths, room, scatter)
         if 0 < fours < noted:
             # the same rays once more, for their notes only
             room, nowhere = np.empty((noted, 2)), np.zeros((2, 3, 0, 0), dtype=np.float32)
             aside = np.zeros(TALLIES), np.zeros_like(paths)
-            trace_batch(*source.before, batch, *source.behind, nowhere, *aside, room)
+            elsewhere = None if table is None else (table.tables, table.amounts, np.zeros(STRAYS), nowhere[0])
+            trace_batch(*source.before, batch, *source.behind, nowhere, *aside, room, elsewhere)
         notes.append(room[:noted])
-    figures[BALANCE] = figures[ENTERED + 1 : TALLIES].sum() - figures[ENTERED]
+    figures[BALANCE] = figures[ENTERED + 1 : TALLIES].sum() + strays.sum() - figures[ENTERED]
     figures[GHOSTS] = figures[IN_PICTURE + 1 : BESIDE].sum()
-    result: Batch = {"figures": figures, "paths": paths}
+    scatters = sources[0].scatter is not None
+    result: Batch = {"figures": np.concatenate([figures, strays]) if scatters else figures, "paths": paths}
     if fours:
         result["fours"] = np.concatenate(notes)
     if picture:
+        if scatters:
+            planes = np.concatenate([planes, plane[None]])
         light = np.tensordot(luminance_weights(sources[0].shot.colorspace), planes, (0, 1))
-        two, more = (_in_blocks(plane) for plane in light)
-        result |= {"planes": planes, "blocks": np.stack([two, two + more])}
+        two, more, *stray = (_in_blocks(plane) for plane in light)
+        result |= {"planes": planes, "blocks": np.stack([two, two + more, *stray])}
     return result
 
 

@@ -29,6 +29,7 @@ from ..model.reference_state import ReferenceState
 from .ledger import Ledger, ledger_of
 from .montecarlo import GHOSTS, HEROES, Sums, batches_in_order, ray_source, run_batch
 from .prepare import Settled
+from .scatter import chosen_scatter, scatter_of
 from .shot import Shot, make_opening, make_shots
 
 Floats = NDArray[np.float64]
@@ -45,7 +46,7 @@ MOST_MEMORY = 1.5e9
 # a state is written when this much time has gone by, and never so often that writing takes a tenth of the time
 SAVE_EVERY_S = 20.0
 
-ORDER_2, ORDER_4 = "ghosts", "ghosts.order4+"
+ORDER_2, ORDER_4, SCATTER = "ghosts", "ghosts.order4+", "scatter"
 VARIANCE = ".variance"
 
 
@@ -75,7 +76,7 @@ class ReferencePass:
     Attributes
     ----------
     layers : tuple of Layer
-        "ghosts" (two reflections) and "ghosts.order4+" (more).
+        "ghosts" (two reflections) and "ghosts.order4+" (more); "scatter" where surfaces scatter.
     variances : tuple of Layer
         The variance of their pixels, same names with ".variance".
     ledger : Ledger
@@ -151,7 +152,11 @@ def render_reference(
         )
     shots = spectral_shots(settled, mask)
     prints = _fingerprints(settled, shots[0])
-    sources = [ray_source(shot, quality.seed, side=SIDE, light=k) for k, shot in enumerate(shots)]
+    tables = scatter_of(settled, shots)
+    sources = [
+        ray_source(shot, quality.seed, side=SIDE, light=k, scatter=None if tables is None else tables[k])
+        for k, shot in enumerate(shots)
+    ]
     sums = _start(run.resume, prints)
     begin, saved, saving_s = time.monotonic(), time.monotonic(), 0.0
 
@@ -183,7 +188,7 @@ def render_reference(
 
 def _at_once(shot: Shot, threads: int | None) -> int:
     """How many batches to trace side by side: one a thread, as long as their pictures find room."""
-    a_batch = 2 * 3 * 4 * shot.size_px[0] * shot.size_px[1]
+    a_batch = 3 * 3 * 4 * shot.size_px[0] * shot.size_px[1]
     return max(1, min(threads or os.cpu_count() or 1, int(MOST_MEMORY / a_batch)))
 
 
@@ -203,6 +208,7 @@ def _fingerprints(settled: Settled, shot: Shot) -> dict[str, str]:
     """Digest each part of what decides the samples."""
     project, quality = settled.project, settled.project.quality
     packed = shot.packed
+    scatter = chosen_scatter(settled)
     parts: dict[str, Any] = {
         "lens": [settled.lens.model_dump(mode="json"), settled.order.stop_semi_diameter, packed.sensor_z],
         "iris": [settled.iris.model_dump(mode="json", exclude={"mask"}), _digest(shot.opening.mask)],
@@ -210,6 +216,7 @@ def _fingerprints(settled: Settled, shot: Shot) -> dict[str, str]:
         "light": [light.model_dump(mode="json") for light in project.lights],
         "picture": [project.camera.size_px, project.camera.sensor, project.output.colorspace],
         "sensor reflectance": project.camera.sensor_reflectance,
+        "scatter": None if scatter is None else scatter.model_dump(mode="json"),
         "spectral sampling": [quality.wavelengths, quality.bridge, SPECTRAL_SAMPLES, HEROES],
         "seed": [quality.seed, SIDE],
     }
@@ -277,6 +284,7 @@ def _finish(sums: Sums, shots: Sequence[Shot], quality: Quality, reason: str, ke
     # a ray ends in the sensor with what the sensor keeps of it; the picture is what falls on the sensor
     area = kept / float(shot.to_pixels[2] * shot.to_pixels[3])
     mean, variance = sums.mean("planes") / area, sums.variance("planes") / area**2
+    names = (ORDER_2, ORDER_4, SCATTER)[: len(mean)]
     ledger = ledger_of(sums)
     flux, high = float(sums.mean("figures")[GHOSTS]) / kept, _share_of_high_orders(ledger)
     errors = {of: relative_error(sums, of) for of in ("total", "blocks")}
@@ -305,8 +313,8 @@ def _finish(sums: Sums, shots: Sequence[Shot], quality: Quality, reason: str, ke
     if flux == 0.0:
         remarks.append("no ray met a ghost in the picture")
     return ReferencePass(
-        tuple(_layer(name, mean[k]) for k, name in enumerate((ORDER_2, ORDER_4))),
-        tuple(_layer(name + VARIANCE, variance[k]) for k, name in enumerate((ORDER_2, ORDER_4))),
+        tuple(_layer(name, mean[k]) for k, name in enumerate(names)),
+        tuple(_layer(name + VARIANCE, variance[k]) for k, name in enumerate(names)),
         ledger,
         facts,
         tuple(remarks),

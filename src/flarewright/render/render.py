@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import groupby
 from math import isfinite, pi
@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from ..io.mask_image import read_mask
 from ..model import Layer, Light, Project
 from ..optics.bundle import incidence
-from ..optics.color import luminance_weights
 from ..optics.pack import facing
 from ..optics.paths import ghost_paths
 from ..optics.shape import ideal
@@ -116,12 +115,11 @@ def render(
     images = [direct_image(settled.lens, shot) for shot in shots]
     passes = list(drawn.passes)
     scattered: dict[str, Any] = {}
-    kept = 1.0
     told: tuple[str, ...] = ()
     if tables is not None:
-        passes.append(render_scatter(settled, shots, images, tables, threads=threads))
-        whole_light, images = _luminous(shots, images), dimmed(images, tables)
-        kept = _luminous(shots, images) / whole_light if whole_light > 0.0 else 1.0
+        if project.quality.mode != "reference":
+            passes.append(render_scatter(settled, shots, images, tables, threads=threads))
+        images = dimmed(images, tables)
         facts, told = scatter_facts(settled, tables)
         scattered = {"scatter": facts}
     if project.output.starburst:
@@ -134,11 +132,7 @@ def render(
     if ledger and account is None:
         from .ledger import trace_ledger
 
-        account = trace_ledger(shots, project.quality.seed, threads=threads)
-    if account is not None and tables is not None:
-        from .ledger import with_scatter
-
-        account = with_scatter(account, kept)
+        account = trace_ledger(shots, project.quality.seed, scatter=tables, threads=threads)
     summary = {**_summary(settled, shots, images, art), **drawn.facts, **scattered}
     return Rendering(
         settled.project,
@@ -147,15 +141,6 @@ def render(
         (*settled.remarks, *drawn.remarks, *told, *_remarks(settled, shots)),
         account if ledger else None,
     )
-
-
-def _luminous(shots: Sequence[Shot], images: Sequence[DirectImage]) -> float:
-    """Luminous flux of the direct images."""
-    flux = 0.0
-    for shot, image in zip(shots, images, strict=True):
-        per_wavelength = shot.weights(shot.packed.wavelengths_nm) @ luminance_weights(shot.colorspace)
-        flux += shot.light.intensity * float(per_wavelength @ image.throughput_mm2)
-    return flux
 
 
 @dataclass(frozen=True)

@@ -143,7 +143,8 @@ def scatter_facts(settled: Settled, tables: Sequence[ScatterTables]) -> tuple[di
         "direct_kept": float(tables[0].kept[middle]),
     }
     told = f"surfaces scatter up to {lost:.2%} of the direct light; ghosts are drawn as if they lost nothing by it"
-    return facts, (told,) if lost > TOLD else ()
+    final = settled.project.quality.mode != "reference"
+    return facts, (told,) if final and lost > TOLD else ()
 
 
 def render_scatter(
