@@ -1,0 +1,383 @@
+"""A camera that exists only in numbers: it photographs a light through a rendered lens while it turns.
+
+The turntable jitters, the camera wobbles and leans, the light drifts, the lens hazes, the sensor counts photons, reads
+with noise, digitises to 14 bits and clips. Beside the photographs stands the truth without noise. Everything follows
+from `Setup` and its seed. What was made is kept in the folder that FLAREWRIGHT_SYNTHETIC_CACHE names, if it is set.
+
+    from synthetic_camera import Setup, make
+    made = make(Setup(lens="tessar-brendel", angles_deg=(0, 2, 4)), folder)   # captures.csv, truth.json, *.npy
+
+As a script: `python tests/measure/synthetic_camera.py FOLDER --lens NAME --angles 0,30,0.3`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import json
+import os
+import shutil
+import tempfile
+from dataclasses import asdict, dataclass, replace
+from math import cos, degrees, hypot, radians, sin
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import flarewright as fw
+from flarewright.model.capture import FrameInfo, MergedFrame
+from flarewright.optics.color import xyz_to_rgb_matrix
+
+Floats = NDArray[np.float64]
+Pixels = NDArray[np.float32]
+
+VERSION = 1
+"""Raise when the same `Setup` gives other pixels, so that old caches are not taken."""
+
+# the sensor's red, green and blue from X, Y, Z: no weight is negative, so no light gives a negative count
+_FROM_XYZ = np.array([[0.9, 0.1, 0.0], [0.0, 1.0, 0.0], [0.0, 0.1, 0.85]])
+_FROM_REC709 = _FROM_XYZ @ np.linalg.inv(xyz_to_rgb_matrix("rec709"))
+
+
+@dataclass(frozen=True)
+class Setup:
+    """Camera, light and turntable.
+
+    Angles of the turntable are those that the captures will tell; the true ones differ by jitter. Lengths on the sensor
+    are pixels. `bright` is where the brightest ghosts (99.5th percentile) lie in the longest exposure, as part of full.
+    """
+
+    lens: str = "speed-panchro-50"
+    angles_deg: tuple[float, ...] = tuple(0.3 * k for k in range(100))
+    size_px: tuple[int, int] = (720, 480)
+    sensor_width_mm: float = 36.0
+    f_number: float | None = None
+    blades: int | None = None
+    coating: str | None = "single-1950s"  # as the command line's --coating
+    zoom: float | None = None
+    quality: str = "draft"
+    wavelengths: int = 3
+    roll_deg: float = 0.0
+    exposures_s: tuple[float, ...] = (1 / 512, 1 / 32, 2.0)
+    iso: float = 100.0
+    bright: float = 0.5
+    light_diameter_deg: float = 0.2
+    haze: float = 0.05  # of the longest exposure's full, close to the light
+    veil: float = 0.01
+    haze_radius_px: float = 60.0
+    black: float = 512.0
+    white: float = 16383.0
+    electrons_per_unit: float = 3.0
+    read_noise: float = 4.0
+    jitter_deg: float = 0.02
+    tilt_deg: float = 0.4
+    wander_deg: float = 0.05
+    pitch_deg: float = 0.1
+    pitch_wander_deg: float = 0.02
+    drift: float = 0.02
+    axis_offset_px: tuple[int, int] = (3, -2)
+    seed: int = 0
+
+    @property
+    def steady(self) -> Setup:
+        """The same camera on a perfect turntable under a steady light, without haze."""
+        still = replace(self, jitter_deg=0.0, tilt_deg=0.0, wander_deg=0.0, pitch_deg=0.0, pitch_wander_deg=0.0)
+        return replace(still, drift=0.0, haze=0.0, veil=0.0)
+
+    @property
+    def axis_px(self) -> tuple[float, float]:
+        """Where the optical axis meets the picture (x, y)."""
+        return 0.5 * self.size_px[0] + self.axis_offset_px[0], 0.5 * self.size_px[1] + self.axis_offset_px[1]
+
+
+@dataclass(frozen=True)
+class Pose:
+    """Where the light truly stands at one step of the turntable.
+
+    `brightness` is the light's at each exposure.
+    """
+
+    number: int
+    nominal_deg: float
+    field_deg: tuple[float, float]
+    constellation_deg: float
+    brightness: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Truth:
+    """What a perfect camera would measure: linear, unit as in `MergedFrame` (1 fills the sensor in a second)."""
+
+    total: Pixels
+    ghosts: Pixels
+    light_px: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class GhostTruth:
+    """One ghost of one constellation.
+
+    `centre_px` is the middle of its outline, `outline_px` that outline in 64 directions from it; `flux` and `peak` are
+    per channel; `at_edge`: the picture cuts it.
+    """
+
+    name: str
+    centre_px: tuple[float, float]
+    outline_px: Floats
+    flux: tuple[float, float, float]
+    peak: tuple[float, float, float]
+    at_edge: bool
+
+
+def poses(setup: Setup) -> list[Pose]:
+    """Turn the table: jitter, lean, wander and drift from the seed."""
+    rng = np.random.default_rng([setup.seed, 1])
+    count, shots = len(setup.angles_deg), len(setup.exposures_s)
+    jitter = rng.normal(size=count) * setup.jitter_deg
+    tilt = setup.tilt_deg + _walk(rng, count) * setup.wander_deg
+    pitch = setup.pitch_deg + _walk(rng, count) * setup.pitch_wander_deg
+    drift = 1.0 + setup.drift * _walk(rng, count * shots).reshape(count, shots)
+    found = []
+    for k, nominal in enumerate(setup.angles_deg):
+        yaw = radians(nominal + jitter[k])
+        lean, nod = radians(setup.roll_deg + tilt[k]), radians(pitch[k])
+        # the light straight ahead, seen after the camera was turned by yaw, nodded, and rolled
+        x, y, z = sin(yaw), -sin(nod) * cos(yaw), cos(nod) * cos(yaw)
+        x, y = cos(lean) * x - sin(lean) * y, sin(lean) * x + cos(lean) * y
+        field = (degrees(np.arctan2(x, z)), degrees(np.arctan2(y, z)))
+        angle = degrees(np.arctan2(hypot(x, y), z)) * (1.0 if nominal >= 0.0 else -1.0)
+        found.append(Pose(k, nominal, field, angle, tuple(float(value) for value in drift[k])))
+    return found
+
+
+def _walk(rng: np.random.Generator, count: int) -> Floats:
+    """Return a slow random walk of unit spread."""
+    steps = np.cumsum(rng.normal(size=count)) / np.sqrt(20.0)
+    return np.asarray(np.tanh(steps - steps.mean()))
+
+
+def render_pose(setup: Setup, pose: Pose, *, layers: str = "passes") -> fw.Rendering:
+    """Render the light where it truly stands, with room for the axis' offset around the picture."""
+    (width, height), (right, down) = setup.size_px, setup.axis_offset_px
+    big = (width + 2 * abs(right), height + 2 * abs(down))
+    pixel = setup.sensor_width_mm / width
+    iris = {} if setup.blades is None else {"iris": fw.Iris(blades=setup.blades)}
+    coating = {} if setup.coating is None else {"coating": _coating(setup.coating)}
+    project = fw.Project(
+        lens=setup.lens, f_number=setup.f_number, zoom=setup.zoom,
+        lights=(fw.Light(field_deg=pose.field_deg, diameter_deg=setup.light_diameter_deg),),
+        camera=fw.Camera(size_px=big, sensor_mm=(big[0] * pixel, big[1] * pixel)),
+        quality=fw.Quality(mode=setup.quality, wavelengths=setup.wavelengths),
+        output=fw.Output(layers=layers), **iris, **coating,
+    )  # fmt: skip
+    return fw.render(project)
+
+
+def _coating(text: str) -> Any:
+    from flarewright.io.project_file import parse_coating_choice
+
+    return parse_coating_choice(text)
+
+
+def truth_of(setup: Setup, pose: Pose, scale: float) -> Truth:
+    """Return the noise-free picture; `scale` is the unit of `MergedFrame` over the renderer's (`scale_of`)."""
+    rendering = render_pose(setup, pose)
+    layers = {layer.name: layer for layer in rendering.layers}
+    ghosts = _seen(setup, layers["ghosts"]) * scale
+    star = _blurred(_seen(setup, layers["starburst"]) * scale)
+    light = _light_px(setup, rendering)
+    total = ghosts + star + _haze(setup, light)
+    return Truth(total.astype(np.float32), ghosts.astype(np.float32), light)
+
+
+def _light_px(setup: Setup, rendering: fw.Rendering) -> tuple[float, float]:
+    x, y = rendering.summary["lights"][0]["direct_position_mm"]
+    per_mm = setup.size_px[0] / setup.sensor_width_mm
+    return setup.axis_px[0] + x * per_mm, setup.axis_px[1] - y * per_mm
+
+
+def _seen(setup: Setup, layer: fw.Layer) -> Floats:
+    """Crop a layer to the picture and turn it into the sensor's colours."""
+    (width, height), (right, down) = setup.size_px, setup.axis_offset_px
+    big = np.zeros((height + 2 * abs(down), width + 2 * abs(right), 3))
+    x, y, w, h = layer.window
+    big[y : y + h, x : x + w] = layer.pixels
+    top, left = abs(down) - down, abs(right) - right
+    return np.maximum(big[top : top + height, left : left + width] @ _FROM_REC709.T, 0.0)
+
+
+def _blurred(image: Floats) -> Floats:
+    """Spread the direct image as a filter in front of the sensor does: a small kernel of unit sum."""
+    kernel = np.exp(-0.5 * (np.arange(-3, 4) / 0.7) ** 2)
+    return _along(_along(image, kernel / kernel.sum(), 0), kernel / kernel.sum(), 1)
+
+
+def _along(image: Floats, kernel: Floats, axis: int) -> Floats:
+    half = kernel.size // 2
+    padded = np.pad(image, [(half, half) if k == axis else (0, 0) for k in range(3)])
+    total = np.zeros_like(image)
+    for k, weight in enumerate(kernel):
+        total += weight * np.take(padded, np.arange(k, k + image.shape[axis]), axis)
+    return total
+
+
+def _haze(setup: Setup, light_px: tuple[float, float]) -> Floats:
+    width, height = setup.size_px
+    x, y = np.arange(width) + 0.5, np.arange(height)[:, None] + 0.5
+    far = ((x - light_px[0]) ** 2 + (y - light_px[1]) ** 2) / setup.haze_radius_px**2
+    glow = (setup.veil + setup.haze / (1.0 + far)) / max(setup.exposures_s)
+    return glow[..., None] * np.array([0.9, 1.0, 1.1])
+
+
+def scale_of(setup: Setup) -> float:
+    """Return radiance in the unit of `MergedFrame` over the renderer's, from the ghosts at the middle angle."""
+    middle = replace(setup.steady, angles_deg=(setup.angles_deg[len(setup.angles_deg) // 2],))
+    layer = {layer.name: layer for layer in render_pose(middle, poses(middle)[0]).layers}["ghosts"]
+    level = float(np.percentile(_seen(setup, layer)[..., 1], 99.5))
+    return setup.bright / max(setup.exposures_s) / level
+
+
+def expose(setup: Setup, radiance: Pixels, exposure_s: float, brightness: float, seed: tuple[int, ...]) -> NDArray[Any]:
+    """Photograph: photons, electrons that overflow, reading, digits."""
+    rng = np.random.default_rng([setup.seed, 2, *seed])
+    full = setup.white - setup.black
+    units = radiance.astype(np.float64) * (exposure_s * brightness * full)
+    # what is clipped by far need not be counted exactly
+    electrons = rng.poisson(np.minimum(units, 4.0 * full) * setup.electrons_per_unit).astype(np.float64)
+    electrons += rng.normal(size=electrons.shape) * setup.read_noise
+    numbers = np.rint(setup.black + electrons / setup.electrons_per_unit)
+    return np.clip(numbers, 0.0, setup.white).astype(np.uint16)
+
+
+def ideal_frame(setup: Setup, truth: Truth, pose: Pose, *, seed: int = 0, noise: bool = True) -> MergedFrame:
+    """Return the frame that a perfect merge of all exposures would give: truth plus noise of known variance."""
+    full = setup.white - setup.black
+    gain = setup.electrons_per_unit * full
+    electrons = truth.total.astype(np.float64) * gain
+    weight = np.zeros(electrons.shape)
+    for exposure in setup.exposures_s:
+        variance = electrons / exposure + (setup.read_noise / exposure) ** 2
+        fits = truth.total * exposure < 1.0 - 4.0 * np.sqrt(variance) * exposure / gain
+        weight += np.where(fits, 1.0 / variance, 0.0)
+    with np.errstate(divide="ignore"):
+        variance = 1.0 / weight / gain**2
+    spread = np.where(np.isfinite(variance), np.sqrt(variance), 0.0)
+    rng = np.random.default_rng([setup.seed, 3, seed, pose.number])
+    noisy = truth.total + (spread * rng.normal(size=spread.shape) if noise else 0.0)
+    x, y = truth.light_px[0] - setup.axis_px[0], truth.light_px[1] - setup.axis_px[1]
+    sign = 1.0 if pose.nominal_deg >= 0.0 else -1.0
+    roll = degrees(np.arctan2(-sign * y, sign * x)) if hypot(x, y) > 1.0 else setup.roll_deg
+    info = FrameInfo(
+        file=f"frame-{pose.number:03d}.exr", constellation_deg=pose.constellation_deg, nominal_deg=pose.nominal_deg,
+        roll_deg=roll, nominal_roll_deg=setup.roll_deg, light_px=truth.light_px, axis_px=setup.axis_px,
+        exposures_s=setup.exposures_s, iso=setup.iso,
+    )  # fmt: skip
+    return MergedFrame(info, noisy.astype(np.float32), variance.astype(np.float32))
+
+
+def ghosts_of(setup: Setup, pose: Pose, scale: float) -> list[GhostTruth]:
+    """Return the truth of every ghost in the picture, brightest first."""
+    rendering = render_pose(setup, pose, layers="ghosts")
+    found = []
+    for layer in rendering.layers:
+        if layer.name.startswith("ghost."):
+            one = _ghost(layer.name.removeprefix("ghost."), _seen(setup, layer) * scale)
+            if one is not None:
+                found.append(one)
+    return sorted(found, key=lambda ghost: -ghost.flux[1])
+
+
+def _ghost(name: str, image: Floats) -> GhostTruth | None:
+    green = image[..., 1]
+    lit = green[green > 0.0]
+    if lit.size == 0:
+        return None
+    # half of what the even inside has: noise-free edges are sharp, so the level hardly matters
+    inside = green > 0.5 * float(np.median(lit))
+    rows, columns = np.nonzero(inside)
+    x, y = columns + 0.5, rows + 0.5
+    middle = 0.5 * (x.min() + x.max()), 0.5 * (y.min() + y.max())
+    angle = np.radians(np.arange(64) * (360.0 / 64))
+    reach = (x - middle[0])[:, None] * np.cos(angle) + (y - middle[1])[:, None] * np.sin(angle)
+    off = np.abs((y - middle[1])[:, None] * np.cos(angle) - (x - middle[0])[:, None] * np.sin(angle)) < 1.0
+    far = np.where(off, reach, 0.0).max(axis=0)
+    outline = np.stack([middle[0] + far * np.cos(angle), middle[1] + far * np.sin(angle)], axis=1)
+    height, width = green.shape
+    at_edge = bool(rows.min() == 0 or columns.min() == 0 or rows.max() == height - 1 or columns.max() == width - 1)
+    flux, peak = image.sum(axis=(0, 1)), image.max(axis=(0, 1))
+    return GhostTruth(name, middle, outline, tuple(map(float, flux)), tuple(map(float, peak)), at_edge)
+
+
+def make(setup: Setup, folder: Path | None = None, *, ghosts: bool = False) -> Path:
+    """Photograph everything into a folder, or find it in the cache.
+
+    Returns the folder: captures.csv, camera.json, `capture-KKK-J.npy` (uint16), `truth-KKK.npy` and `ghosts-KKK.npy`
+    (float32), and truth.json: for each pose true angle, light_px, and with `ghosts` every ghost's centre, outline and
+    flux; also `scale`, axis_px and the setup.
+    """
+    cache = os.environ.get("FLAREWRIGHT_SYNTHETIC_CACHE")
+    if cache is not None:
+        key = hashlib.sha256(repr((VERSION, setup, ghosts)).encode()).hexdigest()[:16]
+        kept = Path(cache) / f"{setup.lens}-{key}"
+        if not (kept / "truth.json").is_file():
+            kept.parent.mkdir(parents=True, exist_ok=True)
+            with tempfile.TemporaryDirectory(dir=kept.parent) as fresh:
+                _make(setup, Path(fresh), ghosts)
+                shutil.rmtree(kept, ignore_errors=True)
+                shutil.copytree(fresh, kept)
+        if folder is None:
+            return kept
+        shutil.copytree(kept, folder, dirs_exist_ok=True)
+        return folder
+    assert folder is not None, "give a folder, or set FLAREWRIGHT_SYNTHETIC_CACHE"
+    folder.mkdir(parents=True, exist_ok=True)
+    _make(setup, folder, ghosts)
+    return folder
+
+
+def _make(setup: Setup, folder: Path, ghosts: bool) -> None:
+    scale = scale_of(setup)
+    lines = ["file,constellation_deg,exposure_s,iso,f_number,roll_deg"]
+    table = []
+    for pose in poses(setup):
+        truth = truth_of(setup, pose, scale)
+        np.save(folder / f"truth-{pose.number:03d}.npy", truth.total)
+        np.save(folder / f"ghosts-{pose.number:03d}.npy", truth.ghosts)
+        for j, exposure in enumerate(setup.exposures_s):
+            name = f"capture-{pose.number:03d}-{j}.npy"
+            np.save(folder / name, expose(setup, truth.total, exposure, pose.brightness[j], (pose.number, j)))
+            lines.append(f"{name},{pose.nominal_deg:.6g},{exposure!r},{setup.iso:g},,{setup.roll_deg:g}")
+        row: dict[str, Any] = {**asdict(pose), "light_px": truth.light_px}
+        if ghosts:
+            every = ghosts_of(setup, pose, scale)
+            row["ghosts"] = [{**asdict(one), "outline_px": one.outline_px.tolist()} for one in every]
+        table.append(row)
+    (folder / "captures.csv").write_text("\n".join(lines) + "\n", "utf-8")
+    camera = {"black_level": setup.black, "white_level": setup.white, "iso": setup.iso}
+    (folder / "camera.json").write_text(json.dumps(camera) + "\n", "utf-8")
+    data = {"scale": scale, "axis_px": setup.axis_px, "setup": asdict(setup), "poses": table}
+    (folder / "truth.json").write_text(json.dumps(data) + "\n", "utf-8")
+
+
+def main() -> None:
+    """Make a folder of captures from the command line."""
+    parser = argparse.ArgumentParser(description="Photograph a rendered lens with a synthetic camera.")
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--lens", default=Setup.lens)
+    parser.add_argument("--angles", default="0,29.7,0.3", help="first, last, step in degrees")
+    parser.add_argument("--quality", default="draft", choices=("draft", "final", "reference"))
+    parser.add_argument("--width", type=int, default=720)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--ghosts", action="store_true", help="also the truth of every ghost")
+    given = parser.parse_args()
+    first, last, step = (float(text) for text in given.angles.split(","))
+    angles = tuple(first + step * k for k in range(round((last - first) / step) + 1))
+    size = (given.width, round(given.width * 2 / 3))
+    setup = Setup(lens=given.lens, angles_deg=angles, size_px=size, quality=given.quality, seed=given.seed)
+    print(make(setup, given.folder, ghosts=given.ghosts))
+
+
+if __name__ == "__main__":
+    main()

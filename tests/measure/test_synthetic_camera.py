@@ -1,0 +1,68 @@
+"""The synthetic camera, which judges everything else in this folder, photographs what it says it does."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from synthetic_camera import Setup, expose, ghosts_of, ideal_frame, make, poses, scale_of, truth_of
+
+SMALL = Setup(size_px=(90, 60), angles_deg=(0.0, 6.0, 12.0), sensor_width_mm=36.0, axis_offset_px=(1, -1))
+
+
+@pytest.fixture(scope="module")
+def scene():
+    scale = scale_of(SMALL)
+    pose = poses(SMALL)[1]
+    return pose, scale, truth_of(SMALL, pose, scale)
+
+
+def test_photographs_have_the_mean_and_the_variance_of_photons_and_reading(scene):
+    _, _, truth = scene
+    time = SMALL.exposures_s[-1]
+    stack = np.stack([expose(SMALL, truth.total, time, 1.0, (k,)) for k in range(60)]).astype(np.float64) - SMALL.black
+    full, gain = SMALL.white - SMALL.black, SMALL.electrons_per_unit
+    units = truth.total.astype(np.float64) * time * full
+    free = units < 0.9 * full
+    variance = units / gain + (SMALL.read_noise / gain) ** 2 + 1.0 / 12.0
+    z = ((stack.mean(axis=0) - units) / np.sqrt(variance / 60.0))[free]
+    assert abs(z.mean()) < 4.0 / np.sqrt(z.size)
+    assert z.std() == pytest.approx(1.0, abs=0.05)
+    assert np.mean((stack.var(axis=0, ddof=1) / variance)[free]) == pytest.approx(1.0, abs=0.02)
+    assert (stack[:, units > 1.2 * full] == full).all()
+
+
+def test_the_same_seed_makes_the_same_photographs_and_another_does_not(scene, tmp_path, monkeypatch):
+    _, _, truth = scene
+    assert np.array_equal(expose(SMALL, truth.total, 1.0, 1.0, (3,)), expose(SMALL, truth.total, 1.0, 1.0, (3,)))
+    other = expose(replace(SMALL, seed=5), truth.total, 1.0, 1.0, (3,))
+    assert not np.array_equal(expose(SMALL, truth.total, 1.0, 1.0, (3,)), other)
+    assert poses(SMALL) == poses(SMALL) != poses(replace(SMALL, seed=5))
+    monkeypatch.setenv("FLAREWRIGHT_SYNTHETIC_CACHE", str(tmp_path / "kept"))
+    one = replace(SMALL, angles_deg=(6.0,))
+    first = make(one)
+    stamp = (first / "truth.json").stat().st_mtime_ns
+    assert make(one) == first
+    assert (first / "truth.json").stat().st_mtime_ns == stamp
+    assert len(list(first.glob("capture-*.npy"))) == 3
+
+
+def test_the_light_is_where_the_star_is_and_ghosts_where_their_light_is(scene):
+    pose, scale, truth = scene
+    star = (truth.total - truth.ghosts)[..., 1]
+    y, x = np.unravel_index(star.argmax(), star.shape)
+    assert (x + 0.5, y + 0.5) == pytest.approx(truth.light_px, abs=1.0)
+    ghosts = ghosts_of(SMALL, pose, scale)
+    assert sum(one.flux[1] for one in ghosts) == pytest.approx(truth.ghosts[..., 1].sum(), rel=1e-3)
+    for one in ghosts:
+        assert np.abs(one.outline_px.mean(axis=0) - one.centre_px).max() < 5.0
+
+
+def test_a_perfect_table_turns_as_told_and_an_ideal_frame_is_the_truth(scene):
+    perfect = poses(SMALL.steady)
+    assert [one.constellation_deg for one in perfect] == pytest.approx(SMALL.angles_deg)
+    assert [one.field_deg[1] for one in perfect] == pytest.approx([0.0] * 3)
+    pose, _, truth = scene
+    frame = ideal_frame(SMALL, truth, pose)
+    z = ((frame.radiance - truth.total) / np.sqrt(frame.variance))[frame.valid]
+    assert z.std() == pytest.approx(1.0, abs=0.03)
+    assert frame.valid.mean() > 0.9
