@@ -27,6 +27,7 @@ from . import (
     lens_schema,
     lens_show,
     lenses,
+    measure_replay,
     project_check,
     project_init,
     project_schema,
@@ -46,6 +47,7 @@ lens_app = typer.Typer(help="Look at, check and convert lens files.")
 coating_app = typer.Typer(help="Look at coatings: the standard ones, and what any coating reflects.")
 project_app = typer.Typer(help="Project files: everything a render needs, in one TOML file.")
 design_app = typer.Typer(help="Search a lens for the flare you want.")
+measure_app = typer.Typer(help="Measure a real camera's flare and replay it.")
 
 app.command("render", epilog=render.EPILOG)(render.render)
 app.command("ghosts", epilog=ghosts.EPILOG)(ghosts.ghosts)
@@ -54,6 +56,7 @@ app.add_typer(lens_app, name="lens")
 app.add_typer(coating_app, name="coating")
 app.add_typer(project_app, name="project")
 app.add_typer(design_app, name="design")
+app.add_typer(measure_app, name="measure")
 lens_app.command("show", epilog=lens_show.EPILOG)(lens_show.show)
 lens_app.command("check", epilog=lens_check.EPILOG)(lens_check.check)
 lens_app.command("convert", epilog=lens_convert.EPILOG)(lens_convert.convert)
@@ -72,6 +75,7 @@ design_app.command("resize")(design_edit.resize)
 design_app.command("move-stop")(design_edit.move_stop)
 design_app.command("benchmark", epilog=design_benchmark.EPILOG)(design_benchmark.benchmark)
 design_app.command("identify", epilog=design_identify.EPILOG)(design_identify.identify)
+measure_app.command("replay", epilog=measure_replay.EPILOG)(measure_replay.replay)
 
 
 def _version(wanted: bool) -> None:
@@ -114,7 +118,7 @@ def run(arguments: Sequence[str]) -> int:
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="replace")
     words = list(arguments)
-    if words in ([], ["lens"], ["coating"], ["project"], ["design"]):
+    if words in ([], ["lens"], ["coating"], ["project"], ["design"], ["measure"]):
         words.append("--help")
     try:
         code = _call(words)

@@ -1,0 +1,65 @@
+"""`flarewright measure replay`: a measured flare at any constellation and roll."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ..errors import FlarewrightError
+from .common import check_place, picture_size, print_json
+
+EPILOG = "Example:\n\nflarewright measure replay model.json --constellation 12.3 --roll 30 -o flare.exr"
+
+
+def replay(
+    model: Annotated[Path, typer.Argument(metavar="MODEL", help="A ghost model, as `measure run` writes it.")],
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="OUT.exr", help="The picture to write.")],
+    constellation: Annotated[float | None, typer.Option(help="Degrees between the optical axis and the light.")] = None,
+    roll: Annotated[
+        float | None, typer.Option(help="Direction of the light, degrees counterclockwise from the right (0).")
+    ] = None,
+    camera: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="JSON: camera and light in space, f-number, ISO, exposure (docs/measure.md)."
+        ),
+    ] = None,
+    size: Annotated[str | None, typer.Option(metavar="WxH", help="Picture in pixels; the captures' when left out.")] = (
+        None
+    ),
+    single: Annotated[bool, typer.Option("--ghosts", help="Also a layer for each ghost.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+) -> None:
+    """Draw a measured flare as layers of an EXR file."""
+    check_place(output, ".exr")
+    from ..io.exr import write_exr
+    from ..io.ghost_model_file import read_ghost_model, read_replay_camera
+    from ..measure.placing import brightness, constellation_and_roll
+    from ..measure.replay import replay as draw
+    from ..model.replay_camera import ReplayCamera
+
+    known = read_ghost_model(model)
+    shot = ReplayCamera() if camera is None else read_replay_camera(camera)
+    if shot.light is not None:
+        if constellation is not None or roll is not None:
+            raise FlarewrightError("the camera file places the light; leave --constellation and --roll out")
+        constellation, roll = constellation_and_roll(shot.position, shot.forward, shot.up, shot.light)
+    if constellation is None:
+        raise FlarewrightError("say where the light is: --constellation DEG, or a --camera file with a light")
+    pixels = picture_size(size) if size is not None else shot.size_px or known.size_px
+    gain = brightness(known.reference, shot)
+    layers = draw(known, constellation, roll_deg=roll or 0.0, size_px=pixels, gain=gain, single=single)
+    metadata = {"model": model.name, "constellation_deg": f"{constellation:.9g}", "roll_deg": f"{roll or 0.0:.9g}"}
+    write_exr(output, layers, pixels, pixel_type="float", metadata=metadata)
+    facts = {
+        "output": str(output), "constellation_deg": constellation, "roll_deg": roll or 0.0, "brightness": gain,
+        "size_px": list(pixels), "layers": [layer.name for layer in layers],
+    }  # fmt: skip
+    if as_json:
+        print_json(facts)
+    else:
+        print(
+            f"{output}: {len(layers)} layers, {constellation:.4g} degrees, roll {roll or 0.0:.4g}, brightness {gain:.4g}"
+        )

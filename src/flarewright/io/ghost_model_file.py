@@ -1,0 +1,87 @@
+"""Ghost models and replay cameras as JSON files."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any, TypeVar
+
+from pydantic import ValidationError
+
+from ..errors import FlarewrightError
+from ..model.base import Frozen
+from ..model.ghost_model import GhostModel
+from ..model.replay_camera import ReplayCamera
+from .atomic import write_atomically
+from .sentences import summary, validation_sentences
+from .text_file import lower_first, read_text
+
+Record = TypeVar("Record", bound=Frozen)
+
+_NEWEST = 1
+
+
+def _read(path: str | Path, what: str, record: type[Record]) -> Record:
+    try:
+        data: Any = json.loads(read_text(path, what))
+    except json.JSONDecodeError as error:
+        raise FlarewrightError(f"{path} is not valid JSON: {lower_first(str(error))}; is it {what}?") from None
+    except (ValueError, RecursionError) as error:
+        raise FlarewrightError(str(error)) from None
+    if not isinstance(data, dict):
+        raise FlarewrightError(f"{path} is not {what}: a JSON object was expected")
+    version = data.get("schema_version", 1)
+    if isinstance(version, int) and version > _NEWEST:
+        raise FlarewrightError(
+            f"{path} has schema_version {version}, newer than this program's {_NEWEST}: update flarewright"
+        )
+    try:
+        return record.model_validate(data)
+    except ValidationError as error:
+        problems = validation_sentences(error)
+        raise FlarewrightError(summary(str(path), problems), tuple(problems)) from None
+
+
+def read_ghost_model(path: str | Path) -> GhostModel:
+    """Read a measured flare.
+
+    Parameters
+    ----------
+    path : str or Path
+
+    Returns
+    -------
+    GhostModel
+
+    Raises
+    ------
+    FlarewrightError
+        The file cannot be read, is not JSON, or is no ghost model; the message is one sentence.
+    """
+    return _read(path, "a ghost model", GhostModel)
+
+
+def read_replay_camera(path: str | Path) -> ReplayCamera:
+    """Read the camera of `measure replay --camera`; raises as `read_ghost_model`."""
+    return _read(path, "a replay camera", ReplayCamera)
+
+
+def write_ghost_model(path: str | Path, model: GhostModel) -> None:
+    """Write a measured flare as JSON, whole or not at all.
+
+    Parameters
+    ----------
+    path : str or Path
+    model : GhostModel
+
+    Raises
+    ------
+    OutputError
+        When the file cannot be written.
+    """
+    text = model.model_dump_json(indent=1)
+
+    def write(part: Path) -> None:
+        part.write_text(text + "\n", encoding="utf-8")
+
+    write_atomically(path, write)

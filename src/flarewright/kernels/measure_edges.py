@@ -1,0 +1,155 @@
+"""Exact coverage by edges: each edge of a mesh of triangles is drawn once, with the step in density across it.
+
+What an edge adds to a row is kept as differences along the row, so that a sum along the rows makes the picture; an edge
+costs what it crosses, not what it bounds. When the ends of an edge move, only the pixels it crosses change, by the
+light swept over: the exact derivative of the exact coverage.
+"""
+
+from math import floor
+
+from ._jit import compiled, inner
+
+
+@inner
+def _piece(row, x0, x1, dy, weight, left, width, plane):
+    """Add a piece of an edge that lies within one row: light to its right."""
+    if x0 > x1:
+        x0, x1 = x1, x0
+    x0, x1 = x0 - left, x1 - left
+    if x1 <= 0.0:
+        plane[row, 0] += weight * dy
+        return
+    if x0 >= width:
+        return
+    span = x1 - x0
+    if span < 1e-12:
+        c = int(x0)
+        part = x0 - c
+        plane[row, c] += weight * dy * (1.0 - part)
+        plane[row, c + 1] += weight * dy * part
+        return
+    slope = weight * dy / span
+    if x0 < 0.0:
+        plane[row, 0] -= slope * x0
+        x0 = 0.0
+    x1 = min(x1, float(width))
+    c = int(x0)
+    while x0 < x1:
+        end = min(c + 1.0, x1)
+        light, part = slope * (end - x0), 0.5 * (x0 + end) - c
+        plane[row, c] += light * (1.0 - part)
+        plane[row, c + 1] += light * part
+        x0 = end
+        c += 1
+
+
+@inner
+def add_edge(x0, y0, x1, y1, weight, left, top, width, height, plane):
+    """Add the light to the right of an edge that runs from (x0, y0) to (x1, y1), as differences along rows.
+
+    `plane` has shape (height, width + 1), its first pixel at (left, top); pixel k spans [k, k + 1].
+    """
+    y0, y1 = y0 - top, y1 - top
+    if y0 == y1 or weight == 0.0:
+        return
+    if y0 > y1:
+        x0, y0, x1, y1, weight = x1, y1, x0, y0, -weight
+    if y1 <= 0.0 or y0 >= height:
+        return
+    slope = (x1 - x0) / (y1 - y0)
+    if y0 < 0.0:
+        x0 -= y0 * slope
+        y0 = 0.0
+    if y1 > height:
+        y1 = float(height)
+    row = int(y0)
+    x = x0
+    while y0 < y1:
+        end = min(row + 1.0, y1)
+        x_end = x + (end - y0) * slope
+        _piece(row, x, x_end, end - y0, weight, left, width, plane)
+        x, y0 = x_end, end
+        row += 1
+
+
+@inner
+def _crossing(row, c, light, part, swept, t, dx, dy, weight, change, v0, v1, out):
+    """Add one pixel's derivatives: the step's change times the coverage, and the step times what the edge sweeps."""
+    near, far = light * (1.0 - part), light * part
+    step = weight * swept
+    here, after = out[row, c], out[row, c + 1]
+    for q in range(change.shape[0]):
+        moved = step * ((v0[q, 0] + t * (v1[q, 0] - v0[q, 0])) * dy - (v0[q, 1] + t * (v1[q, 1] - v0[q, 1])) * dx)
+        here[q] += change[q] * near - moved
+        after[q] += change[q] * far + moved
+
+
+@inner
+def add_edge_changes(x0, y0, x1, y1, weight, change, v0, v1, left, top, width, height, out):
+    """Add the derivatives of `add_edge` by Q parameters.
+
+    `change` (Q,) is the derivative of the weight, `v0` and `v1` (Q, 2) those of the ends; `out` has shape
+    (height, width + 1, Q).
+    """
+    y0, y1, x0, x1 = y0 - top, y1 - top, x0 - left, x1 - left
+    dx, dy = x1 - x0, y1 - y0
+    if max(y0, y1) <= 0.0 or min(y0, y1) >= height or min(x0, x1) >= width:
+        return
+    # walk from grid line to grid line; t runs from 0 to 1 along the edge
+    t = 0.0
+    row, c = int(floor(y0)), int(floor(x0))
+    down, right = dy > 0.0, dx > 0.0
+    if not down and y0 == row:
+        row -= 1
+    if not right and x0 == c:
+        c -= 1
+    t_row = ((row + 1.0 if down else float(row)) - y0) / dy if dy != 0.0 else 2.0
+    t_column = ((c + 1.0 if right else float(c)) - x0) / dx if dx != 0.0 else 2.0
+    step_row = abs(1.0 / dy) if dy != 0.0 else 2.0
+    step_column = abs(1.0 / dx) if dx != 0.0 else 2.0
+    while t < 1.0:
+        end = min(min(t_row, t_column), 1.0)
+        if 0 <= row < height and c < width and end > t:
+            middle, length = 0.5 * (t + end), end - t
+            if c >= 0:
+                part = x0 + middle * dx - c
+                _crossing(row, c, length * dy, part, length, middle, dx, dy, weight, change, v0, v1, out)
+            else:
+                for q in range(change.shape[0]):
+                    out[row, 0, q] += change[q] * length * dy
+        t = end
+        if t_row <= t:
+            row += 1 if down else -1
+            t_row += step_row
+        if t_column <= t:
+            c += 1 if right else -1
+            t_column += step_column
+
+
+@compiled
+def sum_along_rows(plane):
+    """Turn differences along rows into the picture, in place.
+
+    Parameters
+    ----------
+    plane : ndarray, shape (H, W + 1), float64
+    """
+    for row in range(plane.shape[0]):
+        total = 0.0
+        for c in range(plane.shape[1]):
+            total += plane[row, c]
+            plane[row, c] = total
+
+
+@compiled
+def sum_changes_along_rows(changes):
+    """Turn derivatives' differences along rows into derivatives, in place.
+
+    Parameters
+    ----------
+    changes : ndarray, shape (H, W + 1, Q), float64
+    """
+    for row in range(changes.shape[0]):
+        for c in range(1, changes.shape[1]):
+            for q in range(changes.shape[2]):
+                changes[row, c, q] += changes[row, c - 1, q]

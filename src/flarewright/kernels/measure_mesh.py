@@ -1,0 +1,396 @@
+"""Draw a measured ghost from its pupil's mesh: flux-conserving, with exact coverage and exact derivatives.
+
+The mesh is a fan of spokes and rings over the open pupil (`kernels.measure_pupil`). A triangle carries the flux of its
+part of the pupil wherever it lands, so folds and caustics need no special care.
+"""
+
+from math import ceil, floor, pi, sin, sqrt
+
+import numpy as np
+
+from ._jit import compiled, inner
+from .measure_edges import add_edge, add_edge_changes
+from .measure_pupil import DISC_NUMBERS, FIRST_DISC, FIRST_G, FIRST_I, TERMS, border, monomials, place, rims, slopes
+
+# pixels by which a chord may leave its arc, up to so many spokes
+_CHORD = 0.12
+_LEAST_SPOKES, _MOST_SPOKES = 16, 160
+_LEAST_RINGS, _MOST_RINGS = 3, 14
+
+
+@inner
+def _mesh(parameters, disc_count, sigma, spokes, rings, with_changes, pupil, pupil_by):
+    """Fill the mesh's pupil points and their derivatives by the discs; False: it is shut."""
+    discs = np.empty((disc_count + 1, 2))
+    rims(parameters, disc_count, sigma, discs)
+    edge = np.empty((spokes + 1, 2))
+    by = np.empty((spokes + 1, 2, 2 * disc_count + 2))
+    if not border(discs, disc_count + 1, spokes, edge, by):
+        return False
+    # a polygon as large as the disc it stands for
+    swell = sqrt((2.0 * pi / spokes) / sin(2.0 * pi / spokes))
+    for i in range(rings + 1):
+        t = swell * i / rings
+        for j in range(spokes):
+            for m in range(2):
+                pupil[i, j, m] = edge[spokes, m] + t * (edge[j, m] - edge[spokes, m])
+                if with_changes:
+                    for q in range(by.shape[2]):
+                        pupil_by[i, j, m, q] = by[spokes, m, q] + t * (by[j, m, q] - by[spokes, m, q])
+    return True
+
+
+@inner
+def _area(ax, ay, bx, by, cx, cy):
+    """Return a triangle's signed area."""
+    return 0.5 * ((bx - ax) * (cy - ay) - (cx - ax) * (by - ay))
+
+
+@inner
+def _steadied(area):
+    """Return an area that may be divided by: a fold's triangles come close to 0 and keep their sign."""
+    if abs(area) < 1e-7:
+        return -1e-7 if area < 0.0 else 1e-7
+    return area
+
+
+@inner
+def _flux(parameters, sigma, pupil, ia, ja, ib, jb, ic, jc):
+    """Return a triangle's flux: intensity at its middle, never below 0, times its part of the pupil."""
+    xi = (pupil[ia, ja, 0] + pupil[ib, jb, 0] + pupil[ic, jc, 0]) / 3.0
+    eta = (pupil[ia, ja, 1] + pupil[ib, jb, 1] + pupil[ic, jc, 1]) / 3.0
+    intensity, _, _ = slopes(parameters, FIRST_I, xi * xi + eta * eta, xi * sigma, sigma * sigma)
+    part = _area(
+        pupil[ia, ja, 0], pupil[ia, ja, 1], pupil[ib, jb, 0], pupil[ib, jb, 1], pupil[ic, jc, 0], pupil[ic, jc, 1]
+    )
+    return max(intensity, 0.0) * part
+
+
+@inner
+def _land(parameters, pupil, sigma, frame, spots):
+    """Fill where the mesh lands in pixels; frame: axis x, axis y, cos roll, sin roll, scale."""
+    for i in range(pupil.shape[0]):
+        for j in range(pupil.shape[1]):
+            along, across, _, _, _, _ = place(parameters, pupil[i, j, 0], pupil[i, j, 1], sigma)
+            # rows count downwards
+            spots[i, j, 0] = frame[0] + frame[4] * (frame[2] * along - frame[3] * across)
+            spots[i, j, 1] = frame[1] - frame[4] * (frame[3] * along + frame[2] * across)
+
+
+@inner
+def _densities(parameters, sigma, pupil, spots, densities):
+    """Fill the signed density of each triangle, shape (rings, spokes, 2)."""
+    rings, spokes = densities.shape[0], densities.shape[1]
+    for i in range(rings):
+        for j in range(spokes):
+            k = j + 1 if j + 1 < spokes else 0
+            area = _area(
+                spots[i, j, 0], spots[i, j, 1], spots[i + 1, j, 0], spots[i + 1, j, 1], spots[i + 1, k, 0],
+                spots[i + 1, k, 1],
+            )  # fmt: skip
+            densities[i, j, 0] = -_flux(parameters, sigma, pupil, i, j, i + 1, j, i + 1, k) / _steadied(area)
+            if i == 0:
+                densities[i, j, 1] = 0.0
+                continue
+            area = _area(
+                spots[i, j, 0], spots[i, j, 1], spots[i + 1, k, 0], spots[i + 1, k, 1], spots[i, k, 0], spots[i, k, 1]
+            )
+            densities[i, j, 1] = -_flux(parameters, sigma, pupil, i, j, i + 1, k, i, k) / _steadied(area)
+
+
+@inner
+def _draw_mesh(spots, densities, left, top, width, height, plane):
+    """Draw every edge once, with the step in density across it."""
+    rings, spokes = densities.shape[0], densities.shape[1]
+    for i in range(rings):
+        for j in range(spokes):
+            k = j + 1 if j + 1 < spokes else 0
+            before = j - 1 if j > 0 else spokes - 1
+            ax, ay = spots[i, j, 0], spots[i, j, 1]
+            bx, by = spots[i + 1, j, 0], spots[i + 1, j, 1]
+            cx, cy = spots[i + 1, k, 0], spots[i + 1, k, 1]
+            other = densities[i, before, 1] if i > 0 else densities[i, before, 0]
+            add_edge(ax, ay, bx, by, densities[i, j, 0] - other, left, top, width, height, plane)
+            outer = densities[i + 1, j, 1] if i + 1 < rings else 0.0
+            add_edge(bx, by, cx, cy, densities[i, j, 0] - outer, left, top, width, height, plane)
+            if i > 0:
+                step = densities[i, j, 1] - densities[i, j, 0]
+                add_edge(ax, ay, cx, cy, step, left, top, width, height, plane)
+
+
+@inner
+def _grain(parameters, disc_count, sigma, scale):
+    """Return spokes and rings fine enough for a ghost, or 0 spokes when nothing is open; and its longest half width."""
+    pupil, none = np.empty((2, 8, 2)), np.empty((0, 0, 0, 0))
+    if not _mesh(parameters, disc_count, sigma, 8, 1, False, pupil, none):
+        return 0, 0
+    reach = 0.0
+    x0, y0, _, _, _, _ = place(parameters, pupil[0, 0, 0], pupil[0, 0, 1], sigma)
+    for j in range(8):
+        x, y, _, _, _, _ = place(parameters, pupil[1, j, 0], pupil[1, j, 1], sigma)
+        reach = max(reach, sqrt((x - x0) ** 2 + (y - y0) ** 2))
+    reach *= scale
+    spokes = int(min(max(pi * sqrt(reach / (2.0 * _CHORD)), _LEAST_SPOKES), _MOST_SPOKES))
+    rings = int(min(max(0.16 * spokes, _LEAST_RINGS), _MOST_RINGS))
+    return 4 * ((spokes + 3) // 4), rings
+
+
+@compiled
+def grain(parameters, disc_count, sigma, scale):
+    """Return how many spokes and rings a ghost needs.
+
+    Parameters
+    ----------
+    parameters : ndarray, shape (N,)
+    disc_count : int
+    sigma : float
+    scale : float
+        Pixels drawn per pixel of the model.
+
+    Returns
+    -------
+    spokes, rings : int
+        0 when the pupil is shut.
+    """
+    return _grain(parameters, disc_count, sigma, scale)
+
+
+@compiled
+def draw_ghosts(parameters, disc_counts, visible, sigma, frame, plane):
+    """Draw ghosts of one channel on one plane.
+
+    Parameters
+    ----------
+    parameters : ndarray, shape (G, N), float64
+        Padded; see `measure_pupil`.
+    disc_counts : ndarray, shape (G,), int64
+    visible : ndarray, shape (G,), float64
+        Gain of each ghost at this field; 0 leaves it out.
+    sigma : float
+        The field over the model's largest.
+    frame : ndarray, shape (5,)
+        Axis x and y in pixels, cosine and sine of the roll, pixels per pixel of the model.
+    plane : ndarray, shape (H, W + 1), float64
+        Added to: differences along rows (`measure_edges.sum_along_rows`), flux per pixel.
+    """
+    height, width = plane.shape[0], plane.shape[1] - 1
+    none = np.empty((0, 0, 0, 0))
+    for g in range(parameters.shape[0]):
+        if visible[g] == 0.0:
+            continue
+        spokes, rings = _grain(parameters[g], disc_counts[g], sigma, frame[4])
+        if spokes == 0:
+            continue
+        pupil, spots = np.empty((rings + 1, spokes, 2)), np.empty((rings + 1, spokes, 2))
+        if not _mesh(parameters[g], disc_counts[g], sigma, spokes, rings, False, pupil, none):
+            continue
+        _land(parameters[g], pupil, sigma, frame, spots)
+        densities = np.empty((rings, spokes, 2))
+        _densities(parameters[g], sigma, pupil, spots, densities)
+        # the model's irradiance is per pixel of the model: a finer picture keeps it
+        densities *= visible[g] * frame[4] * frame[4]
+        _draw_mesh(spots, densities, 0, 0, width, height, plane)
+
+
+@compiled
+def window_of(parameters, disc_count, sigma, frame, width, height):
+    """Return the pixels that a ghost may touch.
+
+    Parameters
+    ----------
+    parameters : ndarray, shape (N,)
+    disc_count : int
+    sigma : float
+    frame : ndarray, shape (5,)
+    width, height : int
+        Of the picture.
+
+    Returns
+    -------
+    left, top, width, height : int
+        Of the window; width 0 when it touches none.
+    """
+    spokes, rings = _grain(parameters, disc_count, sigma, frame[4])
+    if spokes == 0:
+        return 0, 0, 0, 0
+    pupil, spots = np.empty((rings + 1, spokes, 2)), np.empty((rings + 1, spokes, 2))
+    if not _mesh(parameters, disc_count, sigma, spokes, rings, False, pupil, np.empty((0, 0, 0, 0))):
+        return 0, 0, 0, 0
+    _land(parameters, pupil, sigma, frame, spots)
+    x0, y0, x1, y1 = 1e30, 1e30, -1e30, -1e30
+    for i in range(rings + 1):
+        for j in range(spokes):
+            x0, x1 = min(x0, spots[i, j, 0]), max(x1, spots[i, j, 0])
+            y0, y1 = min(y0, spots[i, j, 1]), max(y1, spots[i, j, 1])
+    if not (x1 > 0.0 and y1 > 0.0 and x0 < width and y0 < height):
+        return 0, 0, 0, 0
+    left, top = max(int(floor(x0)) - 1, 0), max(int(floor(y0)) - 1, 0)
+    right, bottom = min(int(ceil(min(x1, width))) + 1, width), min(int(ceil(min(y1, height))) + 1, height)
+    return left, top, right - left, bottom - top
+
+
+@inner
+def _spot_changes(parameters, sigma, free, frame, pupil, pupil_by, spots_by):
+    """Fill the derivatives of where the mesh lands, (rings + 1, spokes, Q, 2), by the free parameters."""
+    terms = np.empty(TERMS)
+    w = sigma * sigma
+    for i in range(pupil.shape[0]):
+        for j in range(pupil.shape[1]):
+            xi, eta = pupil[i, j, 0], pupil[i, j, 1]
+            monomials(xi * xi + eta * eta, xi * sigma, w, terms)
+            _, _, a_xi, a_eta, c_xi, c_eta = place(parameters, xi, eta, sigma)
+            for q in range(free.size):
+                n = free[q]
+                if n < FIRST_G:
+                    along, across = sigma * terms[n], 0.0
+                elif n < FIRST_I:
+                    along, across = xi * terms[n - FIRST_G], eta * terms[n - FIRST_G]
+                elif n < FIRST_DISC:
+                    along, across = 0.0, 0.0
+                else:
+                    dxi, deta = _pupil_change(n, sigma, pupil_by, i, j)
+                    along, across = a_xi * dxi + a_eta * deta, c_xi * dxi + c_eta * deta
+                spots_by[i, j, q, 0] = frame[4] * (frame[2] * along - frame[3] * across)
+                spots_by[i, j, q, 1] = -frame[4] * (frame[3] * along + frame[2] * across)
+
+
+@inner
+def _pupil_change(n, sigma, pupil_by, i, j):
+    """Return how a pupil point moves with parameter n of a disc."""
+    disc, which = (n - FIRST_DISC) // DISC_NUMBERS + 1, (n - FIRST_DISC) % DISC_NUMBERS
+    if which == 2:
+        return pupil_by[i, j, 0, 2 * disc + 1], pupil_by[i, j, 1, 2 * disc + 1]
+    by = sigma if which == 0 else sigma * sigma * sigma
+    return by * pupil_by[i, j, 0, 2 * disc], by * pupil_by[i, j, 1, 2 * disc]
+
+
+@inner
+def _triangle_changes(parameters, sigma, free, pupil, pupil_by, spots, spots_by, ia, ja, ib, jb, ic, jc, out):
+    """Fill the derivatives of a triangle's signed density by the free parameters."""
+    ax, ay = spots[ia, ja, 0], spots[ia, ja, 1]
+    bx, by = spots[ib, jb, 0], spots[ib, jb, 1]
+    cx, cy = spots[ic, jc, 0], spots[ic, jc, 1]
+    raw = _area(ax, ay, bx, by, cx, cy)
+    area = _steadied(raw)
+    pax, pay = pupil[ia, ja, 0], pupil[ia, ja, 1]
+    pbx, pby = pupil[ib, jb, 0], pupil[ib, jb, 1]
+    pcx, pcy = pupil[ic, jc, 0], pupil[ic, jc, 1]
+    part = _area(pax, pay, pbx, pby, pcx, pcy)
+    xi, eta = (pax + pbx + pcx) / 3.0, (pay + pby + pcy) / 3.0
+    u, v, w = xi * xi + eta * eta, xi * sigma, sigma * sigma
+    intensity, i_u, i_v = slopes(parameters, FIRST_I, u, v, w)
+    dark = intensity <= 0.0
+    if dark:
+        intensity, i_u, i_v = 0.0, 0.0, 0.0
+    i_xi, i_eta = 2.0 * xi * i_u + sigma * i_v, 2.0 * eta * i_u
+    terms = np.empty(TERMS)
+    monomials(u, v, w, terms)
+    density = -intensity * part / area
+    for q in range(free.size):
+        n = free[q]
+        flux_change = 0.0
+        if FIRST_I <= n < FIRST_DISC:
+            # what is below 0 is drawn as 0; its way up must show
+            out[q] = -terms[n - FIRST_I] * part / area if not dark else 0.0
+            continue
+        if n >= FIRST_DISC:
+            dax, day = _pupil_change(n, sigma, pupil_by, ia, ja)
+            dbx, dby = _pupil_change(n, sigma, pupil_by, ib, jb)
+            dcx, dcy = _pupil_change(n, sigma, pupil_by, ic, jc)
+            grown = 0.5 * (
+                (dbx - dax) * (pcy - pay) + (pbx - pax) * (dcy - day) - (dcx - dax) * (pby - pay)
+                - (pcx - pax) * (dby - day)
+            )  # fmt: skip
+            brighter = (i_xi * (dax + dbx + dcx) + i_eta * (day + dby + dcy)) / 3.0
+            flux_change = brighter * part + intensity * grown
+        ux, uy = spots_by[ia, ja, q, 0], spots_by[ia, ja, q, 1]
+        vx, vy = spots_by[ib, jb, q, 0], spots_by[ib, jb, q, 1]
+        tx, ty = spots_by[ic, jc, q, 0], spots_by[ic, jc, q, 1]
+        wider = 0.5 * ((vx - ux) * (cy - ay) + (bx - ax) * (ty - uy) - (tx - ux) * (by - ay) - (cx - ax) * (vy - uy))
+        if raw != area:
+            wider = 0.0
+        out[q] = -flux_change / area - density * wider / area
+
+
+@inner
+def _draw_changes(spots, spots_by, densities, changes, left, top, width, height, out):
+    """Draw every edge's derivatives once."""
+    rings, spokes = densities.shape[0], densities.shape[1]
+    step = np.empty(changes.shape[3])
+    zero = np.zeros(changes.shape[3])
+    for i in range(rings):
+        for j in range(spokes):
+            k = j + 1 if j + 1 < spokes else 0
+            before = j - 1 if j > 0 else spokes - 1
+            ax, ay = spots[i, j, 0], spots[i, j, 1]
+            bx, by = spots[i + 1, j, 0], spots[i + 1, j, 1]
+            cx, cy = spots[i + 1, k, 0], spots[i + 1, k, 1]
+            half = 1 if i > 0 else 0
+            step[:] = changes[i, j, 0] - changes[i, before, half]
+            add_edge_changes(
+                ax, ay, bx, by, densities[i, j, 0] - densities[i, before, half], step, spots_by[i, j],
+                spots_by[i + 1, j], left, top, width, height, out,
+            )  # fmt: skip
+            outer = densities[i + 1, j, 1] if i + 1 < rings else 0.0
+            step[:] = changes[i, j, 0] - (changes[i + 1, j, 1] if i + 1 < rings else zero)
+            add_edge_changes(
+                bx, by, cx, cy, densities[i, j, 0] - outer, step, spots_by[i + 1, j], spots_by[i + 1, k], left, top,
+                width, height, out,
+            )  # fmt: skip
+            if i > 0:
+                step[:] = changes[i, j, 1] - changes[i, j, 0]
+                add_edge_changes(
+                    ax, ay, cx, cy, densities[i, j, 1] - densities[i, j, 0], step, spots_by[i, j], spots_by[i + 1, k],
+                    left, top, width, height, out,
+                )  # fmt: skip
+
+
+@compiled
+def draw_with_changes(parameters, disc_count, sigma, free, frame, left, top, plane, out):
+    """Draw one ghost of one channel and its derivatives inside a window.
+
+    Parameters
+    ----------
+    parameters : ndarray, shape (N,), float64
+    disc_count : int
+    sigma : float
+    free : ndarray, shape (Q,), int64
+        Which parameters to derive by.
+    frame : ndarray, shape (5,)
+    left, top : int
+        First pixel of the window.
+    plane : ndarray, shape (h, w + 1), float64
+        Added to: differences along rows.
+    out : ndarray, shape (h, w + 1, Q), float64
+        Added to: differences along rows of the derivatives.
+
+    Notes
+    -----
+    The derivative of the drawn picture itself, mesh and all: tests/kernels/test_measure_mesh.py compares it with
+    differences.
+    """
+    height, width = plane.shape[0], plane.shape[1] - 1
+    spokes, rings = _grain(parameters, disc_count, sigma, frame[4])
+    if spokes == 0:
+        return
+    pupil, spots = np.empty((rings + 1, spokes, 2)), np.empty((rings + 1, spokes, 2))
+    pupil_by = np.empty((rings + 1, spokes, 2, 2 * disc_count + 2))
+    if not _mesh(parameters, disc_count, sigma, spokes, rings, True, pupil, pupil_by):
+        return
+    _land(parameters, pupil, sigma, frame, spots)
+    spots_by = np.empty((rings + 1, spokes, free.size, 2))
+    _spot_changes(parameters, sigma, free, frame, pupil, pupil_by, spots_by)
+    densities, changes = np.empty((rings, spokes, 2)), np.zeros((rings, spokes, 2, free.size))
+    _densities(parameters, sigma, pupil, spots, densities)
+    for i in range(rings):
+        for j in range(spokes):
+            k = j + 1 if j + 1 < spokes else 0
+            _triangle_changes(
+                parameters, sigma, free, pupil, pupil_by, spots, spots_by, i, j, i + 1, j, i + 1, k, changes[i, j, 0]
+            )
+            if i > 0:
+                _triangle_changes(
+                    parameters, sigma, free, pupil, pupil_by, spots, spots_by, i, j, i + 1, k, i, k, changes[i, j, 1]
+                )
+    _draw_mesh(spots, densities, left, top, width, height, plane)
+    _draw_changes(spots, spots_by, densities, changes, left, top, width, height, out)

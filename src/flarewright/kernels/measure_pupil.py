@@ -1,0 +1,226 @@
+"""The pupil of a measured ghost: a fan of points over the intersection of discs, and where they land on the sensor.
+
+A ghost of a lens of revolution maps a pupil point p and a field s to (x, y) = s f(p.p, p.s, s.s) + p g(p.p, p.s, s.s):
+no other form is symmetric. Its rims are the unit disc and discs whose centres move with s, so that the open part of the
+pupil is convex and mirrored at the line through s. Every point comes with its derivatives by the ghost's parameters.
+"""
+
+from math import cos, pi, sin, sqrt
+
+import numpy as np
+
+from ._jit import compiled, inner
+
+# monomials of u = p.p, v = p.s, w = s.s up to second order: of f, of g and of the intensity
+TERMS = 10
+# parameters: f, g, intensity, then three a disc: centre by s, centre by s (s.s), radius
+FIRST_G, FIRST_I, FIRST_DISC = TERMS, 2 * TERMS, 3 * TERMS
+DISC_NUMBERS = 3
+MOST_DISCS = 4
+
+
+@inner
+def monomials(u, v, w, out):
+    """Fill the ten monomials of (u, v, w): 1, u, v, w, uu, uv, vv, uw, vw, ww."""
+    out[0], out[1], out[2], out[3] = 1.0, u, v, w
+    out[4], out[5], out[6] = u * u, u * v, v * v
+    out[7], out[8], out[9] = u * w, v * w, w * w
+
+
+@inner
+def slopes(c, at, u, v, w):
+    """Return value and derivatives by u and v of the polynomial whose ten numbers begin at c[at]."""
+    value = c[at] + c[at + 1] * u + c[at + 2] * v + c[at + 3] * w + c[at + 4] * u * u + c[at + 5] * u * v
+    value += c[at + 6] * v * v + c[at + 7] * u * w + c[at + 8] * v * w + c[at + 9] * w * w
+    by_u = c[at + 1] + 2.0 * c[at + 4] * u + c[at + 5] * v + c[at + 7] * w
+    by_v = c[at + 2] + c[at + 5] * u + 2.0 * c[at + 6] * v + c[at + 8] * w
+    return value, by_u, by_v
+
+
+@inner
+def _reach(middle, cosine, sine, centre, radius):
+    """Return the distance from `middle` to a disc's rim, and its derivatives by middle - centre and by radius."""
+    a = middle - centre
+    root = sqrt(max(radius * radius - a * a * sine * sine, 1e-12))
+    return root - a * cosine, -cosine - a * sine * sine / root, radius / root
+
+
+@inner
+def _nearest_rim(middle, cosine, sine, discs, count):
+    """Return which disc's rim is met first along a spoke."""
+    best, at = 1e30, 0
+    for k in range(count):
+        reach, _, _ = _reach(middle, cosine, sine, discs[k, 0], discs[k, 1])
+        if reach < best:
+            best, at = reach, k
+    return at
+
+
+@inner
+def _corner(discs, a, b, upper, spot, by):
+    """Fill where two rims meet and its derivatives by their centres and radii; tell whether they do."""
+    ca, ra, cb, rb = discs[a, 0], discs[a, 1], discs[b, 0], discs[b, 1]
+    apart = cb - ca
+    if abs(apart) < 1e-9:
+        return False
+    xi = (ra * ra - rb * rb - ca * ca + cb * cb) / (2.0 * apart)
+    square = ra * ra - (xi - ca) * (xi - ca)
+    if square < 1e-8:
+        return False
+    eta = sqrt(square)
+    spot[0], spot[1] = xi, eta if upper else -eta
+    dxi = np.zeros(4)
+    dxi[0], dxi[1] = (xi - ca) / apart, ra / apart
+    dxi[2], dxi[3] = (cb - xi) / apart, -rb / apart
+    for m in range(4):
+        deta = -(xi - ca) * dxi[m]
+        if m == 0:
+            deta += xi - ca
+        elif m == 1:
+            deta += ra
+        disc = a if m < 2 else b
+        by[0, 2 * disc + m % 2] = dxi[m]
+        by[1, 2 * disc + m % 2] = deta / spot[1]
+    return True
+
+
+@inner
+def rims(parameters, disc_count, sigma, discs):
+    """Fill centre (along s) and radius of each disc at a field; the first is the unit disc."""
+    discs[0, 0], discs[0, 1] = 0.0, 1.0
+    w = sigma * sigma
+    for k in range(disc_count):
+        at = FIRST_DISC + DISC_NUMBERS * k
+        discs[k + 1, 0] = sigma * (parameters[at] + parameters[at + 1] * w)
+        discs[k + 1, 1] = parameters[at + 2]
+
+
+@inner
+def border(discs, count, spokes, points, by):
+    """Fill the border of the open pupil, spoke by spoke, from the middle of its axis.
+
+    Parameters
+    ----------
+    discs : ndarray, shape (D, 2)
+        Centre along s and radius.
+    count, spokes : int
+    points : ndarray, shape (spokes + 1, 2)
+        Filled: along s and across; the last one is the middle.
+    by : ndarray, shape (spokes + 1, 2, 2 * D)
+        Filled: derivatives by each disc's centre and radius.
+
+    Returns
+    -------
+    bool
+        False when nothing is open.
+    """
+    low, high, at_low, at_high = -1e30, 1e30, 0, 0
+    for k in range(count):
+        if discs[k, 1] <= 0.0:
+            return False
+        if discs[k, 0] - discs[k, 1] > low:
+            low, at_low = discs[k, 0] - discs[k, 1], k
+        if discs[k, 0] + discs[k, 1] < high:
+            high, at_high = discs[k, 0] + discs[k, 1], k
+    if high - low < 1e-6:
+        return False
+    middle = 0.5 * (low + high)
+    by[:] = 0.0
+    points[spokes, 0], points[spokes, 1] = middle, 0.0
+    by[spokes, 0, 2 * at_low] += 0.5
+    by[spokes, 0, 2 * at_low + 1] -= 0.5
+    by[spokes, 0, 2 * at_high] += 0.5
+    by[spokes, 0, 2 * at_high + 1] += 0.5
+    active = np.empty(spokes, np.int64)
+    for j in range(spokes):
+        angle = 2.0 * pi * j / spokes
+        active[j] = _nearest_rim(middle, cos(angle), sin(angle), discs, count)
+    for j in range(spokes):
+        angle = 2.0 * pi * j / spokes
+        cosine, sine = cos(angle), sin(angle)
+        k = active[j]
+        reach, by_a, by_r = _reach(middle, cosine, sine, discs[k, 0], discs[k, 1])
+        points[j, 0], points[j, 1] = middle + reach * cosine, reach * sine
+        for q in range(2 * count):
+            dm = by[spokes, 0, q]
+            dreach = by_a * (dm - (1.0 if q == 2 * k else 0.0)) + (by_r if q == 2 * k + 1 else 0.0)
+            by[j, 0, q], by[j, 1, q] = dm + dreach * cosine, dreach * sine
+    _snap(discs, spokes, active, middle, points, by)
+    return True
+
+
+@inner
+def _snap(discs, spokes, active, middle, points, by):
+    """Move the nearest spoke onto each corner, where two rims meet: a fan's chord would cut it off."""
+    spot, change = np.empty(2), np.empty((2, by.shape[2]))
+    for j in range(spokes):
+        after = j + 1 if j + 1 < spokes else 0
+        if active[j] == active[after]:
+            continue
+        change[:] = 0.0
+        upper = sin(2.0 * pi * (j + 0.5) / spokes) > 0.0
+        if not _corner(discs, active[j], active[after], upper, spot, change):
+            continue
+        here = np.arctan2(spot[1], spot[0] - middle)
+        turn = here - 2.0 * pi * j / spokes
+        turn -= 2.0 * pi * np.floor(turn / (2.0 * pi))
+        if turn > 2.0 * pi / spokes:
+            continue
+        at = j if turn < pi / spokes else after
+        points[at, 0], points[at, 1] = spot[0], spot[1]
+        by[at] = change
+
+
+@inner
+def place(parameters, xi, eta, sigma):
+    """Return where a pupil point lands, along s and across, and the derivatives by the pupil point."""
+    u, v, w = xi * xi + eta * eta, xi * sigma, sigma * sigma
+    f, fu, fv = slopes(parameters, 0, u, v, w)
+    g, gu, gv = slopes(parameters, FIRST_G, u, v, w)
+    f_xi, f_eta = 2.0 * xi * fu + sigma * fv, 2.0 * eta * fu
+    g_xi, g_eta = 2.0 * xi * gu + sigma * gv, 2.0 * eta * gu
+    along, across = sigma * f + xi * g, eta * g
+    return along, across, sigma * f_xi + g + xi * g_xi, sigma * f_eta + xi * g_eta, eta * g_xi, g + eta * g_eta
+
+
+@compiled
+def land(parameters, pupil, sigma, places):
+    """Fill where pupil points land.
+
+    Parameters
+    ----------
+    parameters : ndarray, shape (N,)
+    pupil : ndarray, shape (M, 2)
+        Along the field and across it, in radii of the first rim.
+    sigma : float
+        The field over the model's largest.
+    places : ndarray, shape (M, 2)
+        Filled: along the field and across it, pixels from the axis.
+    """
+    for k in range(pupil.shape[0]):
+        along, across, _, _, _, _ = place(parameters, pupil[k, 0], pupil[k, 1], sigma)
+        places[k, 0], places[k, 1] = along, across
+
+
+@compiled
+def outline(parameters, disc_count, sigma, spokes, points):
+    """Fill the pupil's border; see `border`.
+
+    Parameters
+    ----------
+    parameters : ndarray, shape (N,)
+    disc_count : int
+        Moving discs.
+    sigma : float
+    spokes : int
+    points : ndarray, shape (spokes + 1, 2)
+        Filled; the last one is the middle.
+
+    Returns
+    -------
+    bool
+        False when nothing is open.
+    """
+    discs = np.empty((disc_count + 1, 2))
+    rims(parameters, disc_count, sigma, discs)
+    return border(discs, disc_count + 1, spokes, points, np.empty((spokes + 1, 2, 2 * disc_count + 2)))

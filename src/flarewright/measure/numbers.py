@@ -1,0 +1,79 @@
+"""A model's ghosts as the arrays that kernels take, and back."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..kernels.measure_pupil import DISC_NUMBERS, FIRST_DISC, FIRST_G, FIRST_I, MOST_DISCS
+from ..model.ghost_model import AberrationGhost, BezierGhost, Channel, Disc, Ten
+
+Floats = NDArray[np.float64]
+
+NUMBERS = FIRST_DISC + DISC_NUMBERS * MOST_DISCS
+
+
+def channel_numbers(channel: Channel) -> Floats:
+    """Return the numbers of one colour, shape (42,), discs that are not there 0."""
+    numbers = np.zeros(NUMBERS)
+    numbers[:FIRST_G], numbers[FIRST_G:FIRST_I], numbers[FIRST_I:FIRST_DISC] = channel.f, channel.g, channel.intensity
+    for k, disc in enumerate(channel.discs):
+        at = FIRST_DISC + DISC_NUMBERS * k
+        numbers[at : at + DISC_NUMBERS] = *disc.centre, disc.radius
+    return numbers
+
+
+def channel_of(numbers: Floats, discs: int, uncertainty: Floats | None = None) -> Channel:
+    """Return the colour that has these numbers.
+
+    Parameters
+    ----------
+    numbers : ndarray, shape (42,)
+    discs : int
+        How many of its discs are there.
+    uncertainty : ndarray, shape (42,), or None
+    """
+    end = FIRST_DISC + DISC_NUMBERS * discs
+    ten = [cast(Ten, tuple(map(float, numbers[at : at + FIRST_G]))) for at in (0, FIRST_G, FIRST_I)]
+    cuts = numbers[FIRST_DISC:end].reshape(discs, DISC_NUMBERS)
+    return Channel(
+        f=ten[0], g=ten[1], intensity=ten[2],
+        discs=tuple(Disc(centre=(float(cut[0]), float(cut[1])), radius=float(cut[2])) for cut in cuts),
+        uncertainty=() if uncertainty is None else tuple(map(float, uncertainty[:end])),
+    )  # fmt: skip
+
+
+def bezier_numbers(ghost: BezierGhost, constellation_deg: float) -> Floats:
+    """Return a Bezier ghost's 19 numbers at a constellation."""
+    low, high = ghost.visible_deg
+    half = 0.5 * (high - low) or 1.0
+    z = (constellation_deg - 0.5 * (low + high)) / half
+    numbers = [float(np.polynomial.polynomial.polyval(z, coefficients)) for coefficients in ghost.numbers]
+    # what a polynomial may not bring below 0: height, falloffs, exponents, levels
+    for k in (2, *range(9, 19)):
+        numbers[k] = max(numbers[k], 0.0)
+    return np.array(numbers)
+
+
+def field(constellation_deg: float, largest_deg: float) -> float:
+    """Return the length of the field s, with the constellation's sign."""
+    return float(np.tan(np.radians(constellation_deg)) / np.tan(np.radians(largest_deg)))
+
+
+def frame(axis_px: tuple[float, float], roll_deg: float, constellation_deg: float, scale: float) -> Floats:
+    """Return axis, direction of the light and scale as kernels take them, shape (5,).
+
+    A negative constellation is a positive one on the other side.
+    """
+    turn = np.radians(roll_deg + (180.0 if constellation_deg < 0.0 else 0.0))
+    return np.array([axis_px[0] * scale, axis_px[1] * scale, np.cos(turn), np.sin(turn), scale])
+
+
+def visible(ghosts: Sequence[AberrationGhost | BezierGhost], constellation_deg: float) -> Floats:
+    """Return 1 for ghosts that are there at a constellation and 0 for the others, shape (G,)."""
+    return np.array([
+        1.0 if ghost.visible_deg[0] <= constellation_deg <= ghost.visible_deg[1] else 0.0 for ghost in ghosts
+    ])  # fmt: skip

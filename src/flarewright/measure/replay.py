@@ -1,0 +1,205 @@
+"""Draw a measured flare at any constellation and roll, as layers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import FlarewrightError
+from ..kernels.measure_bezier import bezier_window, draw_bezier
+from ..kernels.measure_edges import sum_along_rows
+from ..kernels.measure_mesh import draw_ghosts, window_of
+from ..model.ghost_model import AberrationGhost, BezierGhost, GhostModel
+from ..model.layer import Layer
+from ..render.compose import beauty
+from .glow import halo_radiance, offsets, star_radiance
+from .numbers import NUMBERS, bezier_numbers, channel_numbers, field, frame, visible
+
+Floats = NDArray[np.float64]
+
+# farther beyond the measured range than this, degrees, nothing is replayed
+BEYOND_DEG = 1.0
+_NOTHING = np.empty((0, 0, 3, 19))
+
+
+def light_px(model: GhostModel, constellation_deg: float, roll_deg: float = 0.0) -> tuple[float, float]:
+    """Return where the light's image lies in the captures' picture, (x, y)."""
+    reach = model.focal_px * float(np.tan(np.radians(constellation_deg)))
+    turn = np.radians(roll_deg)
+    return (
+        model.axis_px[0] + reach * float(np.cos(turn)),
+        model.axis_px[1] - reach * float(np.sin(turn)),
+    )
+
+
+def replay(
+    model: GhostModel,
+    constellation_deg: float,
+    *,
+    roll_deg: float = 0.0,
+    size_px: tuple[int, int] | None = None,
+    gain: float = 1.0,
+    single: bool = False,
+) -> tuple[Layer, ...]:
+    """Draw a measured flare.
+
+    Parameters
+    ----------
+    model : GhostModel
+    constellation_deg : float
+        Angle between the optical axis and the light.
+    roll_deg : float
+        Direction of the light, counterclockwise from the right in the upright picture.
+    size_px : tuple of int, optional
+        Width and height; the picture shows the captures' field across its width. None: the captures' size.
+    gain : float
+        Multiplies everything (`measure.placing.brightness`).
+    single : bool
+        Also a layer for each ghost, "ghost.NAME".
+
+    Returns
+    -------
+    tuple of Layer
+        "beauty", "ghosts", with a star or halo also "starburst" and "halo", then the single ghosts. Radiance in the
+        captures' unit.
+
+    Raises
+    ------
+    FlarewrightError
+        When the constellation lies outside what was measured.
+
+    Notes
+    -----
+    Walch 2017, section 8.2: the constellation chooses the numbers, the roll turns the ghosts about the axis.
+    """
+    low, high = model.constellation_deg
+    if not low - BEYOND_DEG <= constellation_deg <= high + BEYOND_DEG:
+        raise FlarewrightError(
+            f"the model was measured from {low:g} to {high:g} degrees; it cannot tell the flare at "
+            f"{constellation_deg:g}"
+        )
+    size = size_px or model.size_px
+    about: dict[str, str | float] = {"constellation_deg": constellation_deg, "roll_deg": roll_deg}
+    pixels = draw(model, constellation_deg, roll_deg, size) * gain
+    layers = [Layer("ghosts", pixels.astype(np.float32), (0, 0, *size), about)]
+    scale, top = _fit(model, size)
+    at = light_px(model, constellation_deg, roll_deg)
+    x, y = offsets((at[0] * scale, at[1] * scale + top), size, scale)
+    if model.star is not None:
+        layers.append(Layer("starburst", (gain * star_radiance(model.star, x, y)).astype(np.float32), (0, 0, *size)))
+    if model.halo is not None:
+        layers.append(Layer("halo", (gain * halo_radiance(model.halo, x, y)).astype(np.float32), (0, 0, *size)))
+    whole = beauty(layers, size)
+    singles = _single(model, constellation_deg, roll_deg, size, gain) if single else []
+    return (whole, *layers, *singles)
+
+
+def _fit(model: GhostModel, size: tuple[int, int]) -> tuple[float, float]:
+    """Return pixels per pixel of the model, and by how many rows the picture is shifted to keep its middle."""
+    scale = size[0] / model.size_px[0]
+    return scale, 0.5 * (size[1] - scale * model.size_px[1])
+
+
+def _frame(model: GhostModel, constellation_deg: float, roll_deg: float, size: tuple[int, int]) -> Floats:
+    scale, top = _fit(model, size)
+    placed = frame(model.axis_px, roll_deg, constellation_deg, scale)
+    placed[1] += top
+    return placed
+
+
+def draw(model: GhostModel, constellation_deg: float, roll_deg: float, size_px: tuple[int, int]) -> Floats:
+    """Draw all ghosts of a model together.
+
+    Parameters
+    ----------
+    model : GhostModel
+    constellation_deg, roll_deg : float
+    size_px : tuple of int
+
+    Returns
+    -------
+    ndarray, shape (H, W, 3)
+        Radiance.
+    """
+    return draw_packed(pack(model), model, constellation_deg, roll_deg, size_px)
+
+
+Packed = tuple[tuple[AberrationGhost, ...], Floats, NDArray[np.int64], tuple[BezierGhost, ...]]
+
+
+def pack(model: GhostModel) -> Packed:
+    """Return a model's ghosts as `draw_packed` takes them, for many pictures of one model."""
+    meshes = tuple(ghost for ghost in model.ghosts if isinstance(ghost, AberrationGhost))
+    curves = tuple(ghost for ghost in model.ghosts if isinstance(ghost, BezierGhost))
+    numbers = np.zeros((3, len(meshes), NUMBERS))
+    counts = np.zeros((3, len(meshes)), np.int64)
+    for k, ghost in enumerate(meshes):
+        for m, channel in enumerate((ghost.red, ghost.green, ghost.blue)):
+            numbers[m, k], counts[m, k] = channel_numbers(channel), len(channel.discs)
+    return meshes, numbers, counts, curves
+
+
+def draw_packed(
+    packed: Packed, model: GhostModel, constellation_deg: float, roll_deg: float, size_px: tuple[int, int]
+) -> Floats:
+    """Draw all ghosts of a packed model together; see `draw`."""
+    meshes, numbers, counts, curves = packed
+    width, height = size_px
+    pixels = np.zeros((height, width, 3))
+    placed = _frame(model, constellation_deg, roll_deg, size_px)
+    sigma = abs(field(constellation_deg, model.largest_deg))
+    if meshes:
+        there = visible(meshes, constellation_deg)
+        for m in range(3):
+            plane = np.zeros((height, width + 1))
+            draw_ghosts(numbers[m], counts[m], there, sigma, placed, plane)
+            sum_along_rows(plane)
+            pixels[:, :, m] = plane[:, :width]
+    for ghost, there_is in zip(curves, visible(curves, constellation_deg), strict=True):
+        if there_is:
+            left, top, w, h = bezier_window(bezier_numbers(ghost, constellation_deg), placed, width, height)
+            if w:
+                window = pixels[top : top + h, left : left + w]
+                draw_bezier(bezier_numbers(ghost, constellation_deg), placed, left, top, window, _NOTHING)
+    return np.maximum(pixels, 0.0)
+
+
+def window(
+    ghost: AberrationGhost, model: GhostModel, constellation_deg: float, roll_deg: float, size_px: tuple[int, int]
+) -> tuple[int, int, int, int]:
+    """Return the pixels (x, y, width, height) that a ghost touches; width 0: none."""
+    placed = _frame(model, constellation_deg, roll_deg, size_px)
+    sigma = abs(field(constellation_deg, model.largest_deg))
+    boxes = [
+        window_of(channel_numbers(channel), len(channel.discs), sigma, placed, *size_px)
+        for channel in (ghost.red, ghost.green, ghost.blue)
+    ]
+    boxes = [box for box in boxes if box[2]]
+    if not boxes:
+        return 0, 0, 0, 0
+    x, y = min(box[0] for box in boxes), min(box[1] for box in boxes)
+    return x, y, max(box[0] + box[2] for box in boxes) - x, max(box[1] + box[3] for box in boxes) - y
+
+
+def _single(
+    model: GhostModel, constellation_deg: float, roll_deg: float, size: tuple[int, int], gain: float
+) -> Sequence[Layer]:
+    """Draw each visible ghost on a layer of its own, cropped to what it touches."""
+    layers = []
+    for ghost, there in zip(model.ghosts, visible(model.ghosts, constellation_deg), strict=True):
+        if not there:
+            continue
+        alone = cast(GhostModel, model.replace(ghosts=(ghost,)))
+        pixels = draw(alone, constellation_deg, roll_deg, size) * gain
+        lit = np.argwhere(pixels.any(axis=2))
+        if not lit.size:
+            continue
+        (top, left), (bottom, right) = lit.min(axis=0), lit.max(axis=0) + 1
+        crop = pixels[top:bottom, left:right].astype(np.float32)
+        layers.append(
+            Layer(f"ghost.{ghost.name}", crop, (int(left), int(top), int(right - left), int(bottom - top)), {})
+        )
+    return layers

@@ -1,0 +1,223 @@
+"""A measured flare: its ghosts, star and halo as numbers over the constellation, and how well they are known.
+
+Positions are in pixels of the picture it was measured in, from the optical axis; a light at constellation theta has the
+field s of length tan(theta) / tan(`largest_deg`), pointing to where the light's image lies. Radiance is in the unit of
+the captures at their settings (`Reference`).
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from .base import Frozen
+
+Ten = tuple[float, float, float, float, float, float, float, float, float, float]
+Rgb3 = tuple[float, float, float]
+
+
+class Disc(Frozen):
+    """A rim that cuts a ghost: a disc in its pupil whose centre moves with the light.
+
+    Attributes
+    ----------
+    centre : tuple of float
+        The centre is s (centre[0] + centre[1] s.s).
+    radius : float
+        In radii of the ghost's first rim.
+    """
+
+    centre: tuple[float, float]
+    radius: float = Field(gt=0.0)
+
+
+class Channel(Frozen):
+    """One colour of a ghost: where each point p of its pupil lands, and how bright it is.
+
+    (x, y) = s f + p g; f, g and the intensity are polynomials of u = p.p, v = p.s, w = s.s with the ten terms
+    1, u, v, w, uu, uv, vv, uw, vw, ww. The pupil is the unit disc cut by `discs`.
+
+    Attributes
+    ----------
+    f, g : tuple of 10 float
+        Pixels.
+    intensity : tuple of 10 float
+        Radiance times pixels per area of the pupil; below 0 counts as 0.
+    discs : tuple of Disc
+    uncertainty : tuple of float
+        Standard deviation of f, g, intensity and each disc's three numbers, in this order; 0 for numbers that were
+        not fitted. Empty: unknown.
+    """
+
+    f: Ten
+    g: Ten
+    intensity: Ten
+    discs: tuple[Disc, ...] = Field((), max_length=4)
+    uncertainty: tuple[float, ...] = ()
+
+    @model_validator(mode="after")
+    def _count(self) -> Channel:
+        if len(self.uncertainty) not in (0, 30 + 3 * len(self.discs)):
+            raise ValueError(f"uncertainty needs {30 + 3 * len(self.discs)} numbers, or none")
+        return self
+
+
+class AberrationGhost(Frozen):
+    """A ghost by its aberrations: one set of numbers for all constellations.
+
+    Attributes
+    ----------
+    name : str
+    red, green, blue : Channel
+    visible_deg : tuple of float
+        Constellations at which it appears and disappears.
+    """
+
+    kind: Literal["aberration"] = "aberration"
+    name: str
+    red: Channel
+    green: Channel
+    blue: Channel
+    visible_deg: tuple[float, float]
+
+
+class BezierGhost(Frozen):
+    """A ghost by Walch's primitive (2017, chapter 6): every number a polynomial over the constellation.
+
+    Attributes
+    ----------
+    name : str
+    numbers : tuple of 19 tuples of float
+        Coefficients, lowest order first, of z = (constellation - middle) / half range of `visible_deg`. In order:
+        centre along and across the field, height, extent left and right, control points left (along, across) and
+        right, falloff outside and inside, exponents outside and inside, border level and inner level of red, green
+        and blue. Pixels and radiance.
+    uncertainty : tuple of float
+        Standard deviation of each number about its polynomial, or empty.
+    visible_deg : tuple of float
+        Constellations at which it appears and disappears.
+    """
+
+    kind: Literal["bezier"] = "bezier"
+    name: str
+    numbers: tuple[tuple[float, ...], ...] = Field(min_length=19, max_length=19)
+    uncertainty: tuple[float, ...] = Field((), max_length=19)
+    visible_deg: tuple[float, float]
+
+
+class Halo(Frozen):
+    """Light around the light's image: haze, scatter and the star's core.
+
+    Attributes
+    ----------
+    radius_px : tuple of float
+        Rising distances from the light's image.
+    radiance : tuple of Rgb
+        At those distances; in between the logarithms are interpolated, beyond the last it is 0.
+    """
+
+    radius_px: tuple[float, ...] = Field(min_length=2)
+    radiance: tuple[Rgb3, ...]
+
+    @model_validator(mode="after")
+    def _rising(self) -> Halo:
+        if len(self.radius_px) != len(self.radiance):
+            raise ValueError("a halo needs one radiance for each radius")
+        if any(b <= a for a, b in zip(self.radius_px, self.radius_px[1:], strict=False)) or self.radius_px[0] <= 0.0:
+            raise ValueError("a halo's radii must rise from above 0")
+        return self
+
+
+class Star(Frozen):
+    """Spikes of diffraction around the light's image; they turn with the camera, not with the light.
+
+    Attributes
+    ----------
+    spikes : int
+        n for an even, 2n for an odd number of blades.
+    first_deg : float
+        Direction of a spike, counterclockwise from the right in the upright picture.
+    width_px : float
+        Standard deviation across a spike.
+    radius_px : tuple of float
+        Rising distances from the light's image.
+    radiance : tuple of Rgb
+        On a spike's ridge at those distances, as in `Halo`.
+    """
+
+    spikes: int = Field(ge=2, le=72)
+    first_deg: float
+    width_px: float = Field(gt=0.0)
+    radius_px: tuple[float, ...] = Field(min_length=2)
+    radiance: tuple[Rgb3, ...]
+
+
+class Reference(Frozen):
+    """Settings of the captures, for the brightness at other settings (Walch 2017, equation 8.3).
+
+    Attributes
+    ----------
+    f_number, iso, exposure_s : float or None
+    luminance_cd_m2 : float or None
+        Of the light that was photographed.
+    solid_angle_sr : float or None
+        Of that light, seen from the camera.
+    """
+
+    f_number: float | None = Field(None, gt=0.0)
+    iso: float | None = Field(None, gt=0.0)
+    exposure_s: float | None = Field(None, gt=0.0)
+    luminance_cd_m2: float | None = Field(None, gt=0.0)
+    solid_angle_sr: float | None = Field(None, gt=0.0)
+
+
+Ghost = Annotated[AberrationGhost | BezierGhost, Field(discriminator="kind")]
+
+
+class GhostModel(Frozen):
+    """A measured flare.
+
+    Attributes
+    ----------
+    schema_version : 1
+    size_px : tuple of int
+        Width and height of the captures.
+    axis_px : tuple of float
+        Where the optical axis meets the picture; pixel k spans k to k + 1, row 0 is at the top.
+    focal_px : float
+        Pixels per unit of tangent: the light's image lies at axis + focal_px tan(constellation).
+    largest_deg : float
+        Constellation at which the field has length 1.
+    constellation_deg : tuple of float
+        Range that was measured.
+    ghosts : tuple of AberrationGhost or BezierGhost
+    halo : Halo or None
+    star : Star or None
+    reference : Reference
+    background : Rgb
+        Radiance everywhere, part of no layer.
+    remarks : tuple of str
+    """
+
+    schema_version: Literal[1] = 1
+    size_px: tuple[int, int]
+    axis_px: tuple[float, float]
+    focal_px: float = Field(gt=0.0)
+    largest_deg: float = Field(gt=0.0, lt=90.0)
+    constellation_deg: tuple[float, float]
+    ghosts: tuple[Ghost, ...] = ()
+    halo: Halo | None = None
+    star: Star | None = None
+    reference: Reference = Reference()
+    background: Rgb3 = (0.0, 0.0, 0.0)
+    remarks: tuple[str, ...] = ()
+
+    @model_validator(mode="after")
+    def _names(self) -> GhostModel:
+        names = [ghost.name for ghost in self.ghosts]
+        if len(set(names)) != len(names):
+            raise ValueError("two ghosts have the same name")
+        if min(self.size_px) < 1:
+            raise ValueError("size_px must be at least 1 by 1")
+        return self

@@ -1,0 +1,87 @@
+"""Walch's primitive: distances against polynomial roots, derivatives against differences."""
+
+import numpy as np
+import pytest
+
+from flarewright.kernels.measure_bezier import bezier_window, draw_bezier, signed_distances
+
+NUMBERS = np.array([
+    20.0, 1.5, 30.0, 36.0, 24.0, 18.0, 15.0, 14.0, 17.0, 6.0, 15.0, 1.3, 1.8, 1.0, 0.8, 0.5, 0.3, 0.25, 0.2,
+])  # fmt: skip
+FRAME = np.array([60.2, 55.1, np.cos(0.4), np.sin(0.4), 1.0])
+NONE = np.empty((0, 0, 3, 19))
+
+
+def by_roots(numbers, x, y):
+    """Return the distance to the border by the roots of the fifth-order polynomial (equation 6.2)."""
+    best = np.inf
+    y = abs(y - numbers[1])
+    for side, at, extent in ((-1.0, 5, numbers[3]), (1.0, 7, numbers[4])):
+        p = np.array([
+            [numbers[0], numbers[2]],
+            [numbers[0] + side * numbers[at], numbers[2]],
+            [numbers[0] + side * extent, numbers[at + 1]],
+            [numbers[0] + side * extent, 0.0],
+        ])  # fmt: skip
+        power = np.array([[1, 0, 0, 0], [-3, 3, 0, 0], [3, -6, 3, 0], [-1, 3, -3, 1]]) @ p
+        cx, cy = np.polynomial.Polynomial(power[:, 0]) - x, np.polynomial.Polynomial(power[:, 1]) - y
+        roots = (cx * cx.deriv() + cy * cy.deriv()).roots()
+        roots = roots[np.abs(roots.imag) < 1e-9].real
+        for t in (0.0, 1.0, *roots[(roots > 0.0) & (roots < 1.0)]):
+            best = min(best, np.hypot(cx(t), cy(t)))
+    return best
+
+
+def test_distance_is_that_of_the_polynomials_roots():
+    points = np.random.default_rng(3).uniform(-60.0, 90.0, (400, 2))
+    found = np.empty(len(points))
+    signed_distances(NUMBERS, points, found)
+    exact = [by_roots(NUMBERS, *point) for point in points]
+    assert np.allclose(np.abs(found), exact, atol=2e-4)
+
+
+def test_inside_is_positive():
+    points = np.array([[20.0, 1.5], [20.0, 30.5], [20.0, 32.5], [-15.0, 1.5], [-17.0, 1.5], [43.0, 1.5], [45.0, 1.5]])
+    found = np.empty(len(points))
+    signed_distances(NUMBERS, points, found)
+    assert list(found > 0.0) == [True, True, False, True, False, True, False]
+
+
+def test_transfer_function_is_that_of_equation_6_4():
+    # a nearly straight border seen from the side: the right end of a very high ghost
+    numbers = NUMBERS.copy()
+    numbers[:9] = 0.0, 0.0, 4000.0, 50.0, 10.0, 50.0, 3900.0, 10.0, 3900.0
+    frame = np.array([0.0, 0.5, 1.0, 0.0, 1.0])
+    pixels = np.zeros((1, 40, 3))
+    draw_bezier(numbers, frame, 0, 0, pixels, NONE)
+    distance = 10.0 - (np.arange(40) + 0.5)
+    inside = 1.0 + (0.3 - 1.0) * np.clip(np.abs(distance) / 15.0, 0.0, 1.0) ** 1.8
+    outside = 1.0 - np.clip(np.abs(distance) / 6.0, 0.0, 1.0) ** 1.3
+    assert np.allclose(pixels[0, :, 0], np.where(distance > 0.0, inside, outside), atol=1e-6)
+
+
+def draw(numbers, window):
+    left, top, width, height = window
+    pixels = np.zeros((height, width, 3))
+    draw_bezier(numbers, FRAME, left, top, pixels, NONE)
+    return pixels
+
+
+def test_derivatives_are_those_of_the_picture():
+    window = bezier_window(NUMBERS, FRAME, 150, 110)
+    left, top, width, height = window
+    pixels, changes = np.zeros((height, width, 3)), np.zeros((height, width, 3, 19))
+    draw_bezier(NUMBERS, FRAME, left, top, pixels, changes)
+    for n in range(19):
+        step = np.zeros(19)
+        step[n] = 1e-5
+        by_difference = (draw(NUMBERS + step, window) - draw(NUMBERS - step, window)) / 2e-5
+        wrong = np.abs(by_difference - changes[..., n]) > 1e-3 * np.abs(by_difference).max() + 1e-9
+        # the border and the middle line have a kink, where the side a difference falls on decides
+        assert wrong.mean() < 0.01, n
+
+
+def test_nothing_lies_outside_the_window():
+    whole = draw(NUMBERS, (0, 0, 150, 110))
+    left, top, width, height = bezier_window(NUMBERS, FRAME, 150, 110)
+    assert whole.sum() == pytest.approx(whole[top : top + height, left : left + width].sum())

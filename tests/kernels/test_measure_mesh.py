@@ -1,0 +1,98 @@
+"""The mesh of a measured ghost: flux, coverage and derivatives against what does not use them."""
+
+import numpy as np
+import pytest
+
+from flarewright.kernels.measure_edges import sum_along_rows, sum_changes_along_rows
+from flarewright.kernels.measure_mesh import draw_ghosts, draw_with_changes, window_of
+from flarewright.kernels.measure_pupil import FIRST_DISC, FIRST_G, FIRST_I
+
+SIZE = (240, 140)
+
+
+def ghost(discs: int = 1) -> np.ndarray:
+    """Return a ghost with every aberration."""
+    numbers = np.zeros(42)
+    numbers[:10] = 150.0, 3.0, -4.0, 12.0, 0.0, 1.0, 0.0, 0.3, 0.0, -1.0
+    numbers[FIRST_G : FIRST_G + 10] = 40.0, 5.0, 4.0, -3.0, 0.0, 0.0, 0.7, 0.0, 1.5, 0.0
+    numbers[FIRST_I : FIRST_I + 4] = 1.0, 0.3, -0.2, 0.1
+    cuts = ((0.9, 0.1, 1.1), (-0.7, 0.0, 1.2))
+    for k in range(discs):
+        numbers[FIRST_DISC + 3 * k : FIRST_DISC + 3 * k + 3] = cuts[k]
+    return numbers
+
+
+FRAME = np.array([100.3, 60.7, np.cos(0.3), np.sin(0.3), 1.0])
+
+
+def draw(numbers, discs, sigma=0.5, frame=FRAME, size=SIZE):
+    plane = np.zeros((size[1], size[0] + 1))
+    draw_ghosts(numbers[None], np.array([discs]), np.ones(1), sigma, frame, plane)
+    sum_along_rows(plane)
+    return plane[:, :-1]
+
+
+def test_a_disc_is_as_large_and_as_bright_as_it_is():
+    numbers = np.zeros(42)
+    numbers[0], numbers[FIRST_G], numbers[FIRST_I] = 80.0, 30.0, 900.0
+    picture = draw(numbers, 0)
+    assert picture.sum() == pytest.approx(900.0 * np.pi, rel=1e-9)
+    y, x = np.mgrid[: SIZE[1], : SIZE[0]] + 0.5
+    centre = FRAME[0] + 40.0 * FRAME[2], FRAME[1] - 40.0 * FRAME[3]
+    away = np.hypot(x - centre[0], y - centre[1])
+    assert np.allclose(picture[away < 28.5], 1.0, rtol=1e-9)
+    assert np.allclose(picture[away > 31.5], 0.0, atol=1e-12)
+    # second moment of a disc: r^2 / 2
+    assert (picture * away**2).sum() / picture.sum() == pytest.approx(450.0, rel=2e-3)
+
+
+def test_flux_is_kept_through_folds_and_cuts_are_those_of_the_discs():
+    numbers = ghost(2)
+    numbers[FIRST_I : FIRST_I + 10] = 0.0
+    numbers[FIRST_I] = 2.0
+    numbers[FIRST_G : FIRST_G + 2] = 4.0, 30.0
+    p = np.linspace(-1.0, 1.0, 2001)
+    xi, eta = np.meshgrid(p, p)
+    open_part = (xi**2 + eta**2 <= 1.0) & (np.hypot(xi - 0.4625, eta) <= 1.1) & (np.hypot(xi + 0.35, eta) <= 1.2)
+    area = open_part.sum() * (p[1] - p[0]) ** 2
+    assert draw(numbers, 2).sum() == pytest.approx(2.0 * area, rel=2e-3)
+
+
+def test_a_shut_pupil_is_dark():
+    numbers = ghost(1)
+    numbers[FIRST_DISC : FIRST_DISC + 3] = 8.0, 0.0, 1.0
+    assert not draw(numbers, 1).any()
+    assert window_of(numbers, 1, 0.5, FRAME, *SIZE)[2] == 0
+
+
+@pytest.mark.parametrize("discs", [0, 1, 2])
+def test_derivatives_are_those_of_the_picture(discs):
+    numbers = ghost(discs)
+    free = np.arange(FIRST_DISC + 3 * discs)
+    left, top, width, height = window_of(numbers, discs, 0.5, FRAME, *SIZE)
+    plane, changes = np.zeros((height, width + 1)), np.zeros((height, width + 1, free.size))
+    draw_with_changes(numbers, discs, 0.5, free, FRAME, left, top, plane, changes)
+    sum_along_rows(plane)
+    sum_changes_along_rows(changes)
+    part = slice(top, top + height), slice(left, left + width)
+    assert np.allclose(plane[:, :-1], draw(numbers, discs)[part], atol=1e-13)
+    for q, n in enumerate(free):
+        step = np.zeros(42)
+        step[n] = 1e-5
+        by_difference = (draw(numbers + step, discs) - draw(numbers - step, discs))[part] / 2e-5
+        assert np.abs(by_difference - changes[:, :-1, q]).max() < 1e-4 * np.abs(by_difference).max() + 1e-12, n
+
+
+def test_what_the_window_cuts_off_does_not_change_the_rest():
+    numbers = ghost(1)
+    whole = draw(numbers, 1)
+    frame = FRAME.copy()
+    frame[:2] -= 120.0, 40.0
+    assert np.allclose(draw(numbers, 1, frame=frame, size=(100, 60)), whole[40:100, 120:220], atol=1e-12)
+
+
+def test_roll_turns_the_ghost_about_the_axis():
+    numbers, axis = ghost(1), np.array([70.0, 70.0])
+    upright = draw(numbers, 1, frame=np.array([*axis, 1.0, 0.0, 1.0]), size=(140, 140))
+    quarter = draw(numbers, 1, frame=np.array([*axis, 0.0, 1.0, 1.0]), size=(140, 140))
+    assert np.allclose(np.rot90(upright), quarter, atol=1e-12)

@@ -1,0 +1,147 @@
+"""Replay: geometry, brightness, file and command."""
+
+import json
+
+import numpy as np
+import pytest
+
+from flarewright.cli.app import run
+from flarewright.errors import FlarewrightError
+from flarewright.io.exr import read_exr
+from flarewright.io.ghost_model_file import read_ghost_model, write_ghost_model
+from flarewright.measure.numbers import channel_of
+from flarewright.measure.placing import brightness, constellation_and_roll
+from flarewright.measure.replay import light_px, replay
+from flarewright.model.ghost_model import AberrationGhost, BezierGhost, GhostModel, Halo, Reference, Star
+from flarewright.model.replay_camera import ReplayCamera
+
+
+def planted() -> GhostModel:
+    """Return a model with a ghost of each kind, a halo and a star."""
+    channels = []
+    for m in range(3):
+        numbers = np.zeros(42)
+        numbers[:4] = -60.0 - m, 1.0, 0.5, 4.0
+        numbers[10:13] = 14.0 + m, 1.0, 0.3
+        numbers[20:23] = 900.0 - 200.0 * m, 80.0, 0.0
+        numbers[30:33] = 1.2, 0.1, 1.1
+        channels.append(channel_of(numbers, 1))
+    bezier = ((30.0, 25.0), (0.0,), (9.0, 0.5), (9.0,), (7.0,), (5.0,), (5.0,), (4.0,), (5.0,), (3.0,), (6.0,), (1.5,),
+              (1.2,), (2.0,), (1.5,), (1.0,), (0.5,), (0.4,), (0.3,))  # fmt: skip
+    return GhostModel(
+        size_px=(160, 90), axis_px=(80.3, 44.6), focal_px=170.0, largest_deg=25.0, constellation_deg=(0.0, 25.0),
+        ghosts=(
+            AberrationGhost(
+                name="1", red=channels[0], green=channels[1], blue=channels[2], visible_deg=(0.0, 25.0)
+            ),
+            BezierGhost(name="2", numbers=bezier, visible_deg=(5.0, 20.0)),
+        ),
+        halo=Halo(radius_px=(1.0, 10.0, 100.0), radiance=((9.0, 8.0, 7.0), (0.9, 0.8, 0.7), (0.01, 0.01, 0.01))),
+        star=Star(
+            spikes=6, first_deg=10.0, width_px=1.0, radius_px=(1.0, 60.0), radiance=((5.0, 5.0, 5.0), (0.1, 0.1, 0.1))
+        ),
+        reference=Reference(f_number=2.0, iso=100.0, exposure_s=0.5, luminance_cd_m2=1e5, solid_angle_sr=1e-4),
+    )  # fmt: skip
+
+
+def test_constellation_and_roll_are_equations_8_1_and_8_2():
+    forward, up = (0.3, -0.2, -1.0), (0.1, 1.0, 0.2)
+    light = (4.0, 2.0, -7.0)
+    constellation, roll = constellation_and_roll((1.0, 0.5, 0.2), forward, up, light)
+    f, away = np.array(forward), np.array(light) - (1.0, 0.5, 0.2)
+    cosine = f @ away / np.linalg.norm(f) / np.linalg.norm(away)
+    assert constellation == pytest.approx(np.degrees(np.arccos(cosine)), abs=1e-9)
+    z = -f / np.linalg.norm(f)
+    x = np.cross(up, z) / np.linalg.norm(np.cross(up, z))
+    assert roll == pytest.approx(np.degrees(np.arctan2(np.cross(z, x) @ away, x @ away)), abs=1e-9)
+    assert constellation_and_roll((0, 0, 0), (0, 0, -1), (0, 1, 0), (0, 1, -1)) == pytest.approx((45.0, 90.0))
+    # 8.1's arc cosine gives 0 here
+    assert constellation_and_roll((0, 0, 0), (0, 0, -1), (0, 1, 0), (1e-9, 0, -1))[0] == pytest.approx(5.7296e-8)
+
+
+@pytest.mark.parametrize(
+    ("change", "factor"),
+    [
+        ({}, 1.0), ({"f_number": 4.0}, 0.25), ({"iso": 400.0}, 4.0), ({"exposure_s": 0.25}, 0.5),
+        ({"luminance_cd_m2": 3e5, "solid_angle_sr": 2e-4}, 6.0), ({"f_number": 1.0, "iso": 50.0}, 2.0),
+    ],
+)  # fmt: skip
+def test_brightness_is_equation_8_3(change, factor):
+    assert brightness(planted().reference, ReplayCamera(**change)) == pytest.approx(factor)
+
+
+def test_a_setting_without_its_old_value_is_refused():
+    with pytest.raises(FlarewrightError, match="iso"):
+        brightness(Reference(f_number=2.0), ReplayCamera(iso=100.0))
+
+
+def test_roll_turns_ghosts_and_the_other_side_is_half_a_turn():
+    model = planted().replace(size_px=(161, 161), axis_px=(80.5, 80.5), halo=None, star=None)
+    right, up, left = (replay(model, 15.0, roll_deg=roll)[0].pixels for roll in (0.0, 90.0, 180.0))
+    assert right.max() > 0.0
+    assert np.allclose(np.rot90(right), up, atol=1e-5 * right.max())
+    whole = model.replace(constellation_deg=(-25.0, 25.0))
+    assert np.allclose(replay(whole, 15.0, roll_deg=180.0)[0].pixels, left)
+    ghost = whole.ghosts[0].replace(visible_deg=(-25.0, 25.0))
+    mirrored = whole.replace(ghosts=(ghost,))
+    assert np.allclose(replay(mirrored, -15.0)[0].pixels, replay(mirrored, 15.0, roll_deg=180.0)[0].pixels)
+
+
+def test_light_lies_where_the_tangent_says():
+    assert light_px(planted(), 20.0, 90.0) == pytest.approx((80.3, 44.6 - 170.0 * np.tan(np.radians(20.0))))
+
+
+def test_a_finer_picture_shows_the_same_radiance():
+    model = planted().replace(halo=None, star=None)
+    coarse = replay(model, 12.0)[0].pixels
+    fine = replay(model, 12.0, size_px=(480, 270))[0].pixels
+    average = fine.reshape(90, 3, 160, 3, 3).mean(axis=(1, 3))
+    assert np.abs(average - coarse).sum() < 0.02 * coarse.sum()
+
+
+def test_layers_add_up_and_single_ghosts_too():
+    model = planted()
+    layers = {layer.name: layer for layer in replay(model, 12.0, single=True, gain=2.0)}
+    parts = layers["ghosts"].pixels + layers["halo"].pixels + layers["starburst"].pixels
+    assert np.allclose(layers["beauty"].pixels, parts, rtol=1e-6)
+    total = np.zeros_like(parts)
+    for name in ("ghost.1", "ghost.2"):
+        x, y, w, h = layers[name].window
+        total[y : y + h, x : x + w] += layers[name].pixels
+    assert np.allclose(total, layers["ghosts"].pixels, atol=1e-6 * total.max())
+    assert "ghost.2" not in {layer.name for layer in replay(model, 22.0, single=True)}
+
+
+def test_file_and_command(tmp_path, capsys):
+    model = planted()
+    path, out, camera = tmp_path / "model.json", tmp_path / "o.exr", tmp_path / "camera.json"
+    write_ghost_model(path, model)
+    assert read_ghost_model(path) == model
+    camera.write_text(json.dumps({"light": [0.2, 0.1, -1.0], "f_number": 4.0, "size_px": [80, 45]}))
+    assert run(["measure", "replay", str(path), "--camera", str(camera), "-o", str(out), "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["brightness"] == 0.25
+    expected = replay(model, told["constellation_deg"], roll_deg=told["roll_deg"], size_px=(80, 45), gain=0.25)
+    assert np.array_equal(read_exr(out).layers[0].pixels, expected[0].pixels)
+
+
+@pytest.mark.parametrize(
+    ("text", "arguments", "message"),
+    [
+        ("{", ["--constellation", "3"], "not valid JSON"),
+        ("[]", ["--constellation", "3"], "a JSON object was expected"),
+        ('{"schema_version": 2}', ["--constellation", "3"], "newer than"),
+        ('{"size_px": [3, 3]}', ["--constellation", "3"], "axis_px"),
+        (None, [], "--constellation DEG"),
+        (None, ["--constellation", "80"], "measured from 0 to 25"),
+        (None, ["--constellation", "8", "--size", "8"], "--size"),
+    ],
+)
+def test_bad_input_is_one_sentence(tmp_path, capsys, text, arguments, message):
+    path = tmp_path / "model.json"
+    path.write_text(planted().model_dump_json() if text is None else text)
+    assert run(["measure", "replay", str(path), "-o", str(tmp_path / "o.exr"), *arguments]) == 2
+    told = capsys.readouterr().err
+    assert message in told
+    assert "Traceback" not in told
+    assert not (tmp_path / "o.exr").exists()
