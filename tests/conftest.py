@@ -7,7 +7,7 @@ import tempfile
 from pathlib import Path
 
 HERE = Path(__file__).parent
-sys.path[:0] = [str(HERE / "physics"), str(HERE / "design"), str(HERE / "measure")]
+sys.path[:0] = [str(HERE / part) for part in ("physics", "design", "measure", "predict")]
 
 # Numba notices a changed kernel but not a changed kernel that it calls, so the cache is named after all their sources
 _sources = sorted((HERE.parent / "src" / "flarewright" / "kernels").glob("*.py"))

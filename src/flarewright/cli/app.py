@@ -28,6 +28,7 @@ from . import (
     lens_show,
     lenses,
     measure_replay,
+    predict,
     project_check,
     project_init,
     project_schema,
@@ -51,6 +52,7 @@ measure_app = typer.Typer(help="Measure a real camera's flare and replay it.")
 
 app.command("render", epilog=render.EPILOG)(render.render)
 app.command("ghosts", epilog=ghosts.EPILOG)(ghosts.ghosts)
+app.command("predict", epilog=predict.EPILOG)(predict.predict)
 app.command("lenses", epilog=lenses.EPILOG)(lenses.lenses)
 app.add_typer(lens_app, name="lens")
 app.add_typer(coating_app, name="coating")

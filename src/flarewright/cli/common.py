@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 import math
 import sys
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -128,3 +129,29 @@ def chosen_fstop(f_number: float | None) -> float | None:
     if f_number is not None and not 0.3 < f_number <= 256.0:
         raise FlarewrightError(f"--fstop {f_number:g} is no f-number of a lens; choose one between 0.3 and 256")
     return f_number
+
+
+@contextmanager
+def progress_bar() -> Iterator[Callable[[str], Callable[[float, str], None]]]:
+    """Show work as bars with an estimate of the time left, where someone looks at it.
+
+    Yields
+    ------
+    callable
+        Begins the bar of a named part of the work, and returns what is called with the finished part (0 to 1) and what
+        was finished.
+    """
+    if not sys.stderr.isatty():
+        yield lambda _name: lambda _part, _words: None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bars:
+
+        def begin(name: str) -> Callable[[float, str], None]:
+            task = bars.add_task(name, total=1.0)
+            return lambda part, words: bars.update(task, completed=part, description=f"{name}: {words}")
+
+        yield begin

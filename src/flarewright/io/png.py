@@ -39,11 +39,7 @@ def write_png(path: str | PathLike[str], rgb_uint8: NDArray[np.uint8], text: Map
     -----
     PNG specification, third edition: chunks (5.3), filter type 2 "Up" (9.2), tEXt and iTXt (11.3.3).
     """
-    if rgb_uint8.ndim != 3 or rgb_uint8.shape[2] != 3 or rgb_uint8.dtype != np.uint8 or rgb_uint8.size == 0:
-        raise FlarewrightError(
-            f"a PNG is made of 8-bit RGB pixels, shape (height, width, 3), not {rgb_uint8.dtype} {rgb_uint8.shape}"
-        )
-    data = _encode(rgb_uint8, text)
+    data = encode_png(rgb_uint8, text)
 
     def write(temporary: Path) -> None:
         temporary.write_bytes(data)
@@ -51,7 +47,13 @@ def write_png(path: str | PathLike[str], rgb_uint8: NDArray[np.uint8], text: Map
     write_atomically(Path(path), write)
 
 
-def _encode(rgb: NDArray[np.uint8], text: Mapping[str, str]) -> bytes:
+def encode_png(rgb_uint8: NDArray[np.uint8], text: Mapping[str, str]) -> bytes:
+    """Return a picture as the bytes of a PNG file; parameters, errors and source as `write_png`."""
+    rgb = rgb_uint8
+    if rgb.ndim != 3 or rgb.shape[2] != 3 or rgb.dtype != np.uint8 or rgb.size == 0:
+        raise FlarewrightError(
+            f"a PNG is made of 8-bit RGB pixels, shape (height, width, 3), not {rgb.dtype} {rgb.shape}"
+        )
     height, width, _ = rgb.shape
     rows = rgb.reshape(height, width * 3)
     # The difference to the row above (modulo 256) is small in smooth pictures, so it packs well.

@@ -1,0 +1,204 @@
+"""Statistic functions: estimators over the constellation, sampled where they bend (Walch 2017, chapter 9)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .statistics import NAMES, Statistics
+from .table import FlareTable
+
+Floats = NDArray[np.float64]
+Progress = Callable[[float, str], None]
+
+# constellations drawn before any refinement, and the least distance between two, degrees
+FIRST, LEAST_DEG = 13, 0.2
+# what is fainter than this part of a curve's maximum need not be followed closely
+FAINT = 1e-3
+
+__all__ = ["Check", "Curves", "bins_of", "check_curves", "sample_curves"]
+
+
+@dataclass(frozen=True)
+class Curves:
+    """Statistics over the constellation.
+
+    Attributes
+    ----------
+    constellation_deg : ndarray, shape (N,)
+        Rising.
+    values : ndarray, shape (N, 5)
+        Columns in the order of `statistics.NAMES`.
+    roll_deg : float
+    worst_step : float
+        Largest error of a straight line between two samples that is expected where sampling ended, as `tolerance`.
+    """
+
+    constellation_deg: Floats
+    values: Floats
+    roll_deg: float
+    worst_step: float
+
+    def column(self, name: str) -> Floats:
+        """Return one statistic over the constellation, shape (N,)."""
+        return self.values[:, NAMES.index(name)]
+
+    def at(self, constellation_deg: float) -> Statistics:
+        """Return the statistics by straight lines between the samples."""
+        found = [float(np.interp(constellation_deg, self.constellation_deg, column)) for column in self.values.T]
+        return Statistics(*found)
+
+
+@dataclass(frozen=True)
+class Check:
+    """Curves against renders of their own at constellations between the samples.
+
+    Attributes
+    ----------
+    constellation_deg : ndarray, shape (M,)
+    predicted, rendered : ndarray, shape (M, 5)
+    """
+
+    constellation_deg: Floats
+    predicted: Floats
+    rendered: Floats
+
+    @property
+    def ratio(self) -> Floats:
+        """Predicted over rendered, shape (M, 5); NaN where the render is black."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.asarray(np.where(self.rendered > 0.0, self.predicted / self.rendered, np.nan))
+
+
+def sample_curves(
+    table: FlareTable,
+    *,
+    to_deg: float | None = None,
+    roll_deg: float = 0.0,
+    tolerance: float = 0.03,
+    most: int = 64,
+    progress: Progress | None = None,
+) -> Curves:
+    """Draw the flare at constellations chosen so that straight lines between them are good enough.
+
+    Parameters
+    ----------
+    table : FlareTable
+    to_deg : float, optional
+        The largest constellation; None: the flare's reach.
+    roll_deg : float
+    tolerance : float
+        Error of a line that is good enough, of sum, mean, maximum and log-average alike, relative to the geometric mean
+        of the value and the curve's maximum: a tenth as much flare may err by three times the share.
+    most : int
+        Drawn constellations; sampling ends there at the latest, and says so by `worst_step`.
+    progress : callable, optional
+        Called with the finished part and what was drawn.
+
+    Returns
+    -------
+    Curves
+
+    Notes
+    -----
+    The interval whose last halving showed the largest error is halved next. An even sweep of `FIRST` constellations
+    comes first, so that a narrow peak between two of them may be missed; `check_curves` looks at others.
+    """
+    end = table.flare.reach_deg if to_deg is None else to_deg
+    known: dict[float, Floats] = {}
+
+    def draw(angle: float) -> Floats:
+        if angle not in known:
+            known[angle] = table.at(angle, roll_deg).values
+            if progress is not None:
+                progress(min(len(known) / most, 1.0), f"{angle:.2f} degrees")
+        return known[angle]
+
+    first = [float(angle) for angle in np.linspace(0.0, end, min(FIRST, most))]
+    for angle in first:
+        draw(angle)
+    # (error found when the interval was made, from, to)
+    waiting = [(np.inf, a, b) for a, b in pairwise(first)]
+    while len(known) < most:
+        waiting.sort(key=lambda one: (-one[0], one[1]))
+        error, a, b = waiting[0] if waiting else (0.0, 0.0, 0.0)
+        if error <= tolerance:
+            break
+        before = waiting.pop(0)[0]
+        middle = 0.5 * (a + b)
+        found = draw(middle)
+        peak = np.max(list(known.values()), axis=0)
+        line = 0.5 * (known[a] + known[b])
+        off = np.abs(found - line) / np.maximum(np.sqrt(np.maximum(found, FAINT * peak) * peak), 1e-30)
+        error = float(off[_FOLLOWED].max())
+        if b - a > 2.0 * LEAST_DEG:
+            # a halved interval of a smooth curve errs a quarter as much; one that crosses its line by chance does not
+            left = 0.25 * max(error, 0.25 * before if before < np.inf else 0.0)
+            waiting += [(left, a, middle), (left, middle, b)]
+    angles = np.array(sorted(known))
+    worst = max((one[0] for one in waiting), default=0.0)
+    return Curves(angles, np.array([known[angle] for angle in angles]), roll_deg, float(worst))
+
+
+# the minimum of a picture is mostly 0 and says little: it is told and not followed
+_FOLLOWED = [NAMES.index(name) for name in ("sum_mm2", "mean", "maximum", "log_average")]
+
+
+def check_curves(curves: Curves, judge: FlareTable, count: int, progress: Progress | None = None) -> Check:
+    """Draw the flare at constellations where the curves have no sample and compare.
+
+    Parameters
+    ----------
+    curves : Curves
+    judge : FlareTable
+        Of a flare of better quality, over the same frame.
+    count : int
+    progress : callable, optional
+
+    Returns
+    -------
+    Check
+        At the middles of the intervals between samples that lie nearest to an even spread.
+    """
+    at = curves.constellation_deg
+    middles = 0.5 * (at[1:] + at[:-1])
+    wanted = np.linspace(0.0, at[-1], count + 2)[1:-1]
+    chosen = sorted({float(middles[int(np.argmin(np.abs(middles - angle)))]) for angle in wanted})
+    rendered = []
+    for k, angle in enumerate(chosen):
+        rendered.append(judge.at(angle, curves.roll_deg).values)
+        if progress is not None:
+            progress((k + 1) / len(chosen), f"check at {angle:.2f} degrees")
+    predicted = [curves.at(angle).values for angle in chosen]
+    return Check(np.array(chosen), np.array(predicted).reshape(-1, len(NAMES)), np.array(rendered).reshape(-1, 5))
+
+
+def bins_of(values: Floats, count: int) -> tuple[Floats, NDArray[np.int64]]:
+    """Divide the range of a curve between its extremes into even bins.
+
+    Parameters
+    ----------
+    values : ndarray, shape (N,)
+    count : int
+        Bins.
+
+    Returns
+    -------
+    edges : ndarray, shape (count + 1,)
+    bins : ndarray, shape (N,)
+        1 (least flare) to `count` (most); 1 throughout for a curve without range.
+
+    Notes
+    -----
+    Walch 2017, section 9.2: how a constellation compares with all others.
+    """
+    low, high = float(values.min()), float(values.max())
+    edges = np.linspace(low, high, count + 1)
+    if high <= low:
+        return edges, np.ones(len(values), dtype=np.int64)
+    part = (values - low) / (high - low)
+    return edges, np.minimum(np.floor(part * count).astype(np.int64) + 1, count)

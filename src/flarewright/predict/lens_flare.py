@@ -1,0 +1,111 @@
+"""The flare of a lens: rendered at any constellation by the one renderer."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+
+from ..model import Camera, Layer, Output, Project, Quality
+from ..optics.constellation import field_angles
+from ..render.prepare import Settled, as_lens, settle
+from ..render.render import render
+from ..render.shot import make_opening, make_shots
+from .flare import Flare, Frame
+
+# field angles are below 90 degrees, and grazing light carries nothing
+REACH_DEG = 85.0
+# pixels across what is drawn for statistics; a flare is smooth but for its brightest spots
+SIDE_PX = 192
+
+__all__ = ["lens_flare", "square_flare", "statistics_quality"]
+
+
+def statistics_quality(mode: str) -> Quality:
+    """Return the quality that pictures for statistics are drawn in: coarse in what an average does not see.
+
+    Parameters
+    ----------
+    mode : {"draft", "final"}
+    """
+    return Quality.model_validate({"mode": mode, "wavelengths": 3, "bridge": False, "tolerance_px": 2.0})
+
+
+def lens_flare(project: Project, *, threads: int | None = None) -> Flare:
+    """Return the flare of a project's lens and first light.
+
+    Parameters
+    ----------
+    project : Project
+        Its first light is moved about; its spectrum and disc stay, its intensity becomes 1.
+    threads : int, optional
+
+    Returns
+    -------
+    Flare
+        Over the project's sensor.
+
+    Raises
+    ------
+    FlarewrightError
+        As `settle`, and later as `render`.
+    """
+    light = project.lights[0].replace(intensity=1.0, distance=None, field_deg=(0.0, 0.0))
+    prepared = project.replace(lights=(light,), output=Output(layers="passes", starburst=False))
+    settled = settle(prepared)
+    # the lens is loaded once; what `settle` reads from the project besides it costs nothing
+    prepared = settled.project.replace(lens=as_lens(prepared.lens))
+    summary = render(prepared.replace(quality=Quality(mode="draft", wavelengths=3))).summary
+
+    def draw(constellation_deg: float, roll_deg: float) -> Sequence[Layer]:
+        there = light.replace(field_deg=field_angles(constellation_deg, roll_deg))
+        return render(prepared.replace(lights=(there,)), threads=threads).layers
+
+    width, height = prepared.camera.sensor
+    return Flare(
+        name=settled.lens.name,
+        draw=draw,
+        size_px=prepared.camera.size_px,
+        sensor=Frame(width, height),
+        f_number=settled.order.f_number,
+        efl=settled.order.efl,
+        scene_scale=float(summary["scene_irradiance_per_radiance"]),
+        turns=_turns(settled),
+        reach_deg=REACH_DEG,
+        fingerprint=hashlib.sha256(prepared.model_dump_json().encode()).hexdigest(),
+        remarks=settled.remarks,
+    )
+
+
+def square_flare(project: Project, quality: Quality, *, threads: int | None = None) -> tuple[Flare, Frame]:
+    """Return the flare of a project's lens for a `FlareTable`, and the frame of its sensor.
+
+    Parameters
+    ----------
+    project : Project
+    quality : Quality
+    threads : int, optional
+
+    Returns
+    -------
+    flare : Flare
+        Over a square as wide as the sensor's diagonal, or over the sensor when the roll does more than turn the flare.
+    frame : Frame
+    """
+    frame = Frame(*project.camera.sensor)
+    quality = quality.replace(paths=project.quality.paths)
+    turned = project.replace(quality=quality, camera=_square(project, frame))
+    if _turns(settle(turned)):
+        return lens_flare(turned, threads=threads), frame
+    high = max(1, round(SIDE_PX * frame.height / frame.width))
+    camera = project.camera.replace(size_px=(SIDE_PX, high), sensor_mm=(frame.width, frame.height))
+    return lens_flare(project.replace(quality=quality, camera=camera), threads=threads), frame
+
+
+def _square(project: Project, frame: Frame) -> Camera:
+    square: Camera = project.camera.replace(size_px=(SIDE_PX, SIDE_PX), sensor_mm=(frame.diagonal, frame.diagonal))
+    return square
+
+
+def _turns(settled: Settled) -> bool:
+    """Whether roll only turns the flare: blades turn with the light then, which moves corners and no light."""
+    return all(shot.packed.symmetric for shot in make_shots(settled, make_opening(settled, None)))

@@ -1,0 +1,236 @@
+"""The occurrence of flare for one camera: curves, their extremes and bins, contrast, and how far all of it holds."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..render.glare import VeilingGlare
+from .contrast import contrast
+from .curves import Check, Curves, Progress, bins_of, check_curves, sample_curves
+from .flare import Flare, Frame
+from .statistics import NAMES
+from .table import FlareTable
+
+Floats = NDArray[np.float64]
+
+# pictures in the report
+SHOWN = 8
+
+__all__ = ["Flares", "Occurrence", "Setting", "Wanted", "contrast_curve", "occurrence_data", "predict_occurrence"]
+
+
+@dataclass(frozen=True)
+class Flares:
+    """One camera's flare in the forms that a prediction needs.
+
+    Attributes
+    ----------
+    sampled : Flare
+        For statistics, many times; one that turns covers a square.
+    frame : Frame
+        The camera's sensor.
+    quality : str
+        Of `sampled`: "draft", "final" or "measured".
+    judge : Flare or None
+        As `sampled` at full quality; None: there is nothing better.
+    shown : Flare
+        Over the frame, to be looked at.
+    """
+
+    sampled: Flare
+    frame: Frame
+    quality: str
+    judge: Flare | None
+    shown: Flare
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What the curves are put into the context of.
+
+    Attributes
+    ----------
+    illuminance_lx : float
+        That the light gives on a plane facing it.
+    luminance_cd_m2 : tuple of float or None
+        Darkest and brightest of the scene; None: no scene, no contrast.
+    """
+
+    illuminance_lx: float = 1e5
+    luminance_cd_m2: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What to predict.
+
+    Attributes
+    ----------
+    to_deg : float or None
+        Largest constellation; None: as far as the flare is known.
+    roll_deg : float
+    tolerance : float
+    samples : int
+        As in `curves.sample_curves`.
+    checks : int
+        Constellations at which the judge is asked.
+    bins : int
+    setting : Setting
+    pictures : bool
+    """
+
+    to_deg: float | None = None
+    roll_deg: float = 0.0
+    tolerance: float = 0.03
+    samples: int = 48
+    checks: int = 4
+    bins: int = 5
+    setting: Setting = Setting()
+    pictures: bool = False
+
+
+@dataclass(frozen=True)
+class Occurrence:
+    """What `flarewright predict LENS` tells.
+
+    Attributes
+    ----------
+    flare : Flare
+        As it was sampled.
+    frame : Frame
+    quality : str
+        "draft", "final" or "measured".
+    curves : Curves
+    bins : int
+    check : Check or None
+    glare : VeilingGlare or None
+    setting : Setting
+    pictures : tuple of (float, ndarray)
+        Constellations and linear pictures of them, shape (H, W, 3).
+    """
+
+    flare: Flare
+    frame: Frame
+    quality: str
+    curves: Curves
+    bins: int
+    check: Check | None
+    glare: VeilingGlare | None
+    setting: Setting
+    pictures: tuple[tuple[float, NDArray[np.float32]], ...] = ()
+
+    @property
+    def veil_cd_m2(self) -> Floats:
+        """Mean flare as the luminance of a scene that would light the sensor as much, over the constellation."""
+        return self.curves.column("mean") * self.setting.illuminance_lx / self.flare.scene_scale
+
+
+def predict_occurrence(flares: Flares, wanted: Wanted, told: Callable[[str], Progress]) -> Occurrence:
+    """Sample, check and picture the flare of a camera over the constellation.
+
+    Parameters
+    ----------
+    flares : Flares
+    wanted : Wanted
+    told : callable
+        Returns where progress of a named part of the work is told.
+
+    Returns
+    -------
+    Occurrence
+        Without the veiling glare, which takes a lens.
+    """
+    table = FlareTable(flares.sampled, flares.frame)
+    curves = sample_curves(
+        table, to_deg=wanted.to_deg, roll_deg=wanted.roll_deg, tolerance=wanted.tolerance, most=wanted.samples,
+        progress=told("curves"),
+    )  # fmt: skip
+    check = None
+    if flares.judge is not None and wanted.checks > 0:
+        check = check_curves(curves, FlareTable(flares.judge, flares.frame), wanted.checks, told("checks"))
+    pictures = []
+    if wanted.pictures:
+        progress = told("pictures")
+        for k, angle in enumerate(angles := _worth_a_look(curves)):
+            pictures.append((angle, flares.shown.picture(angle, wanted.roll_deg)))
+            progress((k + 1) / len(angles), f"{angle:.1f} degrees")
+    return Occurrence(
+        flares.sampled, flares.frame, flares.quality, curves, wanted.bins, check, None, wanted.setting, tuple(pictures)
+    )
+
+
+def _worth_a_look(curves: Curves) -> list[float]:
+    """Choose constellations for pictures: the extremes, and an even spread over where most of the flare is."""
+    at, flux = curves.constellation_deg, curves.column("sum_mm2")
+    lit = at[flux > 0.01 * flux.max()] if flux.max() > 0.0 else at
+    chosen = {float(at[int(np.argmax(curves.column(name)))]) for name in ("maximum", "log_average")}
+    for angle in np.linspace(0.0, float(lit.max()), SHOWN - len(chosen)):
+        chosen.add(float(at[int(np.argmin(np.abs(at - angle)))]))
+    return sorted(chosen)
+
+
+def contrast_curve(found: Occurrence) -> Floats | None:
+    """Return K_real / K_ideal over the constellation, or None without a scene."""
+    if found.setting.luminance_cd_m2 is None:
+        return None
+    low, high = found.setting.luminance_cd_m2
+    return np.array([contrast(high, low, float(veil)).ratio for veil in found.veil_cd_m2])
+
+
+def occurrence_data(found: Occurrence) -> dict[str, Any]:
+    """Return all of it as what `--json` prints."""
+    curves, flare = found.curves, found.flare
+    at = curves.constellation_deg
+    statistics: dict[str, Any] = {}
+    for name in NAMES:
+        values = curves.column(name)
+        edges, bins = bins_of(values, found.bins)
+        low, high = int(np.argmin(values)), int(np.argmax(values))
+        statistics[name] = {
+            "values": values.tolist(),
+            "least": {"value": float(values[low]), "constellation_deg": float(at[low])},
+            "most": {"value": float(values[high]), "constellation_deg": float(at[high])},
+            "bin_edges": edges.tolist(),
+            "bins": bins.tolist(),
+        }
+    data: dict[str, Any] = {
+        "camera": flare.name,
+        "f_number": flare.f_number,
+        "efl_mm": flare.efl,
+        "frame_mm": [found.frame.width, found.frame.height],
+        "pixel_mm": flare.pitch_mm,
+        "quality": found.quality,
+        "roll_deg": curves.roll_deg,
+        "scene_irradiance_per_radiance": flare.scene_scale,
+        "constellation_deg": at.tolist(),
+        "statistics": statistics,
+        "worst_step": curves.worst_step,
+        "illuminance_lx": found.setting.illuminance_lx,
+        "veil_cd_m2": found.veil_cd_m2.tolist(),
+    }
+    ratio = contrast_curve(found)
+    if ratio is not None and found.setting.luminance_cd_m2 is not None:
+        low_cd, high_cd = found.setting.luminance_cd_m2
+        data["scene_luminance_cd_m2"] = [low_cd, high_cd]
+        data["k_ideal"] = contrast(high_cd, low_cd, 0.0).k_ideal
+        data["k_ratio"] = ratio.tolist()
+    if found.check is not None:
+        data["check"] = {
+            "constellation_deg": found.check.constellation_deg.tolist(),
+            **{
+                name: {
+                    "predicted": found.check.predicted[:, k].tolist(),
+                    "rendered": found.check.rendered[:, k].tolist(),
+                }
+                for k, name in enumerate(NAMES)
+            },
+        }
+    if found.glare is not None:
+        data["veiling_glare"] = asdict(found.glare)
+    data["remarks"] = list(flare.remarks)
+    return data
