@@ -194,6 +194,16 @@ PROJECT_FILES = {
         PROJECT + "[imperfection]\nseed = 1\ntilt_arcmin = -1\n",
         "imperfection.tilt_arcmin",
     ),
+    "holdout of nothing": (PROJECT + "[holdout]\noverscan = 2\n", "a holdout is an image or a depth plate"),
+    "holdout with a misspelt key": (PROJECT + "[holdout]\nimages = 'a'\n", "did you mean 'image'"),
+    "holdout that covers less than the picture": (
+        PROJECT + "[holdout]\nimage = 'a.png'\noverscan = 0.5\n",
+        "holdout.overscan",
+    ),
+    "a light's holdout of both kinds": (
+        PROJECT + "holdout = { image = 'a.png', depth = 'a.exr' }\n",
+        "lights[0].holdout",
+    ),
     "negative sensor": (PROJECT + "[camera]\nsensor_mm = [-36, 24]\n", "above 0 mm"),
 }
 
@@ -210,6 +220,10 @@ COMMAND_LINES = {
     "too many distances": (
         [*H, *GOOD, "--distance", "5", "--distance", "6"], "--distance is given 2 times for 1 light"),
     "moon": ([*H, "--light", "moon@1,1", "-o", "a.exr"], "there is no 'moon'"),
+    "holdout that is not there": ([*H, *GOOD, "--holdout", "no.png"], "--holdout no.png does not exist"),
+    "depth that is not there": ([*H, *GOOD, "--depth", "no.exr"], "--depth no.exr does not exist"),
+    "holdout and depth": (
+        [*H, *GOOD, "--holdout", "no.png", "--depth", "no.exr"], "--holdout and --depth both say what hides"),
     "sun nowhere": ([*H, "--light", "sun", "-o", "a.exr"], "--light sun@10,5"),
     "rectangle of words": ([*H, *GOOD, "--light-size", "big"], "--light-size 'big' is not two numbers"),
     "rectangle below zero": ([*H, *GOOD, "--light-size", "-1x2"], "--light-size"),

@@ -6,12 +6,13 @@ from judge import judge, probabilities
 
 from flarewright.errors import ProjectError
 from flarewright.model import Camera, Light, Lines, Output, Polygon, Project, Quality, Rectangle
+from flarewright.optics.border import closed
 from flarewright.optics.color import luminance_weights
 from flarewright.optics.source import outline, parts
 from flarewright.render.prepare import settle
 from flarewright.render.render import render
 from flarewright.render.shot import make_opening, make_shots
-from flarewright.render.spread import covered, polygon_kernel, spread, spread_within
+from flarewright.render.spread import covered, shape_kernel, spread, spread_within
 
 D_LINE = Lines(lines=((587.56, 1.0),))
 SIZE = (240, 160)
@@ -199,24 +200,24 @@ def test_shapes_that_cannot_be(how, words):
 
 def test_coverage_is_exact():
     square = np.array([[1.25, 2.5], [3.75, 2.5], [3.75, 4.0], [1.25, 4.0]])
-    found = covered(square, (6, 6))
+    found = covered(closed(square), (6, 6))
     assert abs(found.sum()) == pytest.approx(2.5 * 1.5)
     assert np.abs(found[3]) == pytest.approx([0.0, 0.75, 1.0, 0.75, 0.0, 0.0])
     assert np.abs(found[2]) == pytest.approx([0.0, 0.375, 0.5, 0.375, 0.0, 0.0])
     # concave, either way round, and the mean place of its light
     corners = np.tan(np.radians(np.array(L_SHAPE.corners_deg))) * 400.0
-    kernel = polygon_kernel(corners - corners.mean(axis=0))
+    kernel = shape_kernel(closed(corners - corners.mean(axis=0)))
     assert kernel.sum() == pytest.approx(1.0)
-    assert kernel == pytest.approx(polygon_kernel((corners - corners.mean(axis=0))[::-1]))
+    assert kernel == pytest.approx(shape_kernel(closed((corners - corners.mean(axis=0))[::-1])))
     # as good as no area: a line, a dot
-    assert polygon_kernel(np.zeros((4, 2)))[1, 1] == pytest.approx(1.0)
+    assert shape_kernel(closed(np.zeros((4, 2))))[1, 1] == pytest.approx(1.0)
 
 
 def test_a_window_is_spread_like_the_whole():
     rng = np.random.default_rng(4)
     sheet = np.zeros((50, 60, 3))
     sheet[0:9, 40:60] = rng.random((9, 20, 3))
-    kernel = polygon_kernel(np.array([[-4.0, -3.0], [6.0, -1.0], [2.0, 5.0]]))
+    kernel = shape_kernel(closed(np.array([[-4.0, -3.0], [6.0, -1.0], [2.0, 5.0]])))
     a, b = (side // 2 for side in kernel.shape)
     whole = spread(sheet, kernel)[a:-a, b:-b]
     assert np.abs(spread_within(sheet, kernel) - whole).max() < 1e-12

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from flarewright.model import Art, Camera, Dirt, Iris, Light, Output, Project, Quality, Starburst
+from flarewright.optics.border import closed
 from flarewright.optics.diffraction import Pattern, Soil, pupil_pattern
 from flarewright.optics.dirt import FIELD, Elements, lay_elements, rasterise, scattered
 from flarewright.optics.pupil import FFT_SIZE, WINDOW, pupil_amplitude
@@ -15,7 +16,7 @@ from flarewright.render.direct import PUPIL_SPAN, direct_image, traced_pupil
 from flarewright.render.prepare import settle
 from flarewright.render.render import render
 from flarewright.render.shot import make_opening, make_shots
-from flarewright.render.spread import polygon_kernel, spread
+from flarewright.render.spread import shape_kernel, spread
 from flarewright.render.starburst import starburst_layer
 
 GREEN = (np.array([550.0]), np.ones((1, 3)))
@@ -200,7 +201,7 @@ def test_disc_blur_of_a_dot_is_the_disc():
     dot = np.zeros((41, 51, 1))
     dot[20, 25] = 1.0
     angle = np.linspace(0.0, 2.0 * math.pi, 400, endpoint=False)
-    disc = spread(dot, polygon_kernel(np.stack([7.0 * np.cos(angle), 5.0 * np.sin(angle)], axis=1)))[..., 0]
+    disc = spread(dot, shape_kernel(closed(np.stack([7.0 * np.cos(angle), 5.0 * np.sin(angle)], axis=1))))[..., 0]
     assert disc.sum() == pytest.approx(1.0, rel=1e-12)
     y, x = np.mgrid[-20:21, -25:26]
     assert disc[(x / 7) ** 2 + (y / 5) ** 2 < 0.7] == pytest.approx(1 / (math.pi * 35), rel=0.01)

@@ -18,6 +18,7 @@ def check(
     from ..io.project_file import read_project
     from ..optics.pack import resolve_coatings
     from ..render.art import resolve_art
+    from ..render.holdout import read_plates
     from ..render.prepare import settle
     from ..render.scatter import check_scatter
 
@@ -25,6 +26,8 @@ def check(
     resolve_coatings(settled.lens, settled.coating)
     resolve_art(settled)
     check_scatter(settled)
+    for light in settled.project.lights:
+        read_plates(settled.project, light)
     if as_json:
         print_json(
             {

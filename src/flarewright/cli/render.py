@@ -75,6 +75,14 @@ def render(
             rich_help_panel=_LIGHT,
         ),
     ] = None,
+    holdout: Annotated[
+        Path | None,
+        typer.Option(help="An image of the picture's shape; its black hides lights.", rich_help_panel=_LIGHT),
+    ] = None,
+    depth: Annotated[
+        Path | None,
+        typer.Option(help="An EXR depth plate in metres: what is nearer hides lights.", rich_help_panel=_LIGHT),
+    ] = None,
     fstop: Annotated[
         float | None, typer.Option(help="f-number; wide open when left out.", rich_help_panel=_LENS)
     ] = None,
@@ -324,6 +332,7 @@ def render(
         orders=orders, order4_limit=order4_limit,
         seed=seed, error=error, error_of=error_of, samples=samples, resumed=None if state is None else state.project,
         ringing=ringing, scatter=scatter, surface_roughness=surface_roughness, cleanliness=cleanliness,
+        holdout=holdout, depth=depth,
         zoom=zoom, filter_plate=filter_plate, imperfection=imperfection, ghost_offset=ghost_offset,
         cover_glass=cover_glass, sensor_reflectance=sensor_reflectance, squeeze=squeeze, desqueeze=desqueeze,
     )  # fmt: skip
@@ -353,6 +362,8 @@ def _keep_inputs(settings: Project, project_file: Path | None, outputs: list[Pat
     """Refuse to write over a file that this render reads."""
     read = [project_file, settings.lens if isinstance(settings.lens, str) else None]
     read += [settings.iris.mask if settings.iris is not None else None, settings.dirt.image]
+    for hiding in (settings.holdout, *(light.holdout for light in settings.lights)):
+        read += [] if hiding is None else [hiding.image, hiding.depth]
     for source in read:
         for output in outputs:
             if source is not None and Path(source).exists() and output.exists() and output.samefile(source):

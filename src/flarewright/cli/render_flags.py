@@ -13,7 +13,7 @@ from ..errors import ProjectError
 from ..io.plate_text import parse_imperfection, parse_plate
 from ..io.project_file import ProjectFileError, explain, parse_coating_choice, read_project
 from ..io.spectrum_text import parse_spectrum
-from ..model import Art, Iris, Light, Project, Rule, Scatter
+from ..model import Art, Holdout, Iris, Light, Project, Rule, Scatter
 from ..model.art import PASSES
 from ..model.light import SUN_DEG
 from .common import field_angles, pair
@@ -116,6 +116,8 @@ class Flags:
     scatter: str | None = None
     surface_roughness: float | None = None
     cleanliness: float | None = None
+    holdout: Path | None = None
+    depth: Path | None = None
     orders: int | None = None
     order4_limit: float | None = None
     seed: int | None = None
@@ -174,10 +176,12 @@ def build_project(flags: Flags) -> Project:
         if given:
             fields[section] = {**(dict(getattr(base, section)) if base else {}), **given}
     said = base.scatter if base else None
-    if (scatter := scatter_flags(flags.scatter, flags.surface_roughness, flags.cleanliness, said)) is not None:
-        fields["scatter"] = scatter
-    if (art := _art(flags, base.art if base else Art())) is not None:
-        fields["art"] = art
+    changed = {
+        "scatter": scatter_flags(flags.scatter, flags.surface_roughness, flags.cleanliness, said),
+        "holdout": _holdout(flags, base.holdout if base else None),
+        "art": _art(flags, base.art if base else Art()),
+    }
+    fields |= {section: table for section, table in changed.items() if table is not None}
     try:
         return Project.model_validate(fields)
     except ValidationError as error:
@@ -307,6 +311,21 @@ def _iris(flags: Flags, lens: Any, base: Project | None) -> dict[str, Any] | Non
     else:
         iris = lens.iris if lens is not None else Iris()
     return {**dict(iris), **given}
+
+
+def _holdout(flags: Flags, base: Holdout | None) -> dict[str, Any] | None:
+    """Return what hides lights with the flags' file, or None when no flag names one."""
+    given = {"image": flags.holdout, "depth": flags.depth}
+    if flags.holdout is not None and flags.depth is not None:
+        raise ProjectError("--holdout and --depth both say what hides the lights; give one of them")
+    for flag, path in (("--holdout", flags.holdout), ("--depth", flags.depth)):
+        if path is not None and not path.is_file():
+            what = "a grey PNG or EXR image" if flag == "--holdout" else "an EXR depth plate"
+            raise ProjectError(f"{flag} {path} does not exist; give {what} in the picture's frame")
+    if flags.holdout is None and flags.depth is None:
+        return None
+    kept = dict(base) if base is not None and (base.image is None) == (flags.holdout is None) else {}
+    return {**kept, **{key: None if path is None else str(path) for key, path in given.items()}}
 
 
 def scatter_flags(

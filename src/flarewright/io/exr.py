@@ -189,6 +189,52 @@ def read_exr(path: str | PathLike[str]) -> ExrContents:
     return ExrContents(tuple(layers), size, kind, metadata, header)
 
 
+def read_exr_plane(path: str | PathLike[str], choices: Sequence[Sequence[str]]) -> NDArray[np.float64]:
+    """Read one plane of any EXR file, over its display window.
+
+    Parameters
+    ----------
+    path : path
+    choices : sequence of sequence of str
+        Channels whose mean is wanted; of several choices the first that the file has. A file of a single channel may
+        call it what it likes.
+
+    Returns
+    -------
+    ndarray, shape (H, W)
+        0 outside the data window.
+
+    Raises
+    ------
+    OSError
+        When it is no readable EXR file.
+    ValueError
+        When it has no such channels.
+    """
+    import OpenEXR
+
+    try:
+        file = OpenEXR.File(str(path), separate_channels=True)
+    except RuntimeError as error:
+        raise OSError(str(error).rstrip(".")) from error
+    known = [name for part in file.parts for name in part.channels]
+    wanted = [*choices, known] if len(known) == 1 else choices
+    found = [(part, names) for names in wanted for part in file.parts if all(name in part.channels for name in names)]
+    if not found:
+        told = " or ".join("".join(names) for names in choices)
+        raise ValueError(f"it has no channel {told}; its channels are {', '.join(known[:8]) or 'none'}")
+    part, names = found[0]
+    low, high = part.header["displayWindow"]
+    left, top = (int(a) - int(b) for a, b in zip(part.header["dataWindow"][0], low, strict=True))
+    width, height = (int(b) - int(a) + 1 for a, b in zip(low, high, strict=True))
+    pixels = np.mean([np.asarray(part.channels[name].pixels, dtype=np.float64) for name in names], axis=0)
+    plane = np.zeros((height, width))
+    inside = pixels[max(-top, 0) : max(height - top, 0), max(-left, 0) : max(width - left, 0)]
+    top, left = max(top, 0), max(left, 0)
+    plane[top : top + inside.shape[0], left : left + inside.shape[1]] = inside
+    return plane
+
+
 def _prefixed(header: Mapping[str, Any], prefix: str) -> dict[str, Any]:
     return {name.removeprefix(prefix): value for name, value in header.items() if name.startswith(prefix)}
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ProjectError
-from .exr import read_exr
+from .exr import read_exr_plane
 
 # a finer mask only costs time: its edges are antialiased
 LARGEST = 4096
@@ -68,6 +68,5 @@ def _read_picture(path: Path) -> NDArray[np.float64]:
 
 
 def _read_exr(path: Path) -> NDArray[np.float64]:
-    first = read_exr(path).layers[0]
-    pixels: NDArray[np.float64] = np.asarray(first.pixels, dtype=np.float64).mean(axis=2)
-    return pixels
+    # a matte may have one channel, or grey with alpha
+    return read_exr_plane(path, (("R", "G", "B"), ("Y",), ("R",), ("A",)))

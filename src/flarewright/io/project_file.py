@@ -30,6 +30,7 @@ from ..model import project as choices
 from ..model import scatter as scatters
 from ..model import starburst as starbursts
 from ..model.camera import Camera
+from ..model.holdout import Holdout
 from ..model.imperfection import Imperfection
 from ..model.iris import Iris
 from ..model.lens import Lens, Surface
@@ -38,7 +39,7 @@ from ..model.project import CoatingChoice, Output, Project, Quality
 from .coating_text import coating_from, parse_coating, read_coating_file
 from .lens_file import lens_from_table
 from .plate_text import parse_plate
-from .project_text import ABOUT, lens_location, project_text
+from .project_text import ABOUT, FILES, HOLDOUT_FILES, lens_location, project_text
 from .sentences import count, did_you_mean, shorten
 from .spectrum_text import parse_spectrum
 from .text_file import read_toml
@@ -152,9 +153,8 @@ def _expanded(data: dict[str, Any], folder: Path, problems: list[str]) -> dict[s
         case other:
             problems.append(f"lens should be a name, a file or a table, not {shorten(other)}")
             out["lens"] = "?"
-    for section, key in (("iris", "mask"), ("dirt", "image")):
-        if isinstance(out.get(section), dict) and isinstance(out[section].get(key), str):
-            out[section] = {**out[section], key: str(folder / out[section][key])}
+    for section, *keys in FILES:
+        _expand_paths(out, section, keys, folder)
     if "coating" in out:
         try:
             out["coating"] = _coating(out["coating"], folder)
@@ -166,6 +166,13 @@ def _expanded(data: dict[str, Any], folder: Path, problems: list[str]) -> dict[s
     if isinstance(out.get("lights"), list):
         out["lights"] = [_light(light, f"lights[{k}]", folder, problems) for k, light in enumerate(out["lights"])]
     return out
+
+
+def _expand_paths(out: dict[str, Any], section: str, keys: list[str], folder: Path) -> None:
+    """Let the paths in a table start at the project's folder."""
+    table = out.get(section)
+    if isinstance(table, dict):
+        out[section] = {**table, **{key: str(folder / table[key]) for key in keys if isinstance(table.get(key), str)}}
 
 
 def _expand_plate(out: dict[str, Any], section: str, key: str, problems: list[str]) -> None:
@@ -221,6 +228,9 @@ def _coating(value: Any, folder: Path) -> Any:
 
 
 def _light(light: Any, where: str, folder: Path, problems: list[str]) -> Any:
+    if isinstance(light, dict):
+        light = dict(light)
+        _expand_paths(light, "holdout", list(HOLDOUT_FILES), folder)
     if not isinstance(light, dict) or not isinstance(light.get("spectrum"), str):
         return light
     try:
@@ -346,6 +356,7 @@ _SECTIONS: dict[str, tuple[type[BaseModel], ...]] = {
     "dirt": (starbursts.Dirt,),
     "starburst": (starbursts.Starburst,),
     "scatter": (scatters.Scatter,),
+    "holdout": (Holdout,),
     "art": (arts.Art,),
     "rules": (arts.Rule,),
     "lens": (Lens,),

@@ -17,6 +17,10 @@ from .spectrum_text import spectrum_text
 LENS_SUFFIXES = (".toml", ".lens", ".json", ".zmx", ".seq")
 """What ends like this is a lens file; any other word without a slash is a shipped lens' name."""
 
+HOLDOUT_FILES = ("image", "depth")
+FILES = (("iris", "mask"), ("dirt", "image"), ("holdout", *HOLDOUT_FILES))
+"""Sections, and their keys that name files."""
+
 ABOUT = {
     "lens": "a shipped lens (`flarewright lenses`), or a lens file beside this project",
     "f_number": "2.8   # left out: wide open",
@@ -85,6 +89,16 @@ _TEACH_SCATTER = """
 # roughness_nm = 5.0
 """
 
+_TEACH_HOLDOUT = """
+# What hides lights, as an image in the picture's frame; docs/sources.md. A light may have one of its own.
+# [holdout]
+# image = "matte.png"   # white lets light through
+# depth = "depth.exr"   # instead: what is nearer than a light hides it
+# depth_unit_mm = 1000.0
+# invert = true   # the image's white hides
+# overscan = 1.2   # the image covers so many times the picture
+"""
+
 _TEACH_ART = """
 # Changes by hand, on top of the physics; docs/art-direction.md. art.physical = true ignores them.
 # [art.gain]
@@ -131,6 +145,8 @@ def project_text(project: Project, *, folder: Path | None = None, comments: bool
     out: list[str] = []
     _emit_table(out, data, (), nothing, ABOUT if comments else {})
     teach = _TEACH_ART if comments and project.art == Art() else ""
+    if comments and project.holdout is None:
+        teach = _TEACH_HOLDOUT + teach
     if comments and project.scatter is None:
         teach = _TEACH_SCATTER + teach
     if comments and "dirt" not in data and "starburst" not in data:
@@ -146,9 +162,10 @@ def _make_relative(data: dict[str, Any], folder: Path) -> None:
         data["lens"] = relative(data["lens"])
         if "/" not in data["lens"] and not data["lens"].lower().endswith(LENS_SUFFIXES):
             data["lens"] = f"./{data['lens']}"
-    for section, key in (("iris", "mask"), ("dirt", "image")):
-        if data.get(section, {}).get(key):
-            data[section][key] = relative(data[section][key])
+    hiding = [light["holdout"] for light in data["lights"] if "holdout" in light]
+    tables = [(data[section], keys) for section, *keys in FILES if section in data]
+    for table, keys in [*tables, *((table, HOLDOUT_FILES) for table in hiding)]:
+        table.update({key: relative(table[key]) for key in keys if table.get(key)})
 
 
 def _short_coating(choice: CoatingChoice) -> str | dict[str, Any]:

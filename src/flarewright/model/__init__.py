@@ -6,6 +6,7 @@ from .coating import Bare, Coating, Film, QuarterWave, Stack, Standard
 from .design import Bounds, Design, GhostWish
 from .figure import Figure
 from .glass import Dispersion, Medium
+from .holdout import Holdout
 from .imperfection import Imperfection
 from .iris import Iris
 from .layer import Layer
@@ -35,6 +36,7 @@ __all__ = [
     "Figure",
     "Film",
     "GhostWish",
+    "Holdout",
     "Imperfection",
     "Iris",
     "Layer",

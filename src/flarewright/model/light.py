@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from .base import Frozen
+from .holdout import Holdout
 
 
 class EqualEnergy(Frozen):
@@ -126,6 +127,8 @@ class Light(Frozen):
         Angle across the light's round disc, 0.53 for the sun, 0 for a point.
     shape : Rectangle or Polygon or None
         What else the light is than a point or a disc. Its radiance is even, and `intensity` is all of it together.
+    holdout : Holdout or None
+        What hides this light, besides the project's.
     """
 
     name: str = "light"
@@ -138,6 +141,7 @@ class Light(Frozen):
     spectrum: Spectrum = D65()
     diameter_deg: float = Field(0.0, ge=0.0, le=60.0)
     shape: Shape | None = None
+    holdout: Holdout | None = None
 
     @model_validator(mode="after")
     def _one_shape(self) -> Light:

@@ -11,6 +11,7 @@ from .base import Frozen
 from .camera import Camera, Colorspace
 from .coating import Coating
 from .design import Design
+from .holdout import Holdout
 from .imperfection import Imperfection
 from .iris import Iris
 from .lens import Lens
@@ -149,6 +150,8 @@ class Project(Frozen):
         One sample of the lens within tolerances; None: as designed.
     scatter : Scatter or None
         What the surfaces scatter; None: as the lens file says, which is nothing for the lenses of the library.
+    holdout : Holdout or None
+        What stands in front of all lights.
     art : Art
         What is changed by hand; nothing by default.
     design : Design or None
@@ -170,6 +173,7 @@ class Project(Frozen):
     filter: Plate | None = None
     imperfection: Imperfection | None = None
     scatter: Scatter | None = None
+    holdout: Holdout | None = None
     art: Art = Art()
     design: Design | None = None
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ..errors import ProjectError
 from ..model import Light
 from ..model.light import Rectangle
+from .border import centroid, closed, content
 
 Floats = NDArray[np.float64]
 
@@ -73,7 +74,7 @@ def outline(light: Light) -> Floats | None:
             offsets = square @ np.array([[cos(turn), sin(turn)], [-sin(turn), cos(turn)]])
         else:
             offsets = np.array(light.shape.corners_deg)
-            if abs(_area(offsets)) < 1e-9 * float(np.ptp(offsets, axis=0).max()) ** 2:
+            if abs(content(closed(offsets))) < 1e-9 * float(np.ptp(offsets, axis=0).max()) ** 2:
                 raise ProjectError(f"the light {light.name!r} has no area; give corners that enclose some")
         angles = np.array(light.field_deg) + offsets
         if np.abs(angles).max() > WIDEST_DEG:
@@ -82,7 +83,7 @@ def outline(light: Light) -> Floats | None:
                 f"{WIDEST_DEG:g} degrees"
             )
         corners = np.tan(np.radians(angles))
-    area = _area(corners)
+    area = content(closed(corners))
     return corners if area > 0.0 else corners[::-1].copy()
 
 
@@ -141,9 +142,9 @@ def parts(light: Light, step_deg: float) -> tuple[Part, ...]:
             for axis, k in ((0, a), (1, b)):
                 cell = _cut(cell, axis, edges[axis][k], 1.0)
                 cell = _cut(cell, axis, edges[axis][k + 1], -1.0)
-            area = _area(cell) if len(cell) > 2 else 0.0
-            if area > 1e-9 * abs(_area(corners)):
-                found.append((cell, area, _centroid(cell, area)))
+            area = content(closed(cell)) if len(cell) > 2 else 0.0
+            if area > 1e-9 * abs(content(closed(corners))):
+                found.append((cell, area, centroid(closed(cell))))
     weights = np.array([area / (1.0 + middle @ middle) ** 1.5 for _, area, middle in found])
     weights /= weights.sum()
     return tuple(
@@ -165,14 +166,3 @@ def _cut(corners: Floats, axis: int, at: float, side: float) -> Floats:
         if (value[k] > 0.0 > value[m]) or (value[k] < 0.0 < value[m]):
             kept.append(corners[k] + value[k] / (value[k] - value[m]) * (corners[m] - corners[k]))
     return np.array(kept).reshape(-1, 2)
-
-
-def _area(corners: Floats) -> float:
-    x, y = corners.T
-    return float(0.5 * (x * np.roll(y, -1) - np.roll(x, -1) * y).sum())
-
-
-def _centroid(corners: Floats, area: float) -> Floats:
-    x, y = corners.T
-    cross = x * np.roll(y, -1) - np.roll(x, -1) * y
-    return np.array([((x + np.roll(x, -1)) * cross).sum(), ((y + np.roll(y, -1)) * cross).sum()]) / (6.0 * area)

@@ -22,7 +22,7 @@ from .canvas import DETAILS, Plane, blank, merge, to_layer
 from .ghosts_draft import draft_alone, draw_draft, draw_draft_by_hand
 from .ghosts_final import FinalPass, contrast, detail_of, draw_alone, draw_final, find_entry, find_final
 from .shot import Shot
-from .sources import halvings, motion, spread_corners
+from .sources import halvings, motion, spread_border
 
 Progress = Callable[[float, str], None]
 
@@ -220,7 +220,7 @@ def _draft(
     pool: ThreadPoolExecutor,
     meter: _Meter,
 ) -> GhostPass:
-    points, wide = ([s for s in shots if (s.corners is None) == point] for point in (True, False))
+    points, wide = ([s for s in shots if (s.border is None) == point] for point in (True, False))
 
     def draw(group: list[int]) -> list[Plane | None]:
         width, height = shots[0].size_px
@@ -261,9 +261,9 @@ def _spread_drafts(
         for path in paths:
             changed, moved = art.get(path.name, PLAIN), motion(shot, path, draft=True)
             if moved is not None:
-                corners = spread_corners(shot, moved[0], shot.to_pixels * [1.0, 1.0, changed.scale, changed.scale])
-                key = (path.name if changed.ramps else None, changed.blur, corners.tobytes())
-                alike.setdefault(key, []).append((path, changed, corners))
+                border = spread_border(shot, moved[0], shot.to_pixels * [1.0, 1.0, changed.scale, changed.scale])
+                key = (path.name if changed.ramps else None, changed.blur, border.tobytes())
+                alike.setdefault(key, []).append((path, changed, border))
         for together in alike.values():
             source = together[0][2]
             halved = halvings(source, float("inf"), DETAILS - 1)

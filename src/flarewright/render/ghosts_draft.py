@@ -20,7 +20,7 @@ from .art import Frame, PathArt
 from .canvas import DETAILS, Plane, merge
 from .grade import coarseness, finish
 from .shot import Shot
-from .spread import polygon_kernel, spread_within
+from .spread import shape_kernel, spread_within
 
 Floats = NDArray[np.float64]
 
@@ -89,8 +89,8 @@ def draft_alone(
         One with a ramp, or any number without that share a blur and a source: both are linear.
     art : sequence of PathArt
         One a ghost.
-    source : ndarray, shape (N, 2), or None
-        What the extent of an area light spreads them over: columns and rows.
+    source : ndarray, shape (N, 5), or None
+        What the extent of an area light spreads them over (`optics.border`): columns and rows.
     halved : int
         How often the resolution may be halved because they are spread.
 
@@ -104,7 +104,7 @@ def draft_alone(
     own = shot.to_pixels / 2.0**detail
     width, height = (-(-side // 2**detail) for side in shot.size_px)
     mx, my = first.margin(own)
-    kernel = None if source is None else polygon_kernel(source / 2.0**detail)
+    kernel = None if source is None else shape_kernel(source, 0.5**detail)
     if kernel is not None:
         mx, my = mx + kernel.shape[1] // 2, my + kernel.shape[0] // 2
     sheet = np.zeros((height + 2 * my, width + 2 * mx, 3))

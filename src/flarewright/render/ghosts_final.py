@@ -20,14 +20,15 @@ from numpy.typing import NDArray
 from ..kernels.bundle import draw_bundle, measure_bundle, node_densities
 from ..kernels.trace import ALIVE, REL, X, Y
 from ..model import Quality
+from ..optics.border import points
 from ..optics.bundle import Bundle, Region, find_region, trace_bundle, trace_grid
 from ..optics.paths import LightPath
 from .art import PLAIN, Frame, PathArt
 from .canvas import DETAILS, Canvas, blank, merge
 from .grade import coarseness, finish
 from .shot import Shot
-from .sources import NARROW_PX, halvings, motion, spread_corners
-from .spread import polygon_kernel, spread_within
+from .sources import NARROW_PX, halvings, motion, spread_border
+from .spread import shape_kernel, spread_within
 
 if TYPE_CHECKING:
     from .ringing import Rings
@@ -118,14 +119,15 @@ def find_final(shot: Shot, path: LightPath, art: PathArt = PLAIN, entry: Region 
         frame = _frame(shot, path, whole)
     view_radius, source, detail = art.view_radius(shot.view_radius, frame), None, 0
     to_pixels = art.place(shot.to_pixels, frame)
-    if shot.corners is not None:
+    if shot.border is not None:
         moved = motion(shot, path)
         if moved is not None:
-            corners = spread_corners(shot, moved[0], to_pixels)
-            if np.abs(corners).max() > NARROW_PX:
+            border = spread_border(shot, moved[0], to_pixels)
+            ends = points(border)
+            if np.abs(ends).max() > NARROW_PX:
                 zoom = float(to_pixels[2:].min())
-                source, detail = corners, halvings(corners, moved[1] * zoom, DETAILS - 1)
-                view_radius += float(np.hypot(*corners.T).max()) / zoom
+                source, detail = border, halvings(border, moved[1] * zoom, DETAILS - 1)
+                view_radius += float(np.hypot(*ends.T).max()) / zoom
     region = find_region(lens, path, tilt, iris_radius, view_radius, within)
     if region is None:
         return None
@@ -272,7 +274,7 @@ def draw_alone(items: Sequence[FinalPass], quality: Quality, canvas: Canvas, sto
     detail = max(items[0].detail, coarseness(art, shot.to_pixels) if art.blur > 0.0 else 0)
     own = shot.to_pixels / 2.0**detail
     mx, my = art.margin(own)
-    kernel = None if source is None else polygon_kernel(source / 2.0**detail)
+    kernel = None if source is None else shape_kernel(source, 0.5**detail)
     if kernel is not None:
         mx, my = mx + kernel.shape[1] // 2, my + kernel.shape[0] // 2
     width, height = (-(-side // 2**detail) for side in canvas.size_px)

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from ..kernels.montecarlo import BESIDE, ENTERED, IN_PICTURE, TALLIES, trace_batch
 from ..kernels.stray import STRAYS
+from ..optics.border import brightness, content, points
 from ..optics.bundle import front_box
 from ..optics.color import luminance_weights
 from ..optics.scatter import ScatterTables
@@ -122,13 +123,13 @@ def _aimed(source: RaySource, batch: int) -> Iterator[RaySource]:
     Every batch has directions of its own, so the variance over batches knows of them.
     """
     shot = source.shot
-    if shot.corners is None:
+    if shot.border is None:
         yield source
         return
     rng = np.random.default_rng([source.seed, batch, source.light])
     here = np.tan(np.radians(shot.light.field_deg))
     aims = AIMS if source.side % AIMS == 0 else 1
-    for k, offset in enumerate(_points_within(shot.corners, aims * aims, rng)):
+    for k, offset in enumerate(_points_within(shot.border, aims * aims, rng)):
         # even radiance: by solid angle
         share = ((1.0 + here @ here) / (1.0 + (here + offset) @ (here + offset))) ** 1.5 / aims**2
         there = moved(shot, here + offset)
@@ -140,19 +141,14 @@ def _aimed(source: RaySource, batch: int) -> Iterator[RaySource]:
         )
 
 
-def _points_within(corners: Floats, count: int, rng: np.random.Generator) -> Floats:
-    """Draw points evenly from a polygon, shape (count, 2)."""
-    low, high = corners.min(axis=0), corners.max(axis=0)
-    x0, y0 = corners.T
-    x1, y1 = np.roll(corners, -1, axis=0).T
+def _points_within(border: Floats, count: int, rng: np.random.Generator) -> Floats:
+    """Draw points from a shape as it is bright, shape (count, 2)."""
+    low, high = points(border).min(axis=0), points(border).max(axis=0)
+    lit = max(abs(content(border)) / float(np.prod(high - low)), 1e-3)
     found = np.empty((0, 2))
     while len(found) < count:
-        x, y = (low + (high - low) * rng.random((4 * count, 2))).T[:, :, None]
-        between = (y0 > y) != (y1 > y)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            left = x < x0 + (y - y0) / (y1 - y0) * (x1 - x0)
-        inside = (between & left).sum(axis=1) % 2 == 1
-        found = np.concatenate([found, np.hstack([x, y])[inside]])
+        tried = low + (high - low) * rng.random((int(2.0 * count / lit), 2))
+        found = np.concatenate([found, tried[rng.random(len(tried)) < brightness(border, tried)]])
     return found[:count]
 
 

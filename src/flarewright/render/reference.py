@@ -151,7 +151,7 @@ def render_reference(
             "none; choose a sensor_reflectance below 1"
         )
     shots = spectral_shots(settled, mask)
-    prints = _fingerprints(settled, shots[0])
+    prints = _fingerprints(settled, shots)
     tables = scatter_of(settled, shots)
     sources = [
         ray_source(shot, quality.seed, side=SIDE, light=k, scatter=None if tables is None else tables[k])
@@ -204,16 +204,19 @@ def _start(state: ReferenceState | None, prints: dict[str, str]) -> Sums:
     return Sums(state.batches, state.sums, state.squares)
 
 
-def _fingerprints(settled: Settled, shot: Shot) -> dict[str, str]:
+def _fingerprints(settled: Settled, shots: Sequence[Shot]) -> dict[str, str]:
     """Digest each part of what decides the samples."""
     project, quality = settled.project, settled.project.quality
-    packed = shot.packed
+    packed, opening = shots[0].packed, shots[0].opening
     scatter = chosen_scatter(settled)
+    hidden = any(holdout is not None for holdout in (project.holdout, *(light.holdout for light in project.lights)))
     parts: dict[str, Any] = {
         "lens": [settled.lens.model_dump(mode="json"), settled.order.stop_semi_diameter, packed.sensor_z],
-        "iris": [settled.iris.model_dump(mode="json", exclude={"mask"}), _digest(shot.opening.mask)],
+        "iris": [settled.iris.model_dump(mode="json", exclude={"mask"}), _digest(opening.mask)],
         "coating": project.coating.model_dump(mode="json"),
-        "light": [light.model_dump(mode="json") for light in project.lights],
+        "light": [light.model_dump(mode="json", exclude={"holdout"}) for light in project.lights],
+        # whatever files say it
+        "holdout": [[shot.light.field_deg, shot.share, _digest(shot.border)] for shot in shots] if hidden else None,
         "picture": [project.camera.size_px, project.camera.sensor, project.output.colorspace],
         "sensor reflectance": project.camera.sensor_reflectance,
         "scatter": None if scatter is None else scatter.model_dump(mode="json"),

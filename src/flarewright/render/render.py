@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..io.mask_image import read_mask
-from ..model import Layer, Light, Project
+from ..model import Layer, Project
 from ..optics.bundle import incidence
 from ..optics.pack import facing
 from ..optics.paths import ghost_paths
@@ -295,14 +295,16 @@ def _summary(settled: Settled, shots: tuple[Shot, ...], images: list[DirectImage
         "wavelengths_nm": [float(w) for w in shots[0].packed.wavelengths_nm],
         "scene_irradiance_per_radiance": _scene_scale(settled, shots[0]),
         "lights": [
-            _light_summary(project.lights[number], list(of_one))
+            _light_summary(project, number, list(of_one))
             for number, of_one in groupby(zip(shots, images, strict=True), lambda pair: pair[0].number)
         ],
     }
 
 
-def _light_summary(light: Light, parts: list[tuple[Shot, DirectImage]]) -> dict[str, Any]:
+def _light_summary(project: Project, number: int, parts: list[tuple[Shot, DirectImage]]) -> dict[str, Any]:
     """Tell where a light is imaged and how bright; of an area light the mean over its parts."""
+    light = project.lights[number]
+    hidden = project.holdout is not None or light.holdout is not None
     throughput = np.sum([shot.share * image.throughput_mm2 for shot, image in parts], axis=0)
     weights = np.array([shot.share * float(image.throughput_mm2.sum()) for shot, image in parts])
     weights = weights / weights.sum() if weights.any() else np.full(len(parts), 1.0 / len(parts))
@@ -312,6 +314,7 @@ def _light_summary(light: Light, parts: list[tuple[Shot, DirectImage]]) -> dict[
         "field_deg": list(light.field_deg),
         **({} if light.distance is None else {"distance_mm": light.distance}),
         **({"parts": len(parts)} if light.extended else {}),
+        **({"visible": sum(shot.share for shot, _ in parts)} if hidden else {}),
         "direct_position_mm": [float(position[0]), float(position[1])],
         "direct_throughput_mm2": [float(flux) for flux in throughput],
         "transmittance": float(weights @ [image.transmittance for _, image in parts]),

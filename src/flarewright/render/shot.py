@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ..errors import ProjectError
 from ..model import Iris, Light, Project
 from ..model.camera import Colorspace
+from ..optics.border import closed
 from ..optics.bundle import Incidence, incidence
 from ..optics.diffraction import Soil
 from ..optics.dirt import lay_elements, rasterise
@@ -86,8 +87,9 @@ class Shot:
         Which of the project's lights it is, or is a part of.
     share : float
         Its part of that light.
-    corners : ndarray, shape (N, 2), or None
-        Outline of the part in slopes (tan X, tan Y) from its own; None for a point.
+    border : ndarray, shape (N, 5), or None
+        Of the part, or of what is seen of it (`optics.border`), in slopes (tan X, tan Y) from its own; None for a
+        point.
     """
 
     light: Light
@@ -100,7 +102,7 @@ class Shot:
     ringing: Ringing | None = None
     number: int = 0
     share: float = 1.0
-    corners: Floats | None = None
+    border: Floats | None = None
 
     @property
     def gain(self) -> float:
@@ -136,7 +138,7 @@ def moved(shot: Shot, slope: Floats) -> Shot:
     light = shot.light.replace(field_deg=(x, y))
     seen = incidence((x, y), light.distance, shot.packed.first_order.entrance_pupil_z)
     packed = facing(shot.packed, seen.axes, seen.nearness)
-    return replace(shot, light=light, incidence=seen, packed=packed, corners=None)
+    return replace(shot, light=light, incidence=seen, packed=packed, border=None)
 
 
 @lru_cache(maxsize=64)
@@ -239,37 +241,44 @@ def make_shots(settled: Settled, opening: Opening) -> tuple[Shot, ...]:
     to_pixels = np.array([width / 2.0, height / 2.0, width / sensor[0], height / sensor[1]])
     coatings = resolve_coatings(settled.lens, settled.coating)
     packs: dict[tuple[float, ...], PackedLens] = {}
-    shots = []
+    shots: list[Shot] = []
     for number, light in enumerate(project.lights):
         wavelengths_nm = traced_wavelengths(project.quality.wavelengths, light.spectrum)
         key = tuple(wavelengths_nm)
         if key not in packs:
             packs[key] = pack_lens(settled.lens, settled.order, coatings, wavelengths_nm, sensor=settled.sensor)
-        colorspace = project.output.colorspace
+        whole = []
         for part in parts(light, project.quality.source_step_deg):
-            point, corners = light, None
-            if light.extended:
-                intensity = light.intensity * part.share
-                changes = {"field_deg": part.field_deg, "intensity": intensity, "diameter_deg": 0.0, "shape": None}
-                point, corners = light.replace(**changes), part.corners
+            changes = {"field_deg": part.field_deg, "intensity": light.intensity * part.share, "holdout": None}
+            point = light.replace(**changes, diameter_deg=0.0, shape=None) if light.extended else light
             seen = _seen(settled, packs[key], number, point)
             packed = facing(packs[key], seen.axes, seen.nearness)
-            size = (width, height)
-            shots.append(
+            whole.append(
                 Shot(
                     point,
                     seen,
                     packed,
                     opening,
                     to_pixels,
-                    size,
-                    colorspace,
+                    (width, height),
+                    project.output.colorspace,
                     number=number,
                     share=part.share,
-                    corners=corners,
+                    border=closed(part.corners) if light.extended else None,
                 )
             )
+        shots += whole if project.holdout is None and light.holdout is None else _unhidden(settled, light, whole)
     return tuple(shots)
+
+
+def _unhidden(settled: Settled, light: Light, whole: list[Shot]) -> list[Shot]:
+    """Return what is seen of the parts of a light; one dark point when all of it is hidden."""
+    # it looks through a shot itself
+    from .holdout import read_plates, seen_part
+
+    plates = read_plates(settled.project, light)
+    seen = [shot for part in whole if (shot := seen_part(settled.lens, part, plates)) is not None]
+    return seen or [replace(whole[0], light=whole[0].light.replace(intensity=0.0), share=0.0, border=None)]
 
 
 def _seen(settled: Settled, packed: PackedLens, number: int, light: Light) -> Incidence:

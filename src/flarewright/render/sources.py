@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..kernels.bundle import measure_bundle
+from ..optics.border import content, mapped, points, rim
 from ..optics.bundle import find_region, trace_bundle, trace_grid
 from ..optics.paths import LightPath
 from .ghosts_draft import draft_centre
@@ -33,7 +34,7 @@ def motion(shot: Shot, path: LightPath, *, draft: bool = False) -> tuple[Floats,
     Parameters
     ----------
     shot : Shot
-        With corners.
+        With a border.
     path : LightPath
     draft : bool
         By matrices instead of rays.
@@ -47,7 +48,7 @@ def motion(shot: Shot, path: LightPath, *, draft: bool = False) -> tuple[Floats,
 
     None when the path passes no light.
     """
-    assert shot.corners is not None
+    assert shot.border is not None
     here = np.tan(np.radians(shot.light.field_deg))
     if shot.packed.symmetric and not draft:
         return _turned(shot, path, here)
@@ -77,13 +78,13 @@ def _ends(
     shot: Shot, path: LightPath, here: Floats, axis: Floats, *, draft: bool
 ) -> tuple[Floats, Floats, float] | None:
     """Measure the motion between the ends of the part along an axis: mm per slope, the ghost's middle, its size."""
-    assert shot.corners is not None
-    along = shot.corners @ axis
-    found = [(float(d), _centre(shot, path, here + d * axis, draft=draft)) for d in (along.min(), along.max())]
+    assert shot.border is not None
+    along = points(shot.border) @ axis
+    found = [(float(d), traced_centre(shot, path, here + d * axis, draft=draft)) for d in (along.min(), along.max())]
     lit = [(d, *centre) for d, centre in found if centre is not None]
     if len(lit) == 1:
         # dark at one end: from the other to the middle
-        middle = _centre(shot, path, here, draft=draft)
+        middle = traced_centre(shot, path, here, draft=draft)
         lit += [(0.0, *middle)] if middle is not None else []
     if len(lit) < 2:
         return None
@@ -92,8 +93,27 @@ def _ends(
     return motion, start - a * motion, 0.5 * (one + other)
 
 
-def _centre(shot: Shot, path: LightPath, slope: Floats, *, draft: bool) -> tuple[Floats, float] | None:
-    """Return a ghost's centroid and rms radius when the light stands elsewhere; upright, mm."""
+def traced_centre(shot: Shot, path: LightPath, slope: Floats, *, draft: bool = False) -> tuple[Floats, float] | None:
+    """Measure where a path's light lands when the light stands elsewhere, on the unbounded sensor plane.
+
+    Parameters
+    ----------
+    shot : Shot
+    path : LightPath
+    slope : ndarray, shape (2,)
+        tan X and tan Y of its field angles.
+    draft : bool
+        By matrices instead of rays.
+
+    Returns
+    -------
+    place : ndarray, shape (2,)
+        Centroid, upright, mm.
+    size : float
+        Root mean square radius, mm; infinite by matrices.
+
+    None when the path passes no light.
+    """
     elsewhere = moved(shot, slope)
     if draft:
         return draft_centre(elsewhere, path), float("inf")
@@ -115,13 +135,13 @@ def _centre(shot: Shot, path: LightPath, slope: Floats, *, draft: bool) -> tuple
     return np.array([x, y]), float(np.sqrt(max(sums[3] / sums[0] - x * x - y * y, 0.0)))
 
 
-def spread_corners(shot: Shot, matrix: Floats, to_pixels: Floats) -> Floats:
+def spread_border(shot: Shot, matrix: Floats, to_pixels: Floats) -> Floats:
     """Map the outline of a part of a light to what its ghost is spread over.
 
     Parameters
     ----------
     shot : Shot
-        With corners.
+        With a border.
     matrix : ndarray, shape (2, 2)
         From `motion`; rounded a little, so that ghosts with much the same spread have the same.
     to_pixels : ndarray, shape (4,)
@@ -129,27 +149,27 @@ def spread_corners(shot: Shot, matrix: Floats, to_pixels: Floats) -> Floats:
 
     Returns
     -------
-    ndarray, shape (N, 2)
+    ndarray, shape (N, 5)
         Columns and rows from the ghost's place.
     """
-    assert shot.corners is not None
-    extent = 0.5 * (shot.corners.max(axis=0) - shot.corners.min(axis=0))
+    assert shot.border is not None
+    extent = 0.5 * np.ptp(points(shot.border), axis=0)
     pixels = matrix * np.array([[to_pixels[2]], [-to_pixels[3]]]) * extent
     largest = float(np.abs(pixels).max())
     unit = 2.0 * ROUND_PX
     while unit < ROUND_PART * largest:
         unit *= 2.0
-    # rounded once more, so that parts of one shape have the same corners to the bit
-    return np.asarray(np.round((shot.corners / extent) @ (np.round(pixels / unit) * unit).T, 6) + 0.0)
+    # rounded once more, so that parts of one shape have the same border to the bit
+    return np.asarray(np.round(mapped(shot.border, np.round(pixels / unit) * unit / extent), 6) + 0.0)
 
 
-def halvings(corners_px: Floats, size_px: float, most: int) -> int:
+def halvings(border_px: Floats, size_px: float, most: int) -> int:
     """Return how often the resolution of a spread ghost may be halved before anyone can see it.
 
     Parameters
     ----------
-    corners_px : ndarray, shape (N, 2)
-        From `spread_corners`.
+    border_px : ndarray, shape (N, 5)
+        From `spread_border`.
     size_px : float
         The ghost's own radius.
     most : int
@@ -158,5 +178,7 @@ def halvings(corners_px: Floats, size_px: float, most: int) -> int:
     -------
     int
     """
-    wide = min(0.5 * float(np.ptp(corners_px, axis=0).min()), size_px)
+    # what is torn has finer parts than it is wide; of a disc both are its radius
+    fine = 2.0 * abs(content(border_px)) / max(rim(border_px), 1e-9)
+    wide = min(0.5 * float(np.ptp(points(border_px), axis=0).min()), fine, size_px)
     return int(np.clip(np.floor(np.log2(max(wide, 1e-9) / COARSE_PX)), 0, most))

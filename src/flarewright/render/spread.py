@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..optics.border import END, START, WEIGHT, mapped, points
 from ..optics.fft_size import fast_size
 from .canvas import lit_window
 
@@ -81,26 +82,30 @@ def joined(one: Floats, other: Floats) -> Floats:
     return np.asarray(np.maximum(both, 0.0))
 
 
-def polygon_kernel(corners_px: Floats) -> Floats:
-    """Return the weights of pixels under a polygon, sum 1.
+def shape_kernel(border: Floats, zoom: float = 1.0) -> Floats:
+    """Return the weights of pixels under a shape, sum 1.
 
     Parameters
     ----------
-    corners_px : ndarray, shape (N, 2)
-        Columns and rows, from the middle of the middle pixel; either way round, concave too.
+    border : ndarray, shape (N, 5)
+        Columns and rows, from the middle of the middle pixel (`optics.border`); either way round.
+    zoom : float
+        By which it is drawn larger.
 
     Returns
     -------
     ndarray, shape (2 a + 1, 2 b + 1)
-        Exact coverage. A polygon without area is a line, or a dot: it is widened to a hundredth of a pixel.
+        Exact coverage. A shape without area is a line, or a dot: it is widened to a hundredth of a pixel.
     """
-    reach = np.maximum(np.ceil(np.abs(corners_px).max(axis=0) + 0.5), 1.0).astype(int)
-    drawn = np.abs(covered(corners_px + reach + 0.5, (2 * int(reach[1]) + 1, 2 * int(reach[0]) + 1)))
+    ends = points(border) * zoom
+    reach = np.maximum(np.ceil(np.abs(ends).max(axis=0) + 0.5), 1.0).astype(int)
+    moved = mapped(border, zoom * np.eye(2), reach + 0.5)
+    drawn = np.abs(covered(moved, (2 * int(reach[1]) + 1, 2 * int(reach[0]) + 1)))
     total = float(drawn.sum())
     if total < 1e-4:
         # as good as a line: its ends and middle hold its light
         drawn = np.zeros_like(drawn)
-        far = corners_px[np.argmax((corners_px**2).sum(axis=1))]
+        far = ends[np.argmax((ends**2).sum(axis=1))]
         count = 2 * int(np.ceil(np.abs(far).max())) * 4 + 1
         for part in np.linspace(-1.0, 1.0, count):
             column, row = np.floor(part * far + reach + 0.5).astype(int)
@@ -109,13 +114,13 @@ def polygon_kernel(corners_px: Floats) -> Floats:
     return np.asarray(drawn / total)
 
 
-def covered(corners_px: Floats, shape: tuple[int, int]) -> Floats:
-    """Compute how much of each pixel a polygon covers, signed by which way round it runs.
+def covered(border: Floats, shape: tuple[int, int]) -> Floats:
+    """Compute how much of each pixel a shape covers, signed by which way round it runs.
 
     Parameters
     ----------
-    corners_px : ndarray, shape (N, 2)
-        Columns and rows within the picture.
+    border : ndarray, shape (N, 5)
+        Columns and rows within the picture (`optics.border`).
     shape : tuple of int
         Rows and columns of the picture.
 
@@ -128,20 +133,33 @@ def covered(corners_px: Floats, shape: tuple[int, int]) -> Floats:
     Green's theorem: each piece of an edge within one pixel adds its height times what lies right of it, and its whole
     height to all pixels further right.
     """
-    start, end = corners_px, np.roll(corners_px, -1, axis=0)
+    edge, t = _cuts(border)
+    along = border[:, END] - border[:, START]
+    places = border[edge, START] + t[:, None] * along[edge]
+    same = edge[1:] == edge[:-1]
+    x, y = (np.stack([places[:-1, k], places[1:, k]])[:, same] for k in (0, 1))
+    height, middle = (y[1] - y[0]) * border[edge[1:][same], WEIGHT], 0.5 * (x[0] + x[1])
+    column = np.clip(np.floor(middle).astype(int), 0, shape[1] - 1)
+    row = np.clip(np.floor(0.5 * (y[0] + y[1])).astype(int), 0, shape[0] - 1)
+    right = np.clip(column + 1.0 - middle, 0.0, 1.0)
     change = np.zeros((shape[0], shape[1] + 1))
-    for (x0, y0), (x1, y1) in zip(start, end, strict=True):
-        cuts = [np.array([0.0, 1.0])]
-        for a, b in ((x0, x1), (y0, y1)):
-            lines = np.arange(np.floor(min(a, b)) + 1.0, np.ceil(max(a, b)))
-            if lines.size:
-                cuts.append((lines - a) / (b - a))
-        t = np.unique(np.concatenate(cuts))
-        x, y = x0 + t * (x1 - x0), y0 + t * (y1 - y0)
-        height, middle = np.diff(y), 0.5 * (x[1:] + x[:-1])
-        column = np.clip(np.floor(middle).astype(int), 0, shape[1] - 1)
-        row = np.clip(np.floor(0.5 * (y[1:] + y[:-1])).astype(int), 0, shape[0] - 1)
-        right = np.clip(column + 1.0 - middle, 0.0, 1.0)
-        np.add.at(change, (row, column), height * right)
-        np.add.at(change, (row, column + 1), height * (1.0 - right))
+    np.add.at(change, (row, column), height * right)
+    np.add.at(change, (row, column + 1), height * (1.0 - right))
     return np.asarray(np.cumsum(change, axis=1)[:, : shape[1]])
+
+
+def _cuts(border: Floats) -> tuple[NDArray[np.intp], Floats]:
+    """Return where edges begin, end and cross the lines between pixels: edge by edge, in rising parts of its length."""
+    number = np.arange(len(border))
+    edges, parts = [number, number], [np.zeros(len(border)), np.ones(len(border))]
+    for axis in (0, 1):
+        a, b = border[:, axis], border[:, 2 + axis]
+        first = np.floor(np.minimum(a, b)) + 1.0
+        count = np.maximum(np.ceil(np.maximum(a, b)) - first, 0.0).astype(int)
+        edge = np.repeat(number, count)
+        line = first[edge] + np.arange(len(edge)) - np.repeat(np.cumsum(count) - count, count)
+        edges.append(edge)
+        parts.append((line - a[edge]) / (b[edge] - a[edge]))
+    edge, t = np.concatenate(edges), np.concatenate(parts)
+    order = np.lexsort((t, edge))
+    return edge[order], t[order]

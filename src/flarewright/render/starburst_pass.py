@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ..errors import ProjectError
 from ..io.mask_image import read_mask
 from ..model import Dirt, Iris, Layer, Lines, Starburst
+from ..optics.border import mapped, points
 from ..optics.diffraction import BladeWings, Pattern, Soil, pupil_pattern
 from ..optics.paths import direct_path
 from .direct import PUPIL_SPAN, DirectImage, defocus_mm, traced_pupil, traced_spot
@@ -172,7 +173,7 @@ def _kernel(
     It is moved by `offset`, columns and rows.
     """
     settled, shot = scene.settled, brightest[0]
-    shape = _shape(settled, parts, brightest, offset) if shot.corners is not None else None
+    shape = _shape(settled, parts, brightest, offset) if shot.border is not None else None
     if defocus_mm(settled.lens, shot) < OUT_OF_FOCUS_PX / float(shot.to_pixels[2:].max()):
         return shape
     spot = traced_spot(settled.lens, shot, offset if shape is None else (0.0, 0.0))
@@ -192,16 +193,17 @@ def _shape(
     zoom = brightest[0].to_pixels[2:] * [1.0, -1.0]
     for shot, image in parts:
         moved = motion(shot, direct_path(settled.lens)) if _flux(shot, image) > 0.0 else None
-        if moved is not None and shot.corners is not None:
+        if moved is not None and shot.border is not None:
             place = np.array(image.position_mm) - np.array(brightest[1].position_mm)
-            drawn.append(((place + shot.corners @ moved[0].T) * zoom + offset, _flux(shot, image)))
+            border = mapped(shot.border, zoom[:, None] * moved[0], place * zoom + offset)
+            drawn.append((border, _flux(shot, image)))
     if not drawn:
         return None
-    reach = [int(np.ceil(max(np.abs(corners[:, k]).max() for corners, _ in drawn) + 0.5)) for k in (1, 0)]
+    reach = [int(np.ceil(max(np.abs(points(border)[:, k]).max() for border, _ in drawn) + 0.5)) for k in (1, 0)]
     size = (2 * reach[0] + 1, 2 * reach[1] + 1)
     total = np.zeros(size)
-    for corners, flux in drawn:
-        part = np.abs(covered(corners + np.array([reach[1], reach[0]]) + 0.5, size))
+    for border, flux in drawn:
+        part = np.abs(covered(mapped(border, np.eye(2), np.array([reach[1], reach[0]]) + 0.5), size))
         area = float(part.sum())
         total += part * (flux / area) if area > 0.0 else 0.0
     return np.asarray(total / total.sum()) if total.any() else None

@@ -1,0 +1,131 @@
+"""The border of a flat shape as edges that know how much brighter it is on their left: area, place, what lies inside.
+
+A plain polygon is a border whose edges all have the weight 1. Grey shapes, holes and separate pieces need no other
+form, for all sums over a shape are sums over its edges (Green's theorem).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+# columns of an edge: where it begins, where it ends, and how much brighter it is on its left than on its right
+START, END, WEIGHT = slice(0, 2), slice(2, 4), 4
+
+__all__ = [
+    "END",
+    "START",
+    "WEIGHT",
+    "backward",
+    "brightness",
+    "centroid",
+    "closed",
+    "content",
+    "mapped",
+    "points",
+    "rim",
+]
+
+
+def closed(corners: Floats) -> Floats:
+    """Return the border of a polygon.
+
+    Parameters
+    ----------
+    corners : ndarray, shape (N, 2)
+        Counter-clockwise, where the second coordinate points up; concave too.
+
+    Returns
+    -------
+    ndarray, shape (N, 5)
+        Each edge's start, end and weight, which is 1.
+    """
+    return np.column_stack([corners, np.roll(corners, -1, axis=0), np.ones(len(corners))])
+
+
+def points(border: Floats) -> Floats:
+    """Return both ends of every edge, shape (2 N, 2)."""
+    return border[:, :WEIGHT].reshape(-1, 2)
+
+
+def mapped(border: Floats, matrix: Floats, offset: Floats | float = 0.0) -> Floats:
+    """Map a border.
+
+    Parameters
+    ----------
+    border : ndarray, shape (N, 5)
+    matrix : ndarray, shape (2, 2)
+        Works on columns (x, y).
+    offset : ndarray, shape (2,), or float
+        Added behind it.
+
+    Returns
+    -------
+    ndarray, shape (N, 5)
+        A matrix that mirrors makes clockwise of counter-clockwise; then `backward` undoes it.
+    """
+    ends = points(border) @ matrix.T + offset
+    return np.column_stack([ends.reshape(-1, WEIGHT), border[:, WEIGHT]])
+
+
+def backward(border: Floats) -> Floats:
+    """Return a border with every edge the other way round, shape (N, 5)."""
+    return border[:, [2, 3, 0, 1, WEIGHT]]
+
+
+def content(border: Floats) -> float:
+    """Add up brightness over area.
+
+    Parameters
+    ----------
+    border : ndarray, shape (N, 5)
+
+    Returns
+    -------
+    float
+        The area of a plain polygon; negative when it runs clockwise.
+    """
+    return float(0.5 * (_cross(border) @ border[:, WEIGHT]))
+
+
+def centroid(border: Floats) -> Floats:
+    """Return the mean place of a shape's brightness, shape (2,)."""
+    weight = _cross(border) * border[:, WEIGHT]
+    middle: Floats = weight @ (border[:, START] + border[:, END]) / (6.0 * content(border))
+    return middle
+
+
+def rim(border: Floats) -> float:
+    """Return the length of all edges, each times its weight."""
+    along = border[:, END] - border[:, START]
+    return float(np.hypot(along[:, 0], along[:, 1]) @ np.abs(border[:, WEIGHT]))
+
+
+def brightness(border: Floats, places: Floats) -> Floats:
+    """Tell how bright a shape is at some places.
+
+    Parameters
+    ----------
+    border : ndarray, shape (N, 5)
+    places : ndarray, shape (M, 2)
+
+    Returns
+    -------
+    ndarray, shape (M,)
+        1 inside a plain polygon and 0 outside, up to rounding.
+    """
+    x0, y0, x1, y1, weight = border.T
+    x, y = places[:, 0, None], places[:, 1, None]
+    between = (y0 > y) != (y1 > y)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        beyond = x < x0 + (y - y0) / (y1 - y0) * (x1 - x0)
+    found: Floats = (between & beyond) @ (weight * np.sign(y1 - y0))
+    return found
+
+
+def _cross(border: Floats) -> Floats:
+    (x0, y0), (x1, y1) = border[:, START].T, border[:, END].T
+    product: Floats = x0 * y1 - x1 * y0
+    return product

@@ -1,0 +1,331 @@
+"""What an image or a depth plate hides of a light: the light that is left, and where."""
+
+import numpy as np
+import OpenEXR
+import pytest
+from judge import judge, probabilities
+from PIL import Image
+
+from flarewright.errors import ProjectError
+from flarewright.io.project_file import project_text, read_project
+from flarewright.io.reference_state import read_state
+from flarewright.model import Camera, Holdout, Light, Lines, Output, Polygon, Project, Quality, Rectangle
+from flarewright.optics.border import brightness, centroid, closed, content, mapped
+from flarewright.optics.color import luminance_weights
+from flarewright.optics.holdout import behind, hidden_at
+from flarewright.render.ledger import trace_ledger
+from flarewright.render.prepare import settle
+from flarewright.render.reference import ReferenceRun
+from flarewright.render.render import render
+from flarewright.render.shot import make_opening, make_shots
+from flarewright.render.spread import covered
+
+D_LINE = Lines(lines=((587.56, 1.0),))
+SIZE = (120, 80)
+FINE = 8
+DISC = Light(field_deg=(6.0, 4.0), spectrum=D_LINE, diameter_deg=3.0)
+
+
+def project(light=DISC, holdout=None, mode="final", **how):
+    return Project(
+        lens="heliar-tronnier",
+        f_number=8.0,
+        lights=(light,),
+        camera=Camera(size_px=SIZE),
+        quality=Quality(mode=mode, wavelengths=1, bridge=False, **how.pop("quality", {})),
+        output=Output(**how),
+        holdout=holdout,
+    )
+
+
+def picture(made, name):
+    found = next(layer for layer in render(made).layers if layer.name == name)
+    return found.pixels.astype(np.float64) @ luminance_weights("rec709")
+
+
+@pytest.fixture(scope="module")
+def whole():
+    """The disc in full: ghosts, direct image, and column and row of its middle."""
+    x, y = render(project()).summary["lights"][0]["direct_position_mm"]
+    middle = (SIZE[0] / 2 + x * SIZE[0] / 36.0, SIZE[1] / 2 - y * SIZE[0] / 36.0)
+    return {name: picture(project(), name) for name in ("ghosts", "starburst")}, middle
+
+
+def matte(path, column):
+    """Black left of a column of the picture, with an edge between pixels."""
+    at = np.arange(SIZE[0] * FINE) / FINE
+    grey = np.round(255.0 * np.clip((at + 1.0 / FINE - column) * FINE, 0.0, 1.0)).astype(np.uint8)
+    Image.fromarray(np.tile(grey, (SIZE[1] * FINE, 1))).save(path)
+    return str(path)
+
+
+def depth_plate(path, depth, name="Z"):
+    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    with OpenEXR.File(header, {name: np.ascontiguousarray(depth, dtype=np.float32)}) as file:
+        file.write(str(path))
+    return str(path)
+
+
+# ---------------------------------------------------------------------------------------------------------------------
+# The light that is left
+
+
+@pytest.mark.parametrize("mode", ["final", "draft"])
+def test_two_halves_of_a_disc_are_the_disc(mode, whole, tmp_path):
+    """Half the direct image each, and together every pixel of the ghosts."""
+    file = matte(tmp_path / "m.png", whole[1][0])
+    halves = [Holdout(image=file), Holdout(image=file, invert=True)]
+    full = picture(project(mode=mode), "ghosts")
+    made = [{name: picture(project(DISC, held, mode), name) for name in whole[0]} for held in halves]
+    for half in made:
+        assert half["starburst"].sum() == pytest.approx(0.5 * whole[0]["starburst"].sum(), rel=0.01)
+        # the ghosts of the two halves differ by which rims they meet
+        assert half["ghosts"].sum() == pytest.approx(0.5 * full.sum(), rel=0.1)
+    both = made[0]["ghosts"] + made[1]["ghosts"]
+    assert both.sum() == pytest.approx(full.sum(), rel=1e-3)
+    assert np.abs(both - full).sum() < 0.02 * full.sum()
+    # the black half is dark, the other as bright as it was
+    column = int(whole[1][0])
+    assert made[0]["starburst"][:, : column - 2].sum() < 0.02 * whole[0]["starburst"].sum()
+    assert np.abs(made[0]["starburst"][:, column + 3 :] / whole[0]["starburst"][:, column + 3 :]).max() < 1.01
+
+
+def test_what_is_seen_of_a_rectangle_is_a_smaller_one(whole, tmp_path):
+    window = Light(field_deg=(6.0, 4.0), spectrum=D_LINE, shape=Rectangle(size_deg=(4.0, 2.0)))
+    x = render(project(window)).summary["lights"][0]["direct_position_mm"][0]
+    hidden = project(window, Holdout(image=matte(tmp_path / "m.png", SIZE[0] / 2 + x * SIZE[0] / 36.0)))
+    middle = np.degrees(np.arctan(np.tan(np.radians((4.0, 8.0))).mean())) - 6.0
+    right = Polygon(corners_deg=((middle, -1.0), (2.0, -1.0), (2.0, 1.0), (middle, 1.0)))
+    shots = make_shots(settle(hidden), make_opening(settle(hidden), None))
+    left = sum(shot.share for shot in shots)
+    assert left == pytest.approx(0.5, abs=0.005)
+    seen = project(Light(field_deg=(6.0, 4.0), spectrum=D_LINE, shape=right, intensity=left))
+    for name in ("ghosts", "starburst"):
+        one, other = picture(hidden, name), picture(seen, name)
+        assert one.sum() == pytest.approx(other.sum(), rel=3e-3)
+    assert np.abs(picture(hidden, "ghosts") - picture(seen, "ghosts")).sum() < 0.02 * picture(seen, "ghosts").sum()
+
+
+def test_the_reference_sees_the_same(whole, tmp_path):
+    """Random directions of what is left, by z-test; and what enters is what is seen."""
+    held = Holdout(image=matte(tmp_path / "m.png", whole[1][0] + 1.0))
+    judged = judge(
+        project(DISC, held, quality={"source_step_deg": 1.5}, layers="ghosts", starburst=False), batches=24, side=32
+    )
+    final, mean, error = judged.total
+    assert abs(final - mean) < 5e-3 * mean + 4.0 * error < 0.1 * mean
+    _, worst = probabilities(judged, judged.mean)
+    assert worst > 1e-4
+    entered = []
+    for hiding in (held, None):
+        settled = settle(project(DISC, hiding))
+        shots = make_shots(settled, make_opening(settled, None))
+        entered.append((trace_ledger(shots, 0).entered_mm2, sum(shot.share for shot in shots)))
+    assert entered[0][0] / entered[1][0] == pytest.approx(entered[0][1], rel=0.01)
+    assert entered[0][1] == pytest.approx(0.427, abs=0.01)
+
+
+def test_a_state_of_another_holdout_is_refused(tmp_path):
+    """By what it hides, not by its name."""
+    file, state = tmp_path / "m.png", tmp_path / "a.state.npz"
+    made = project(DISC, Holdout(image=matte(file, 94.0)), "reference", quality={"reference_samples": 1})
+    render(made, run=ReferenceRun(state_file=state))
+    render(made, run=ReferenceRun(resume=read_state(state)))
+    matte(file, 96.0)
+    with pytest.raises(ProjectError, match="another holdout"):
+        render(made, run=ReferenceRun(resume=read_state(state)))
+
+
+def test_grey_lets_its_part_through(whole, tmp_path):
+    grey = np.full((SIZE[1], SIZE[0]), 64, dtype=np.uint8)
+    Image.fromarray(grey).save(tmp_path / "g.png")
+    for light in (DISC, DISC.replace(diameter_deg=0.0)):
+        full, part = (
+            picture(project(light, held), "ghosts") for held in (None, Holdout(image=str(tmp_path / "g.png")))
+        )
+        assert part.sum() == pytest.approx(64.0 / 255.0 * full.sum(), rel=2e-3)
+        assert np.abs(part - 64.0 / 255.0 * full).sum() < 0.01 * part.sum()
+
+
+def test_a_hidden_light_gives_nothing(tmp_path):
+    Image.fromarray(np.zeros((SIZE[1], SIZE[0]), dtype=np.uint8)).save(tmp_path / "black.png")
+    black = Holdout(image=str(tmp_path / "black.png"))
+    for mode in ("final", "draft"):
+        for light in (DISC, DISC.replace(diameter_deg=0.0)):
+            found = render(project(light, black, mode))
+            assert not any(layer.pixels.any() for layer in found.layers)
+            assert found.summary["lights"][0]["visible"] == 0.0
+            assert sum(found.summary["lights"][0]["direct_throughput_mm2"]) == 0.0
+    # a light of its own beside it is not
+    other = DISC.replace(field_deg=(-6.0, 2.0), diameter_deg=0.0)
+    both = Project(**{**dict(project()), "lights": (DISC.replace(holdout=black), other)})
+    assert picture(both, "ghosts").sum() == pytest.approx(picture(project(other), "ghosts").sum(), rel=1e-6)
+
+
+# ---------------------------------------------------------------------------------------------------------------------
+# Where
+
+
+@pytest.mark.parametrize("lens", ["flektogon-35", "heliar-tronnier"])
+def test_a_plate_lies_in_the_picture(lens, tmp_path):
+    """A point is hidden by the pixels on which its direct image falls, distortion and all, and by no others."""
+    made = project(Light(field_deg=(8.0, -5.0), spectrum=D_LINE)).replace(lens=lens)
+    x, y = render(made).summary["lights"][0]["direct_position_mm"]
+    zoom = SIZE[0] * FINE / 36.0
+    column, row = int(SIZE[0] * FINE / 2 + x * zoom), int(SIZE[1] * FINE / 2 - y * zoom)
+    spot = np.zeros((SIZE[1] * FINE, SIZE[0] * FINE), dtype=np.uint8)
+    spot[row - 1 : row + 2, column - 1 : column + 2] = 255
+    Image.fromarray(spot).save(tmp_path / "spot.png")
+    for invert, seen in ((False, 1.0), (True, 0.0)):
+        settled = settle(made.replace(holdout=Holdout(image=str(tmp_path / "spot.png"), invert=invert)))
+        assert make_shots(settled, make_opening(settled, None))[0].share == pytest.approx(seen, abs=1e-6)
+
+
+def test_outside_the_plate_nothing_is_hidden(tmp_path):
+    beside = DISC.replace(field_deg=(14.0, 0.0), diameter_deg=1.0)
+    Image.fromarray(np.zeros((SIZE[1], SIZE[0]), dtype=np.uint8)).save(tmp_path / "black.png")
+    for overscan, left in ((1.0, 1.0), (1.6, 0.0)):
+        held = Holdout(image=str(tmp_path / "black.png"), overscan=overscan)
+        settled = settle(project(beside, held))
+        assert sum(shot.share for shot in make_shots(settled, make_opening(settled, None))) == pytest.approx(left)
+
+
+def test_a_depth_plate_hides_what_is_behind(tmp_path):
+    """Metres; a lamp at 4 m, the sun, and pixels where nothing is."""
+    lamp = DISC.replace(distance=4000.0, diameter_deg=0.0)
+    nothing = [(far, 1.0, 1.0) for far in (0.0, np.inf, 65504.0)]
+    for depth, lamp_seen, sun_seen in ((3.9, 0.0, 0.0), (4.1, 1.0, 0.0), *nothing):
+        file = depth_plate(tmp_path / "d.exr", np.full((SIZE[1], SIZE[0]), depth))
+        for light, seen in ((lamp, lamp_seen), (lamp.replace(distance=None), sun_seen)):
+            settled = settle(project(light, Holdout(depth=file)))
+            assert sum(shot.share for shot in make_shots(settled, make_opening(settled, None))) == seen
+        (tmp_path / "d.exr").unlink()
+
+
+# ---------------------------------------------------------------------------------------------------------------------
+# The geometry
+
+
+ROUND = 2.0 * np.pi * np.arange(24) / 24.0
+OUTLINES = {
+    "disc": np.stack([20.3 + 7.0 * np.cos(ROUND), 15.1 + 5.0 * np.sin(ROUND)], axis=1),
+    "concave, on the lines": np.array([(5.0, 5.0), (25.0, 5.5), (25.0, 12.0), (12.0, 12.0), (12.0, 22.0), (5.2, 22.0)]),
+    "half outside": np.array([(-9.5, -4.0), (20.0, 3.0), (44.0, 25.0), (-3.0, 36.0)]),
+}
+
+
+@pytest.mark.parametrize("name", OUTLINES)
+@pytest.mark.parametrize("kind", ["grey", "black and white"])
+def test_a_cut_shape_covers_pixels_as_the_image_lets_it(name, kind):
+    """Exact coverage of each pixel, pixel by pixel, and which points lie in it."""
+    rng = np.random.default_rng(5)
+    hidden = rng.random((30, 40))
+    hidden = hidden if kind == "grey" else np.round(hidden)
+    border, margin = closed(OUTLINES[name]), 12
+    cut = behind(border, hidden)
+    size = (30 + 2 * margin, 40 + 2 * margin)
+    whole, left = (covered(mapped(shape, np.eye(2), margin), size) for shape in (border, cut))
+    expected = whole * (1.0 - np.pad(hidden, margin))
+    assert left == pytest.approx(expected, abs=1e-12)
+    assert content(cut) == pytest.approx(abs(expected.sum()), rel=1e-12)
+    rows, columns = np.indices(size) - margin + 0.5
+    middle = np.array([(expected * at).sum() for at in (columns, rows)]) / expected.sum()
+    assert centroid(cut) == pytest.approx(middle, abs=0.2)
+    places = rng.random((500, 2)) * [40, 30]
+    seen = brightness(border, places) * (1.0 - hidden[places[:, 1].astype(int), places[:, 0].astype(int)])
+    assert brightness(cut, places) == pytest.approx(seen, abs=1e-12)
+
+
+def test_fine_images_are_averaged():
+    """A chequered image of 400 pixels lets half of a shape through, evenly."""
+    chequered = np.indices((300, 400)).sum(axis=0) % 2.0
+    border = closed(np.array([(0.0, 0.0), (400.0, 0.0), (400.0, 300.0), (0.0, 300.0)]))
+    cut = behind(border, chequered)
+    assert content(cut) == pytest.approx(60_000.0, rel=1e-3)
+    assert len(cut) < 70_000
+    assert centroid(cut) == pytest.approx([200.0, 150.0], abs=0.1)
+
+
+def test_all_nothing_and_between():
+    border = closed(OUTLINES["disc"])
+    assert behind(border, np.zeros((30, 40))) is border
+    assert len(behind(border, np.ones((30, 40)))) == 0
+    ramp = np.tile(np.arange(40.0) / 40.0, (30, 1))
+    assert hidden_at(ramp, np.array([20.0, 11.3])) == pytest.approx(19.5 / 40.0)
+    assert hidden_at(ramp, np.array([60.0, 11.3])) == 0.0
+
+
+# ---------------------------------------------------------------------------------------------------------------------
+# Files and flags
+
+
+def test_project_files_keep_it(tmp_path):
+    Image.fromarray(np.zeros((SIZE[1], SIZE[0]), dtype=np.uint8)).save(tmp_path / "m.png")
+    text = (
+        'lens = "heliar-tronnier"\n[holdout]\nimage = "m.png"\noverscan = 1.5\ninvert = true\n'
+        '[[lights]]\nfield_deg = [1.0, 2.0]\nholdout = { depth = "d.exr", depth_unit_mm = 1.0 }\n'
+    )
+    (tmp_path / "p.toml").write_text(text)
+    found = read_project(tmp_path / "p.toml")
+    assert found.holdout == Holdout(image=str(tmp_path / "m.png"), overscan=1.5, invert=True)
+    assert found.lights[0].holdout == Holdout(depth=str(tmp_path / "d.exr"), depth_unit_mm=1.0)
+    for comments in (False, True):
+        (tmp_path / "q.toml").write_text(project_text(found, folder=tmp_path, comments=comments))
+        assert read_project(tmp_path / "q.toml") == found
+
+
+@pytest.mark.parametrize(
+    ("holdout", "words"),
+    [
+        ("image = 'no.png'", "there is no such holdout image"),
+        ("depth = 'no.exr'", "there is no such holdout depth plate"),
+        ("image = 'p.toml'", "cannot be read as an image"),
+        ("depth = 'm.png'", "cannot be read as a depth plate"),
+        ("image = 'square.png'", "of another shape than the picture's 120x80"),
+        ("depth = 'colour.exr'", "it has no channel Z or depth"),
+        ("", "a holdout is an image or a depth plate; give one"),
+        ("image = 'm.png'\ndepth = 'd.exr'", "a holdout is an image or a depth plate; give one"),
+        ("depth = 'd.exr'\ninvert = true", "invert is for an image"),
+        ("image = 'm.png'\noverscan = 0.5", "holdout.overscan should be greater than or equal to 1, not 0.5"),
+        ("image = 'm.png'\nmask = 'x'", "holdout.mask is not a known key"),
+    ],
+)
+def test_bad_holdouts(holdout, words, tmp_path):
+    Image.fromarray(np.zeros((SIZE[1], SIZE[0]), dtype=np.uint8)).save(tmp_path / "m.png")
+    Image.fromarray(np.zeros((50, 50), dtype=np.uint8)).save(tmp_path / "square.png")
+    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    with OpenEXR.File(header, {name: np.ones((80, 120), dtype=np.float32) for name in "AB"}) as file:
+        file.write(str(tmp_path / "colour.exr"))
+    lights = "[[lights]]\nfield_deg = [1.0, 2.0]"
+    head = f"lens = 'heliar-tronnier'\n[camera]\nsize_px = [120, 80]\n{lights}\n[holdout]\n"
+    (tmp_path / "p.toml").write_text(f"{head}{holdout}\n")
+
+    def shots():
+        settled = settle(read_project(tmp_path / "p.toml"))
+        return make_shots(settled, make_opening(settled, None))
+
+    with pytest.raises(ProjectError, match=words):
+        shots()
+
+
+def test_one_channel_by_any_name(tmp_path):
+    """Alpha alone as a matte; a depth called as its renderer likes."""
+    for name, key in (("A", "image"), ("V", "image"), ("depth", "depth"), ("mist", "depth")):
+        file = depth_plate(tmp_path / f"{name}.exr", np.full((SIZE[1], SIZE[0]), 0.25), name)
+        settled = settle(project(DISC, Holdout(**{key: file})))
+        shots = make_shots(settled, make_opening(settled, None))
+        assert sum(shot.share for shot in shots) == pytest.approx(0.25 if key == "image" else 0.0)
+
+
+def test_a_cropped_plate_lies_where_its_window_is(tmp_path):
+    header = {
+        "compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage,
+        "displayWindow": ((0, 0), (SIZE[0] - 1, SIZE[1] - 1)),
+        "dataWindow": ((60, 0), (SIZE[0] - 1, 39)),
+    }  # fmt: skip
+    file = OpenEXR.File(header, {"A": np.ones((40, 60), dtype=np.float32)})
+    file.write(str(tmp_path / "a.exr"))
+    for field, seen in (((6.0, 4.0), 1.0), ((-6.0, 4.0), 0.0), ((6.0, -4.0), 0.0)):
+        settled = settle(project(DISC.replace(field_deg=field), Holdout(image=str(tmp_path / "a.exr"))))
+        shots = make_shots(settled, make_opening(settled, None))
+        assert sum(shot.share for shot in shots) == pytest.approx(seen)
