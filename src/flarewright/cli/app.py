@@ -21,6 +21,7 @@ from . import (
     design_identify,
     design_scratch,
     design_solve,
+    edit,
     ghosts,
     lens_check,
     lens_convert,
@@ -54,6 +55,7 @@ app.command("render", epilog=render.EPILOG)(render.render)
 app.command("ghosts", epilog=ghosts.EPILOG)(ghosts.ghosts)
 app.command("predict", epilog=predict.EPILOG)(predict.predict)
 app.command("lenses", epilog=lenses.EPILOG)(lenses.lenses)
+app.command("edit", epilog=edit.EPILOG)(edit.edit)
 app.add_typer(lens_app, name="lens")
 app.add_typer(coating_app, name="coating")
 app.add_typer(project_app, name="project")

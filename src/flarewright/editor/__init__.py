@@ -1,0 +1,1 @@
+"""The browser editor: state in `model`, pictures from `render`, solutions from `design`."""

@@ -1,0 +1,109 @@
+"""What survives a crash: the whole history, written after every change."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from ..errors import FlarewrightError
+from ..io.atomic import write_atomically
+from ..model import Project
+from .history import History, Moment
+from .view import View
+
+VERSION = 1
+# steps back that are kept on disk
+KEPT = 60
+
+
+@dataclass(frozen=True)
+class Saved:
+    """What an autosave holds.
+
+    Attributes
+    ----------
+    history : History
+    view : View
+    file : str or None
+        The project file that is edited.
+    clean : bool
+        Whether that file holds the present project.
+    """
+
+    history: History
+    view: View
+    file: str | None
+    clean: bool
+
+
+def state_folder() -> Path:
+    """Return where the editor keeps its state: FLAREWRIGHT_STATE, or the system's place for such things."""
+    if given := os.environ.get("FLAREWRIGHT_STATE"):
+        return Path(given)
+    if sys.platform == "win32":
+        return Path(os.environ.get("LOCALAPPDATA", str(Path.home()))) / "flarewright"
+    if sys.platform == "darwin":
+        return Path.home() / "Library" / "Application Support" / "flarewright"
+    return Path(os.environ.get("XDG_STATE_HOME", str(Path.home() / ".local" / "state"))) / "flarewright"
+
+
+def autosave_path(what: str | None) -> Path:
+    """Return the autosave of a project file or a lens; None: of the session without either."""
+    name = "session" if what is None else hashlib.sha256(what.encode()).hexdigest()[:16]
+    return state_folder() / f"{name}.autosave.json"
+
+
+def write_autosave(path: Path, saved: Saved) -> None:
+    """Write a session, whole or not at all.
+
+    Parameters
+    ----------
+    path : Path
+    saved : Saved
+
+    Raises
+    ------
+    OutputError
+        The file cannot be written.
+    """
+    first = max(0, saved.history.at - KEPT + 1)
+    moments = saved.history.moments[first : first + KEPT]
+    data = {
+        "version": VERSION, "file": saved.file, "clean": saved.clean, "at": saved.history.at - first,
+        "view": saved.view.model_dump(mode="json"),
+        "moments": [
+            {"label": m.label, "group": m.group, "project": m.project.model_dump(mode="json")} for m in moments
+        ],
+    }  # fmt: skip
+    text = json.dumps(data, allow_nan=False)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_atomically(path, lambda temporary: _write(temporary, text))
+
+
+def read_autosave(path: Path) -> Saved | None:
+    """Read what `write_autosave` wrote; None where there is nothing, or nothing of use."""
+    try:
+        data: dict[str, Any] = json.loads(path.read_text("utf-8"))
+        if data["version"] != VERSION:
+            return None
+        moments = tuple(
+            Moment(Project.model_validate(m["project"]), str(m["label"]), str(m["group"])) for m in data["moments"]
+        )
+        at = int(data["at"])
+        if not 0 <= at < len(moments):
+            return None
+        return Saved(History(moments, at), View.model_validate(data["view"]), data["file"], bool(data["clean"]))
+    except (OSError, ValueError, KeyError, TypeError, ValidationError, FlarewrightError):
+        # a damaged autosave must not keep the editor from starting
+        return None
+
+
+def _write(path: Path, text: str) -> None:
+    path.write_text(text, "utf-8")

@@ -1,0 +1,149 @@
+"""Drawings beside the picture: cross-section, coatings, colour maps, the library's thumbnails."""
+
+from __future__ import annotations
+
+import hashlib
+import threading
+from functools import lru_cache
+
+import numpy as np
+
+from ..design.colors import indices_of, pair_map
+from ..design.ghosts import placed_ghosts
+from ..design.prescription import structure_of
+from ..errors import FlarewrightError, OutputError, ProjectError
+from ..io.atomic import write_atomically
+from ..io.coating_text import format_coating
+from ..io.library import lens_path, shipped
+from ..model import Coating, Project, Surface
+from ..model.design import Bounds
+from ..optics.coating_response import WAVELENGTHS_NM, coating_response
+from ..optics.dispersion import refractive_index
+from ..optics.pack import resolve_coatings
+from ..render.coating_plot import PLOT_ANGLES_DEG, STRIP_ANGLES_DEG, coating_figure
+from ..render.cross_section import cross_section
+from ..render.figure import to_svg
+from ..render.prepare import as_lens, load_lens, settle
+from .autosave import state_folder
+from .files import project_for_lens
+from .shown import jpeg, pixels_of, png
+from .studio import exposure_of, take
+from .view import View
+
+THUMB_SCALE = 0.25
+# thumbnails are drawn one at a time: they are many, and the picture in the viewport comes first
+_THUMBS = threading.Lock()
+
+
+def section_svg(project: Project, ghost: str | None) -> str:
+    """Draw the lens with the light's rays, or with those of a ghost."""
+    settled = settle(project)
+    pair = None
+    if ghost and ghost.count("-") == 1 and "sensor" not in ghost:
+        j, i = ghost.split("-")
+        pair = int(j), int(i)
+    angle = max(project.lights, key=lambda light: light.intensity).field_deg
+    return cross_section(settled.lens, settled.order, field_deg=angle, ghost=pair).svg
+
+
+def coating_svg(project: Project, row: int) -> str:
+    """Plot what the coating of a row reflects."""
+    lens = as_lens(project.lens)
+    if not 0 <= row < len(lens.rows) or not isinstance(lens.rows[row], Surface):
+        raise ProjectError(f"row {row} is no surface, so nothing is coated there")
+    coat: Coating | None = resolve_coatings(lens, project.coating)[row]
+    surface, before = lens.rows[row], lens.rows[row - 1] if row else None
+    assert isinstance(surface, Surface)
+    medium = surface.medium or (before.medium if isinstance(before, Surface) else None)
+    if medium is None:
+        raise ProjectError(f"row {row} has air on both sides, so nothing is coated there")
+    index = refractive_index(medium, WAVELENGTHS_NM)
+    curves = coating_response(coat, medium.n_d, index, PLOT_ANGLES_DEG)
+    strip = coating_response(coat, medium.n_d, index, STRIP_ANGLES_DEG)
+    bare = float(coating_response(None, medium.n_d, index, 0.0).luminous_reflectance[0])
+    name = "no coating" if coat is None else format_coating(coat)
+    return to_svg(coating_figure(curves, strip, bare, f"Row {row}: {name}", medium.glass or f"n = {medium.n_d:g}"))
+
+
+def colour_map(project: Project, ghost: str) -> bytes:
+    """Draw the colours that a ghost takes by the centre wavelengths of its two mirrors' coatings; PNG.
+
+    First mirror upwards, second to the right, `Bounds().center_wavelength_nm` from end to end.
+    """
+    j, i = (int(part) for part in ghost.split("-"))
+    lens = as_lens(project.lens)
+    picture = pair_map(indices_of(lens), (j, i), Bounds())
+    coded = np.power(np.clip(picture[::-1], 0.0, 1.0), 1.0 / 2.2)
+    return png((coded * 255.0 + 0.5).astype(np.uint8))
+
+
+def places(project: Project) -> list[dict[str, object]]:
+    """Return where matrices put each ghost that design can move: centre (mm along the line to the light), radius."""
+    settled = settle(project)
+    structure_of(settled.lens)
+    x, y = (np.tan(np.radians(angle)) for angle in project.lights[0].field_deg)
+    slope = float(np.hypot(x, y))
+    found = placed_ghosts(
+        settled.lens, f_number=settled.order.f_number, sensor_distance=settled.order.sensor_distance
+    )  # fmt: skip
+    return [
+        {
+            "name": f"{one.first_reflection}-{one.second_reflection}", "place": one.place * slope,
+            "radius": one.radius, "hidden": bool(slope > one.reach),
+        }
+        for one in found
+    ]  # fmt: skip
+
+
+@lru_cache(maxsize=1)
+def library() -> tuple[dict[str, object], ...]:
+    """Return the lenses that ship: name, title, patent, and what is searched for."""
+    out = []
+    for name in shipped():
+        try:
+            lens = load_lens(name)
+        except FlarewrightError:
+            continue
+        out.append(
+            {
+                "name": name, "title": lens.name, "source": lens.source, "f_number": lens.f_number,
+                "rows": len(lens.rows), "words": f"{name} {lens.name} {lens.source} f/{lens.f_number:g}".lower(),
+            }
+        )  # fmt: skip
+    return tuple(out)
+
+
+def thumbnail(name: str) -> bytes:
+    """Draw a lens' flare small; kept on disk, for a lens file that does not change has one flare.
+
+    Parameters
+    ----------
+    name : str
+        Of a lens that ships.
+
+    Returns
+    -------
+    bytes
+        JPEG.
+    """
+    if name not in shipped():
+        raise ProjectError(f"{name!r} is no lens of the library")
+    stamp = hashlib.sha256(lens_path(name).read_bytes()).hexdigest()[:16]
+    path = state_folder() / "thumbnails" / f"{name}.{stamp}.jpg"
+    if path.is_file():
+        return path.read_bytes()
+    with _THUMBS:
+        picture = take(project_for_lens(name), "draft", View(), scale=THUMB_SCALE)
+        data = jpeg(pixels_of(picture.ghosts + picture.rest, exposure_of(picture), View()), 85)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_atomically(path, lambda temporary: _write(temporary, data))
+    except (OSError, OutputError):
+        # without a place to keep it, it is drawn anew next time
+        return data
+    return data
+
+
+def _write(path: object, data: bytes) -> None:
+    assert hasattr(path, "write_bytes")
+    path.write_bytes(data)

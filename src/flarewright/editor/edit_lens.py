@@ -1,0 +1,354 @@
+"""Changes of the prescription: cells, rows, the stop, another lens."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import atan, degrees, isfinite, radians, tan
+from typing import Any
+
+from ..errors import FlarewrightError, GlassError, LensError
+from ..io.coating_text import UNCOATED, coating_from, format_coating
+from ..io.media import attach
+from ..model import AsLens, Iris, Lens, PerRow, Project, Row, Stop, Surface
+from ..model.art import Art
+from ..render.prepare import as_lens, first_order
+
+COLUMNS = ("radius", "thickness", "glass", "n_d", "v_d", "semi_diameter", "coating")
+MOST_ROWS = 200
+
+
+def own_lens(project: Project) -> Lens:
+    """Return the project's lens as a prescription, estimates left open so that they follow what is changed."""
+    lens = as_lens(project.lens)
+    rows = tuple(
+        row.replace(semi_diameter=None, semi_diameter_estimated=False)
+        if isinstance(row, Surface) and row.semi_diameter_estimated
+        else row
+        for row in lens.rows
+    )
+    open_lens: Lens = lens.replace(rows=rows)
+    return open_lens
+
+
+def set_cell(project: Project, row: int, column: str, text: str) -> Project:
+    """Write into one cell of the prescription.
+
+    Parameters
+    ----------
+    project : Project
+    row : int
+    column : str
+        One of `COLUMNS`.
+    text : str
+        As a person types it: "flat", "52.3", "N-BK7", "air", "quarter-wave:550"; empty: unknown, or none.
+
+    Returns
+    -------
+    Project
+
+    Raises
+    ------
+    FlarewrightError
+        When it cannot be read, or the rows make no lens with it.
+    """
+    lens = own_lens(project)
+    if not 0 <= row < len(lens.rows) or column not in COLUMNS:
+        raise LensError(f"there is no cell {column!r} in row {row}")
+    old, words = lens.rows[row], text.strip()
+    if isinstance(old, Stop):
+        if column != "thickness":
+            raise LensError(f"row {row} is the stop: it has a thickness only, its opening follows from the f-number")
+        new: Row = old.replace(thickness=_number(words, row, column))
+    else:
+        new = _changed(old, row, column, words)
+    rows = (*lens.rows[:row], new, *lens.rows[row + 1 :])
+    if column == "coating" and not isinstance(project.coating, AsLens):
+        # the cell shows what the row wears, so that is what it changes
+        return _recoated(project, lens, row, new)
+    return with_lens(project, lens.replace(rows=rows))
+
+
+def _recoated(project: Project, lens: Lens, row: int, new: Row) -> Project:
+    from ..optics.pack import resolve_coatings
+
+    coats = list(resolve_coatings(lens, project.coating))
+    coats[row] = new.coating if isinstance(new, Surface) else None
+    changed: Project = project.replace(coating=PerRow(coatings=tuple(coats)))
+    return changed
+
+
+def _changed(old: Surface, row: int, column: str, words: str) -> Surface:
+    if column == "radius":
+        return _replaced(old, curvature=_curvature(words, row))
+    if column == "thickness":
+        return _replaced(old, thickness=_number(words, row, column))
+    if column == "semi_diameter":
+        return _replaced(old, semi_diameter=None if not words else _number(words, row, column))
+    if column == "coating":
+        return _replaced(old, coating=coating_from(words))
+    return _replaced(old, medium=_medium(old, row, column, words))
+
+
+def _replaced(old: Surface, **changes: Any) -> Surface:
+    new: Surface = old.replace(**changes)
+    return new
+
+
+def _medium(old: Surface, row: int, column: str, words: str) -> Any:
+    """Find what fills the gap behind a row when its glass, index or Abbe number is written anew."""
+    if words.lower() in ("", "air", "1", "1.0", UNCOATED):
+        if column == "v_d" and old.medium is not None:
+            return attach(None, old.medium.n_d, None)[0]
+        return None
+    try:
+        if column == "glass":
+            return attach(words, None, None)[0]
+        value = _number(words, row, column)
+        if column == "n_d":
+            # another index is another glass: its name would be a lie
+            return attach(None, value, old.medium.v_d if old.medium is not None else None)[0]
+        if old.medium is None:
+            raise GlassError(f"row {row}: air has no V_d; write a glass or its n_d first")
+        return attach(None, old.medium.n_d, value)[0]
+    except GlassError as error:
+        raise LensError(f"row {row}: {str(error).removeprefix(f'row {row}: ')}") from None
+
+
+def _number(words: str, row: int, column: str) -> float:
+    try:
+        value = float(words.replace(",", "."))
+    except ValueError:
+        raise LensError(f"row {row}: {column} {words!r} is no number; write it in mm, like 12.5") from None
+    if not isfinite(value):
+        raise LensError(f"row {row}: {column} {words!r} is no finite number; write it in mm, like 12.5")
+    return value
+
+
+def _curvature(words: str, row: int) -> float:
+    if words.lower() in ("flat", "inf", "infinity", "plane", "∞", ""):
+        return 0.0
+    radius = _number(words, row, "radius")
+    if abs(radius) < 1e-3:
+        raise LensError(f'row {row}: radius {words} is smaller than a micrometre; a plane surface is "flat"')
+    return 1.0 / radius
+
+
+def add_row(project: Project, row: int) -> Project:
+    """Put a plane air-to-air surface behind a row, 1 mm behind it where there is room; it gets its glass next."""
+    lens = own_lens(project)
+    if len(lens.rows) >= MOST_ROWS:
+        raise LensError(f"a lens has at most {MOST_ROWS} rows here")
+    old = lens.rows[row]
+    gap = 0.5 * old.thickness if row + 1 < len(lens.rows) else 1.0
+    medium = old.medium if isinstance(old, Surface) else None
+    semi = old.semi_diameter if isinstance(old, Surface) else None
+    front = old.replace(thickness=old.thickness - gap) if row + 1 < len(lens.rows) else old.replace(thickness=gap)
+    new = Surface(thickness=gap, medium=medium, semi_diameter=semi)
+    return _renumbered(project, lens, (*lens.rows[:row], front, new, *lens.rows[row + 1 :]), _behind(row + 1))
+
+
+def duplicate_row(project: Project, row: int) -> Project:
+    """Put a copy of a row behind it."""
+    lens = own_lens(project)
+    if not isinstance(lens.rows[row], Surface):
+        raise LensError(f"row {row} is the stop, and a lens has one")
+    return _renumbered(project, lens, (*lens.rows[: row + 1], *lens.rows[row:]), _behind(row + 1))
+
+
+def remove_row(project: Project, row: int) -> Project:
+    """Take a row out; the gap in front of it takes its room, and the glass in front of it goes on to the next row."""
+    lens = own_lens(project)
+    gone = lens.rows[row]
+    if isinstance(gone, Stop):
+        raise LensError(f"row {row} is the stop, which every lens has; make another row the stop first")
+    rows = list(lens.rows)
+    if row > 0:
+        rows[row - 1] = rows[row - 1].replace(thickness=rows[row - 1].thickness + gone.thickness)
+    del rows[row]
+    last = rows[-1]
+    if row == len(rows) and isinstance(last, Surface):
+        rows[-1] = last.replace(medium=None)
+    return _renumbered(
+        project, lens, tuple(rows), lambda k: None if k == row else k - (k > row)
+    )  # fmt: skip
+
+
+def move_stop(project: Project, row: int) -> Project:
+    """Make a row the stop (thesis section 5.3.3)."""
+    from ..design.edits import move_stop as moved
+
+    lens = as_lens(project.lens)
+    old = lens.stop_row
+    found = moved(lens, row)
+    coating = project.coating
+    if isinstance(coating, PerRow):
+        coating = PerRow(coatings=tuple(c for k, c in enumerate(coating.coatings) if k != old))
+    # the old stop is gone, and with another stop ghosts have other names
+    changed: Project = project.replace(lens=found, coating=coating, art=_without_names(project.art), f_number=None)
+    return changed
+
+
+def _behind(first: int) -> Callable[[int], int]:
+    return lambda k: k + (k >= first)
+
+
+def _renumbered(project: Project, lens: Lens, rows: tuple[Row, ...], place: Callable[[int], int | None]) -> Project:
+    """Give a lens new rows, and everything that counts rows its new numbers."""
+    try:
+        presets = {name: _moved(list(c), place, len(rows)) for name, c in lens.coating_presets.items()}
+        positions = tuple(
+            p.replace(gaps=tuple((new, gap) for row, gap in p.gaps if (new := place(row)) is not None))
+            for p in lens.positions
+        )
+        elements = tuple(
+            e.replace(rows=ends) for e in lens.elements if None not in (ends := tuple(place(k) for k in e.rows))
+        )
+        changed = lens.replace(rows=rows, coating_presets=presets, positions=positions, elements=elements)
+    except ValueError as error:
+        raise LensError(sentence(error)) from None
+    coating = project.coating
+    if isinstance(coating, PerRow):
+        coating = PerRow(coatings=_moved(list(coating.coatings), place, len(rows)))
+    base: Project = project.replace(coating=coating, art=_without_names(project.art))
+    return with_lens(base, changed)
+
+
+def _moved(entries: list[Any], place: Callable[[int], int | None], count: int) -> tuple[Any, ...]:
+    out: list[Any] = [None] * count
+    for k, entry in enumerate(entries):
+        new = place(k)
+        if new is not None:
+            out[new] = entry
+    return tuple(out)
+
+
+def _without_names(art: Art) -> Art:
+    """Leave out rules that name rows, for the rows have other numbers now."""
+    plain = tuple(rule for rule in art.rules if not any(c.isdigit() for c in rule.select.partition(":")[0]))
+    kept: Art = art.replace(
+        rules=tuple(rule for rule in plain if not rule.select.removeprefix("not ").startswith("row:"))
+    )
+    return kept
+
+
+def with_lens(project: Project, lens: Lens) -> Project:
+    """Give a project a prescription; what the iris says stays."""
+    changed: Project = project.replace(lens=lens)
+    return changed
+
+
+def choose_lens(project: Project, lens: str | Lens) -> Project:
+    """Take another lens: what belonged to the old one (coatings, art, zoom, target) is left behind.
+
+    Lights keep their places in the picture, and the opening is that of before as far as the lens opens.
+    """
+    known = as_lens(lens)
+    efl = first_order(known).efl
+    try:
+        old = first_order(as_lens(project.lens)).efl
+    except FlarewrightError:
+        old = efl
+    lights = tuple(
+        light.replace(field_deg=tuple(_kept_place(angle, old / efl) for angle in light.field_deg))
+        for light in project.lights
+    )
+    stopped = None if project.f_number is None else max(project.f_number, known.f_number)
+    iris = known.iris if known.iris != Iris() else project.iris
+    changed: Project = project.replace(
+        lens=lens, f_number=stopped, iris=iris, coating=AsLens(), lights=lights, art=Art(), zoom=None, design=None
+    )
+    return changed
+
+
+def _kept_place(angle_deg: float, zoom: float) -> float:
+    return round(degrees(atan(tan(radians(angle_deg)) * zoom)), 4)
+
+
+def set_lens_facts(project: Project, values: dict[str, Any]) -> Project:
+    """Change the lens' own facts: name, f_number (wide open), field_deg, sensor_distance."""
+    return with_lens(project, own_lens(project).replace(**values))
+
+
+def sentence(error: Exception) -> str:
+    """Return one sentence for whatever refused an edit."""
+    from pydantic import ValidationError
+
+    from ..io.sentences import validation_sentences
+
+    if isinstance(error, ValidationError):
+        return "; ".join(validation_sentences(error))
+    return " ".join(str(error).split())
+
+
+@dataclass(frozen=True)
+class Prescription:
+    """The table of a lens, ready for the page.
+
+    Attributes
+    ----------
+    rows : tuple of dict
+        One a row: the text of every column, `stop`, and `notes`: column to sentence.
+    facts : dict
+        efl, bfl, f_number and the like, mm; empty when the lens makes no image.
+    problem : str
+        Why it makes none; empty otherwise.
+    """
+
+    rows: tuple[dict[str, Any], ...]
+    facts: dict[str, float]
+    problem: str
+
+
+def prescription(project: Project) -> Prescription:
+    """Return the table of a project's lens with what is to be said beside its cells."""
+    from ..optics.pack import resolve_coatings
+    from ..render.prepare import settle
+    from .lens_notes import notes
+
+    problem, facts = "", {}
+    try:
+        settled = settle(project)
+        order = settled.order
+        facts = {
+            "efl": order.efl, "bfl": order.bfl, "f_number": order.f_number, "sensor_distance": order.sensor_distance,
+            "entrance_pupil": order.entrance_pupil_diameter, "stop": 2.0 * order.stop_semi_diameter,
+        }  # fmt: skip
+    except FlarewrightError as error:
+        problem = str(error)
+    try:
+        lens = as_lens(project.lens)
+    except FlarewrightError:
+        if isinstance(project.lens, str):
+            return Prescription((), {}, problem)
+        lens = project.lens
+    try:
+        coats = resolve_coatings(lens, project.coating)
+    except FlarewrightError:
+        coats = tuple(None for _ in lens.rows)
+    told = notes(lens)
+    rows = tuple(_row(k, row, coats[k], told.get(k, {})) for k, row in enumerate(lens.rows))
+    return Prescription(rows, facts, problem)
+
+
+def _row(k: int, row: Row, coat: Any, told: dict[str, str]) -> dict[str, Any]:
+    if isinstance(row, Stop):
+        return {"row": k, "stop": True, "thickness": _text(row.thickness), "notes": told}
+    medium = row.medium
+    return {
+        "row": k,
+        "stop": False,
+        "radius": "flat" if row.curvature == 0.0 else _text(1.0 / row.curvature),
+        "thickness": _text(row.thickness),
+        "glass": "" if medium is None else medium.glass or "",
+        "n_d": "" if medium is None else f"{medium.n_d:.5g}",
+        "v_d": "" if medium is None or medium.v_d is None else f"{medium.v_d:.4g}",
+        "semi_diameter": "" if row.semi_diameter is None else _text(row.semi_diameter),
+        "estimated": row.semi_diameter_estimated,
+        "coating": "" if coat is None else format_coating(coat),
+        "notes": told,
+    }
+
+
+def _text(value: float) -> str:
+    return f"{value:.6g}"

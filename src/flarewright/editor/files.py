@@ -1,0 +1,212 @@
+"""Opening, importing and exporting: what goes from the editor to files and back."""
+
+from __future__ import annotations
+
+import csv
+import io
+import shlex
+from collections.abc import Callable
+from math import atan, degrees
+from pathlib import Path
+from typing import Literal
+
+from .. import __version__
+from ..errors import FlarewrightError, LensError, OutputError, ProjectError
+from ..io.atomic import write_atomically
+from ..io.exr import write_exr
+from ..io.lens_writer import format_lens
+from ..io.library import lens_path, shipped
+from ..io.project_file import project_from_data, project_text, read_project
+from ..io.text_file import read_toml
+from ..model import Camera, Iris, Lens, Light, Preset, Project
+from ..render.prepare import complete_lens, first_order, load_lens, settle
+from ..render.render import render
+from .edit_lens import own_lens
+from .seen import Seen
+
+SAMPLE = "heliar-tronnier"
+# of a new project: where the light is imaged, and how far it is stopped down
+PLACE_MM = (10.5, 5.6)
+F_NUMBER = 8.0
+PICTURES = (".exr", ".png", ".jpg", ".jpeg")
+Kind = Literal["exr", "png", "lens", "project", "csv"]
+SUFFIXES: dict[str, str] = {"exr": ".exr", "png": ".png", "lens": ".lens.toml", "project": ".toml", "csv": ".csv"}
+
+
+def sample_project() -> Project:
+    """Return the project that the first run shows: a lens of few, large ghosts, coated as the thesis has it."""
+    base = project_for_lens(SAMPLE)
+    shown: Project = base.replace(
+        f_number=16.0, iris=Iris(blades=6, rotation_deg=10.0), coating=Preset(name="thesis"),
+        lights=(Light(field_deg=(8.0, 4.4)),),
+    )  # fmt: skip
+    return shown
+
+
+def project_for_lens(lens: str | Lens) -> Project:
+    """Return a project with a lens, a light in the picture's upper right and six blades where the lens says nothing."""
+    known = load_lens(lens) if isinstance(lens, str) else complete_lens(lens)
+    iris = known.iris if known.iris != Iris() else Iris(blades=6)
+    efl = first_order(known).efl
+    x, y = (round(degrees(atan(mm / efl)), 3) for mm in PLACE_MM)
+    return Project(
+        lens=lens, iris=iris, f_number=max(known.f_number, F_NUMBER), lights=(Light(field_deg=(x, y)),),
+        camera=Camera(size_px=(1920, 1080)),
+    )  # fmt: skip
+
+
+def open_any(text: str) -> tuple[Project, str | None]:
+    """Open a project file, a lens file, or a shipped lens by its name.
+
+    Parameters
+    ----------
+    text : str
+
+    Returns
+    -------
+    project : Project
+    file : str or None
+        The project file, to be saved to again.
+
+    Raises
+    ------
+    FlarewrightError
+        When it is neither.
+    """
+    path = Path(text).expanduser()
+    if path.suffix.lower() == ".toml" and path.is_file() and _is_project(read_toml_of(path)):
+        project = read_project(path)
+        settle(project)
+        return project, str(path.resolve())
+    found = lens_path(text)
+    name = found.stem if found.stem in shipped() and not path.exists() else str(path.resolve())
+    return project_for_lens(name), None
+
+
+def read_toml_of(path: Path) -> dict[str, object]:
+    """Read TOML; a file that is none is told in one sentence."""
+    try:
+        return read_toml(path, "a project or lens file")
+    except ValueError as error:
+        raise ProjectError(str(error)) from None
+
+
+def _is_project(data: dict[str, object]) -> bool:
+    return "lights" in data or "lens" in data
+
+
+def imported(name: str, data: bytes, folder: Path, project: Project) -> tuple[Project | None, Lens | None, str | None]:
+    """Take in a file that was dropped on the page.
+
+    Parameters
+    ----------
+    name : str
+        As the file is called; its ending says what it is.
+    data : bytes
+    folder : Path
+        Where it is kept: pictures are read again later.
+    project : Project
+        What is open, for messages.
+
+    Returns
+    -------
+    project, lens, picture
+        One of the three.
+
+    Raises
+    ------
+    FlarewrightError
+        When it is nothing that the editor reads; the message names the kinds that it does.
+    """
+    del project
+    suffix = Path(name).suffix.lower()
+    plain = Path(name).name or "dropped"
+    if suffix not in (".toml", ".lens", *PICTURES):
+        raise LensError(
+            f"{plain} cannot be opened here: drop a lens (.lens or .toml), a project (.toml), or a background picture "
+            "(.exr, .png, .jpg)"
+        )
+    folder.mkdir(parents=True, exist_ok=True)
+    path = folder / plain
+    write_atomically(path, lambda temporary: _write_bytes(temporary, data))
+    if suffix in PICTURES:
+        return None, None, str(path)
+    try:
+        if suffix == ".toml":
+            table = read_toml_of(path)
+            if _is_project(table):
+                found = project_from_data(table, folder=folder, where=plain)
+                settle(found)
+                return found, None, None
+        lens = load_lens(path)
+    except FlarewrightError as error:
+        # the folder is ours, and means nothing to a person
+        raise type(error)(str(error).replace(str(path), plain)) from None
+    return None, lens.replace(name=lens.name or plain), None
+
+
+def _write_bytes(path: Path, data: bytes) -> None:
+    path.write_bytes(data)
+
+
+def save_project(project: Project, text: str) -> Path:
+    """Write a project file.
+
+    Parameters
+    ----------
+    project : Project
+    text : str
+        Path; `.toml` is added where it is missing.
+
+    Returns
+    -------
+    Path
+
+    Raises
+    ------
+    OutputError
+        It cannot be written.
+    """
+    if not text.strip():
+        raise OutputError("the project needs a file name, like shot.toml")
+    path = Path(text.strip()).expanduser()
+    if path.suffix.lower() != ".toml":
+        path = path.with_name(f"{path.name}.toml")
+    written = project_text(project, folder=path.resolve().parent)
+    write_atomically(path, lambda temporary: _write_bytes(temporary, written.encode()))
+    return path.resolve()
+
+
+def command_line(file: str, project: Project) -> str:
+    """Return the command that renders a saved project."""
+    stem = Path(file).with_suffix("")
+    quality = " --quality final" if project.quality.mode == "draft" else ""
+    return f"flarewright render --project {shlex.quote(file)}{quality} -o {shlex.quote(f'{stem}.exr')}"
+
+
+def export_picture(project: Project, path: Path, progress: Callable[[float, str], None] | None = None) -> None:
+    """Render a project at its own size and quality into an EXR with its layers."""
+    rendering = render(project, progress=progress)
+    write_exr(
+        path, rendering.layers, project.camera.size_px, pixel_type=project.output.pixel_type,
+        metadata={"version": __version__, "project": project_text(project)},
+        pixel_aspect=rendering.project.camera.pixel_aspect, colorspace=project.output.colorspace,
+    )  # fmt: skip
+
+
+def lens_text(project: Project) -> str:
+    """Return the project's lens as a lens file."""
+    return format_lens(own_lens(project))
+
+
+def ghost_csv(seen: Seen) -> str:
+    """Return the ghosts of a picture as a table: brightest first, millimetres in the upright picture."""
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow(["ghost", "flux_mm2", "peak_irradiance", "rms_radius_mm", "x_mm", "y_mm"])
+    width, height = seen.project.camera.sensor
+    for ghost in seen.ghosts:
+        x, y = (ghost.centre[0] - 0.5) * width, (0.5 - ghost.centre[1]) * height
+        numbers = (ghost.flux, ghost.peak, ghost.size_mm, x, y)
+        writer.writerow([ghost.name, *(f"{number:.6g}" for number in numbers)])
+    return out.getvalue()

@@ -1,0 +1,85 @@
+"""Work beside the page: one thread that always does the newest job and drops what is overtaken."""
+
+from __future__ import annotations
+
+import threading
+import traceback
+from collections.abc import Callable
+from contextlib import suppress
+
+
+class Overtaken(Exception):  # noqa: N818 (nothing is wrong: something newer came)
+    """Raised inside a job when a newer one waits."""
+
+
+Check = Callable[[], None]
+Job = Callable[[Check], None]
+
+
+class Lane:
+    """Runs one job at a time; a new one takes the place of the waiting one and asks the running one to end.
+
+    Parameters
+    ----------
+    name : str
+        Of the thread.
+    """
+
+    def __init__(self, name: str) -> None:
+        self._wake = threading.Condition()
+        self._next: tuple[int, Job] | None = None
+        self._newest = 0
+        self._busy = False
+        self._closed = False
+        self._thread = threading.Thread(target=self._run, name=name, daemon=True)
+        self._thread.start()
+
+    def submit(self, job: Job) -> None:
+        """Do this next; `job` is given a function that raises `Overtaken` when it should end."""
+        with self._wake:
+            self._newest += 1
+            self._next = (self._newest, job)
+            self._wake.notify_all()
+
+    def cancel(self) -> None:
+        """Ask the running job to end, and forget the waiting one."""
+        with self._wake:
+            self._newest += 1
+            self._next = None
+
+    def wait(self, timeout_s: float) -> bool:
+        """Wait until nothing is left to do; False when that takes too long."""
+        with self._wake:
+            return self._wake.wait_for(lambda: self._next is None and not self._busy, timeout_s)
+
+    def close(self) -> None:
+        """End after the running job."""
+        with self._wake:
+            self._closed = True
+            self._newest += 1
+            self._next = None
+            self._wake.notify_all()
+
+    def _run(self) -> None:
+        while True:
+            with self._wake:
+                self._wake.wait_for(lambda: self._next is not None or self._closed)
+                if self._next is None:
+                    return
+                number, job = self._next
+                self._next, self._busy = None, True
+
+            def check(number: int = number) -> None:
+                if number != self._newest:
+                    raise Overtaken
+
+            try:
+                with suppress(Overtaken):
+                    job(check)
+            except Exception:
+                # a job tells its own mistakes; what is left is one of ours, and the lane must go on
+                traceback.print_exc()
+            finally:
+                with self._wake:
+                    self._busy = False
+                    self._wake.notify_all()

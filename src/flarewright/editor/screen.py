@@ -1,0 +1,239 @@
+"""What the viewport shows, and the work that makes it: latest wins, sharper as it waits, last good one kept."""
+
+from __future__ import annotations
+
+import threading
+import time
+from dataclasses import replace
+from typing import Any
+
+from ..errors import FlarewrightError
+from ..model import Project
+from . import studio
+from .jobs import Check, Lane
+from .seen import Seen, alone, is_there, outline, see, under
+from .session import Session
+from .shown import jpeg, pixels_of, plate_for, png
+from .studio import Match, Picture
+from .view import View
+
+# pictures of a dragging hand: their sides as parts of the viewport's, and the time that one may take
+SCALES = (1.0, 2.0 / 3.0, 0.5, 1.0 / 3.0)
+SLOW_S, FAST_S = 0.045, 0.016
+# a lens whose final picture takes less needs no draft in front of it
+SOON_S = 0.35
+TELL_S = 0.12
+OUTLINE = (240, 176, 84)
+# ghosts under the pointer that are looked at closely before one is believed
+LOOKED_AT = 6
+
+
+class Screen:
+    """The pictures of a session.
+
+    Parameters
+    ----------
+    session : Session
+    """
+
+    def __init__(self, session: Session) -> None:
+        self.session = session
+        self.picture: Picture | None = None
+        self.seen: Seen | None = None
+        self.match = Match()
+        self.problem = ""
+        self.number = 0
+        self._scale = 0
+        self._final_s = 10.0
+        self._lane = Lane("pictures")
+        self._hand = threading.Lock()
+        self._busy: tuple[Project, View] | None = None
+        session.listeners.append(self._heard)
+
+    def start(self) -> None:
+        """Begin with the first picture."""
+        self._heard({"type": "changed"})
+
+    def wait(self, timeout_s: float) -> bool:
+        """Wait until the picture rests."""
+        return self._lane.wait(timeout_s)
+
+    def _heard(self, event: dict[str, Any]) -> None:
+        if event["type"] != "changed":
+            return
+        project, view = self.session.project, self.session.view
+        wanted = (project, view.replace(exposure_stops=None, look="srgb", plate=None, plate_stops=0.0))
+        if wanted == self._busy and not self.problem:
+            # only the way it is shown has changed
+            self._publish()
+            return
+        self._busy = wanted
+        self._lane.submit(lambda check: self._work(project, view, check))
+
+    # -----------------------------------------------------------------------------------------------------------------
+    # Work
+
+    def _work(self, project: Project, view: View, check: Check) -> None:
+        try:
+            self._draw(project, view, check)
+        except FlarewrightError as error:
+            check()
+            self.problem = str(error)
+            self.session.tell({"type": "picture"})
+        except MemoryError:
+            self.problem = "there is not enough memory for this picture; choose a smaller one"
+            self.session.tell({"type": "picture"})
+
+    def _draw(self, project: Project, view: View, check: Check) -> None:
+        shown = self.picture
+        fresh = shown is None or not studio.same_scene(shown.project, project)
+        working = view.grey or view.unclipped
+        draft: Picture | None = None
+        if fresh or working or self._final_s > SOON_S:
+            draft = studio.take(project, "draft", view)
+            check()
+            if fresh:
+                self.match = Match(1.0, studio.exposure_of(draft))
+            self._show(draft)
+        if not working:
+            final = studio.take(project, "final", view, progress=self._progress("final picture", check))
+            check()
+            self._final_s = final.seconds
+            if draft is None:
+                draft = studio.take(project, "draft", view)
+            self.match = studio.matched(draft, final, self.match)
+            if fresh:
+                self.match = replace(self.match, exposure_stops=studio.exposure_of(final))
+            self._show(final)
+        grade: studio.Grade = "draft" if working else "final"
+        self.seen = see(project, grade, self._progress("ghosts", check))
+        check()
+        self.session.tell({"type": "ghosts"})
+
+    def _progress(self, what: str, check: Check) -> Any:
+        told = 0.0
+
+        def step(part: float, _: str) -> None:
+            nonlocal told
+            check()
+            now = time.perf_counter()
+            if now - told > TELL_S:
+                told = now
+                self.session.tell({"type": "progress", "part": part, "what": what})
+
+        return step
+
+    def _show(self, picture: Picture) -> None:
+        self.picture, self.problem = picture, ""
+        self._publish()
+
+    def _publish(self) -> None:
+        self.number += 1
+        self.session.tell({"type": "picture"})
+
+    # -----------------------------------------------------------------------------------------------------------------
+    # What the page asks for
+
+    @property
+    def exposure_stops(self) -> float:
+        """What the picture is shown with."""
+        own = self.session.view.exposure_stops
+        return self.match.exposure_stops if own is None else own
+
+    def expose(self) -> None:
+        """Find the exposure anew, by what is shown now."""
+        if self.picture is not None:
+            gain = self.match.gain if self.picture.grade == "draft" else 1.0
+            self.match = replace(self.match, exposure_stops=studio.exposure_of(self.picture, gain))
+        self.session.set_view({"exposure_stops": None})
+
+    def encoded(self, quality: int = 92) -> bytes:
+        """Return the picture that is shown, as JPEG; black before there is one."""
+        return jpeg(self.pixels(), quality)
+
+    def pixels(self) -> Any:
+        """Return the picture that is shown as sRGB pixels."""
+        import numpy as np
+
+        picture = self.picture
+        if picture is None:
+            width, height = studio.view_size(self.session.project)
+            return np.zeros((height, width, 3), dtype=np.uint8)
+        return self._pixels(picture)
+
+    def _pixels(self, picture: Picture) -> Any:
+        view, light = self.session.view, studio.light_of(picture, self.match)
+        plate = plate_for(view, (light.shape[1], light.shape[0]))
+        return pixels_of(light, self.exposure_stops, view, plate)
+
+    def moving(self, light: int, x: float, y: float) -> tuple[bytes, float]:
+        """Draw the picture with a light elsewhere, as sharp as a dragging hand has patience for.
+
+        Parameters
+        ----------
+        light : int
+        x, y : float
+            Field angles, degrees.
+
+        Returns
+        -------
+        picture : bytes
+            JPEG.
+        seconds : float
+        """
+        from .edit_shot import move_light
+
+        # the final picture of a place that the hand has left is of no use
+        self._lane.cancel()
+        self._busy = None
+        with self._hand:
+            begun = time.perf_counter()
+            project = move_light(self.session.project, light, x, y)
+            picture = studio.take(project, "moving", self.session.view, scale=SCALES[self._scale])
+            if picture.seconds > SLOW_S and self._scale + 1 < len(SCALES):
+                self._scale += 1
+            elif picture.seconds < FAST_S and self._scale > 0:
+                self._scale -= 1
+            data = jpeg(self._pixels(picture), 80)
+            return data, time.perf_counter() - begun
+
+    def rest(self) -> None:
+        """Go on with the final picture after a drag that changed nothing."""
+        if self._busy is None:
+            self._heard({"type": "changed"})
+
+    def target(self, quality: int = 92) -> bytes:
+        """Draw the fictional target: the picture as the wishes would have it."""
+        import numpy as np
+
+        from .edit_wishes import new_discs, target_project
+
+        project = self.session.project
+        picture = studio.take(target_project(project), "draft", self.session.view)
+        ghosts = picture.ghosts * np.float32(self.match.gain) + picture.rest
+        height, width = ghosts.shape[:2]
+        across = width / project.camera.sensor[0]
+        level = float(np.percentile(ghosts.max(axis=2), 90.0)) + 0.25 * 2.0**-self.exposure_stops
+        rows, columns = np.mgrid[0:height, 0:width] + 0.5
+        for x, y, radius in new_discs(project):
+            away = np.hypot(columns - width / 2 - x * across, rows - height / 2 + y * across)
+            ghosts[away < radius * across] += np.float32(level)
+        return jpeg(pixels_of(ghosts, self.exposure_stops, self.session.view), quality)
+
+    def pick(self, u: float, v: float) -> tuple[str, ...]:
+        """Return the ghosts under a place, brightest first; the first of them are looked at in full size."""
+        seen = self.seen
+        if seen is None:
+            return ()
+        found = under(seen, u, v)
+        grade = self._grade()
+        near = [name for name in found[:LOOKED_AT] if is_there(alone(seen.project, name, grade), u, v)]
+        return (*near, *found[LOOKED_AT:])
+
+    def outlined(self, ghost: str) -> bytes:
+        """Draw the border of a ghost as PNG, clear elsewhere."""
+        return png(outline(alone(self.session.project, ghost, self._grade()), OUTLINE))
+
+    def _grade(self) -> studio.Grade:
+        view = self.session.view
+        return "draft" if view.grey or view.unclipped or self.picture is None else "final"

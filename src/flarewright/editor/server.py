@@ -1,0 +1,404 @@
+"""The web server of the editor: the page, its pictures, and what it asks for."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import tempfile
+from collections.abc import Awaitable, Callable
+from functools import wraps
+from pathlib import Path
+from typing import Any
+
+from starlette.applications import Starlette
+from starlette.background import BackgroundTask
+from starlette.concurrency import run_in_threadpool
+from starlette.requests import Request
+from starlette.responses import FileResponse, JSONResponse, Response
+from starlette.routing import Mount, Route, WebSocketRoute
+from starlette.staticfiles import StaticFiles
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
+from ..errors import FlarewrightError, ProjectError
+from . import drawings, files
+from .autosave import state_folder
+from .edit_lens import choose_lens
+from .guard import Application, Guard
+from .screen import Screen
+from .session import Session
+from .snapshot import ghosts_of, picture_of, solve_of, state_of
+from .solving import Solver
+
+STATIC = Path(__file__).parent / "static"
+MOST_BYTES = 256 * 2**20
+MOST_SECONDS = 3600.0
+
+Answer = Callable[[Request], Awaitable[Response]]
+Work = Callable[["Desk", Request, Any], Any]
+
+
+def told(work: Work) -> Callable[[Desk], Answer]:
+    """Make an answer of a function of request and body: what it returns as JSON, its mistake as one sentence."""
+
+    def bind(desk: Desk) -> Answer:
+        @wraps(work)
+        async def answer(request: Request) -> Response:
+            try:
+                raw = await request.body() if request.method == "POST" else b""
+                if request.url.path == "/api/import":
+                    body: Any = raw
+                else:
+                    body = json.loads(raw) if raw else {}
+                result = await run_in_threadpool(work, desk, request, body)
+            except FlarewrightError as error:
+                return JSONResponse({"error": str(error)}, status_code=400)
+            except (ValueError, KeyError, TypeError) as error:
+                return JSONResponse({"error": f"the editor did not understand the page: {error}"}, status_code=400)
+            if isinstance(result, Response):
+                return result
+            return JSONResponse(result if result is not None else {})
+
+        return answer
+
+    return bind
+
+
+class Desk:
+    """A session with its screen and its solver, and the tabs that look at it."""
+
+    def __init__(self, session: Session, greeting: str = "") -> None:
+        self.session, self.greeting = session, greeting
+        self.screen, self.solver = Screen(session), Solver(session)
+        self._tabs: set[asyncio.Queue[dict[str, Any]]] = set()
+        self._loop: asyncio.AbstractEventLoop | None = None
+        session.listeners.append(self._heard)
+
+    def _heard(self, event: dict[str, Any]) -> None:
+        """Pass on what happens, from whichever thread, to all tabs."""
+        kind = event["type"]
+        if kind == "changed":
+            event = {"type": kind, "revision": self.session.revision}
+        elif kind == "picture":
+            event = {"type": kind, **picture_of(self.screen)}
+        elif kind == "solve":
+            event = {"type": kind, **solve_of(self.solver)}
+        if self._loop is not None and not self._loop.is_closed():
+            self._loop.call_soon_threadsafe(self._post, event)
+
+    def _post(self, event: dict[str, Any]) -> None:
+        for tab in self._tabs:
+            tab.put_nowait(event)
+
+    async def socket(self, socket: WebSocket) -> None:
+        """Tell a tab what happens for as long as it is open."""
+        self._loop = asyncio.get_running_loop()
+        await socket.accept()
+        tab: asyncio.Queue[dict[str, Any]] = asyncio.Queue()
+        self._tabs.add(tab)
+        if self.greeting:
+            tab.put_nowait({"type": "message", "kind": "info", "text": self.greeting})
+            self.greeting = ""
+        sender = asyncio.create_task(_send(socket, tab))
+        try:
+            while True:
+                await socket.receive_text()
+        except WebSocketDisconnect:
+            pass
+        finally:
+            self._tabs.discard(tab)
+            sender.cancel()
+
+    def state(self) -> dict[str, Any]:
+        """Return what the page is made of."""
+        return state_of(self.screen, self.solver)
+
+
+async def _send(socket: WebSocket, tab: asyncio.Queue[dict[str, Any]]) -> None:
+    while True:
+        await socket.send_text(json.dumps(await tab.get()))
+
+
+def _state(desk: Desk, _request: Request, _body: Any) -> Any:
+    return desk.state()
+
+
+def _do(desk: Desk, _request: Request, body: Any) -> Any:
+    desk.session.do(str(body["name"]), dict(body.get("values", {})), str(body.get("group", "")))
+    return desk.state()
+
+
+def _view(desk: Desk, _request: Request, body: Any) -> Any:
+    desk.session.set_view(dict(body))
+    return desk.state()
+
+
+def _undo(desk: Desk, _request: Request, _body: Any) -> Any:
+    desk.session.undo()
+    return desk.state()
+
+
+def _redo(desk: Desk, _request: Request, _body: Any) -> Any:
+    desk.session.redo()
+    return desk.state()
+
+
+def _expose(desk: Desk, _request: Request, _body: Any) -> Any:
+    desk.screen.expose()
+    return desk.state()
+
+
+def _rest(desk: Desk, _request: Request, _body: Any) -> Any:
+    desk.screen.rest()
+
+
+def _picture(desk: Desk, _request: Request, _body: Any) -> Any:
+    return _jpeg(desk.screen.encoded())
+
+
+def _moving(desk: Desk, request: Request, _body: Any) -> Any:
+    asked = request.query_params
+    data, seconds = desk.screen.moving(int(asked["light"]), float(asked["x"]), float(asked["y"]))
+    return _jpeg(data, {"X-Seconds": f"{seconds:.4f}"})
+
+
+def _target(desk: Desk, _request: Request, _body: Any) -> Any:
+    return _jpeg(desk.screen.target())
+
+
+def _pick(desk: Desk, request: Request, _body: Any) -> Any:
+    asked = request.query_params
+    return {"ghosts": list(desk.screen.pick(float(asked["u"]), float(asked["v"])))}
+
+
+def _outline(desk: Desk, request: Request, _body: Any) -> Any:
+    return Response(desk.screen.outlined(request.query_params["ghost"]), media_type="image/png", headers=_FRESH)
+
+
+def _ghosts(desk: Desk, _request: Request, _body: Any) -> Any:
+    return ghosts_of(desk.screen)
+
+
+def _section(desk: Desk, request: Request, _body: Any) -> Any:
+    svg = drawings.section_svg(desk.session.project, request.query_params.get("ghost"))
+    return Response(svg, media_type="image/svg+xml", headers=_FRESH)
+
+
+def _coating(desk: Desk, request: Request, _body: Any) -> Any:
+    svg = drawings.coating_svg(desk.session.project, int(request.query_params["row"]))
+    return Response(svg, media_type="image/svg+xml", headers=_FRESH)
+
+
+def _colour_map(desk: Desk, request: Request, _body: Any) -> Any:
+    data = drawings.colour_map(desk.session.project, request.query_params["ghost"])
+    return Response(data, media_type="image/png", headers=_FRESH)
+
+
+def _places(desk: Desk, _request: Request, _body: Any) -> Any:
+    return {"places": drawings.places(desk.session.project)}
+
+
+def _library(_desk: Desk, _request: Request, _body: Any) -> Any:
+    return {"lenses": list(drawings.library())}
+
+
+def _thumbnail(_desk: Desk, request: Request, _body: Any) -> Any:
+    return _jpeg(drawings.thumbnail(request.path_params["name"]))
+
+
+def _glasses(_desk: Desk, request: Request, _body: Any) -> Any:
+    from ..io.glass_catalogue import all_names
+
+    words = request.query_params.get("q", "").lower().replace(" ", "")
+    names = [name for name in all_names() if words in name.lower().replace(" ", "")]
+    # those that begin so come first
+    names.sort(key=lambda name: (not name.lower().startswith(words), name))
+    return {"glasses": names[:40]}
+
+
+def _import(desk: Desk, request: Request, body: Any) -> Any:
+    name = request.query_params["name"]
+    if len(body) > MOST_BYTES:
+        raise ProjectError(f"{name} is larger than {MOST_BYTES // 2**20} MB, which no lens or background is")
+    kept = state_folder() / "imports"
+    project, lens, picture = files.imported(name, body, kept, desk.session.project)
+    if picture is not None:
+        if request.query_params.get("as") == "mask":
+            from ..io.mask_image import read_mask
+
+            read_mask(picture)
+            desk.session.do("set_iris", {"mask": picture})
+        else:
+            desk.session.set_view({"plate": picture})
+    elif project is not None:
+        desk.session.put(project, f"Import {name}")
+    elif lens is not None:
+        desk.session.put(choose_lens(desk.session.project, lens), f"Import {name}")
+    return desk.state()
+
+
+def _open(desk: Desk, _request: Request, body: Any) -> Any:
+    desk.session.open(str(body["text"]))
+    return desk.state()
+
+
+def _save(desk: Desk, _request: Request, body: Any) -> Any:
+    path = desk.session.save(str(body["text"]))
+    return desk.state() | {"told": f"Saved {path}"}
+
+
+def _command(desk: Desk, _request: Request, _body: Any) -> Any:
+    if desk.session.file is None or not desk.session.clean:
+        raise ProjectError("save the project first: the command renders the file")
+    return {"text": files.command_line(desk.session.file, desk.session.project)}
+
+
+def _export(desk: Desk, request: Request, _body: Any) -> Any:
+    kind, project = request.path_params["kind"], desk.session.project
+    if kind not in files.SUFFIXES:
+        raise ProjectError(f"there is no export {kind!r}; known are {', '.join(files.SUFFIXES)}")
+    stem = Path(desk.session.file).stem if desk.session.file else "flare"
+    name = {"Content-Disposition": f'attachment; filename="{_plain(stem)}{files.SUFFIXES[kind]}"'}
+    if kind == "exr":
+        folder = tempfile.mkdtemp(prefix="flarewright-")
+        path = Path(folder) / "flare.exr"
+        tell = desk.session.tell
+        files.export_picture(project, path, lambda part, what: tell({"type": "export", "part": part, "what": what}))
+        return FileResponse(path, headers=name, media_type="image/x-exr", background=BackgroundTask(_remove, path))
+    if kind == "png":
+        from .shown import png
+
+        return Response(png(desk.screen.pixels()), media_type="image/png", headers=name)
+    if kind == "csv" and desk.screen.seen is None:
+        raise ProjectError("the ghosts are still being measured; try again in a moment")
+    from ..io.project_file import project_text
+
+    if kind == "lens":
+        text = files.lens_text(project)
+    elif kind == "project":
+        text = project_text(project)
+    else:
+        assert desk.screen.seen is not None
+        text = files.ghost_csv(desk.screen.seen)
+    return Response(text, media_type="text/plain; charset=utf-8", headers=name)
+
+
+def _remove(path: Path) -> None:
+    """Remove an exported file when it is sent."""
+    path.unlink(missing_ok=True)
+    path.parent.rmdir()
+
+
+def _plain(stem: str) -> str:
+    return "".join(c if c.isascii() and (c.isalnum() or c in "-_.") else "_" for c in stem) or "flare"
+
+
+def _solve(desk: Desk, _request: Request, body: Any) -> Any:
+    seconds = min(max(float(body.get("seconds", 30.0)), 1.0), MOST_SECONDS)
+    desk.solver.start(seconds, desk.screen.exposure_stops)
+    return desk.state()
+
+
+def _colors(desk: Desk, _request: Request, body: Any) -> Any:
+    desk.solver.start_colors(str(body.get("kind", "quarter-wave")), desk.screen.exposure_stops)
+    return desk.state()
+
+
+def _stop(desk: Desk, _request: Request, _body: Any) -> Any:
+    desk.solver.stop()
+    return desk.state()
+
+
+def _accept(desk: Desk, _request: Request, body: Any) -> Any:
+    desk.solver.accept(int(body["number"]))
+    return desk.state()
+
+
+def _candidate(desk: Desk, request: Request, _body: Any) -> Any:
+    found, k = desk.solver.progress.found, int(request.path_params["k"])
+    if not 0 <= k < len(found):
+        raise ProjectError(f"there is no lens {k} among those found")
+    return _jpeg(found[k].picture)
+
+
+_FRESH = {"Cache-Control": "no-store"}
+
+
+def _jpeg(data: bytes, more: dict[str, str] | None = None) -> Response:
+    return Response(data, media_type="image/jpeg", headers=_FRESH | (more or {}))
+
+
+_GET = {
+    "/api/state": _state, "/api/picture": _picture, "/api/moving": _moving, "/api/target": _target,
+    "/api/pick": _pick, "/api/outline": _outline, "/api/ghosts": _ghosts, "/api/section": _section,
+    "/api/coating": _coating, "/api/map": _colour_map, "/api/places": _places, "/api/library": _library,
+    "/api/thumbnail/{name}": _thumbnail, "/api/glasses": _glasses, "/api/command": _command,
+    "/api/export/{kind}": _export, "/api/candidate/{k}": _candidate,
+}  # fmt: skip
+_POST = {
+    "/api/do": _do, "/api/view": _view, "/api/undo": _undo, "/api/redo": _redo, "/api/expose": _expose,
+    "/api/rest": _rest, "/api/import": _import, "/api/open": _open, "/api/save": _save, "/api/solve": _solve,
+    "/api/colors": _colors, "/api/stop": _stop, "/api/accept": _accept,
+}  # fmt: skip
+
+
+async def _index(_request: Request) -> Response:
+    return FileResponse(STATIC / "index.html", headers=_FRESH)
+
+
+def make_app(desk: Desk, token: str | None = None) -> Application:
+    """Return the ASGI application of a desk.
+
+    Parameters
+    ----------
+    desk : Desk
+    token : str, optional
+        Needed wherever the editor is not on the loopback address.
+
+    Returns
+    -------
+    callable
+    """
+    routes: list[Any] = [Route("/", _index)]
+    routes += [Route(path, told(work)(desk), methods=["GET"]) for path, work in _GET.items()]
+    routes += [Route(path, told(work)(desk), methods=["POST"]) for path, work in _POST.items()]
+    routes += [WebSocketRoute("/ws", desk.socket), Mount("/static", StaticFiles(directory=STATIC))]
+    return Guard(Starlette(routes=routes), token)
+
+
+def serve(desk: Desk, host: str, port: int, token: str | None, ready: Callable[[int], None]) -> None:
+    """Serve until Ctrl-C.
+
+    Parameters
+    ----------
+    desk : Desk
+    host : str
+    port : int
+        0: any that is free.
+    token : str or None
+    ready : callable
+        Called with the port once the page can be opened.
+
+    Raises
+    ------
+    ProjectError
+        When the port is taken.
+    """
+    import socket
+
+    import uvicorn
+
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    with socket.socket(family, socket.SOCK_STREAM) as place:
+        place.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            place.bind((host, port))
+        except OSError as error:
+            raise ProjectError(
+                f"the editor cannot listen on {host}:{port} ({(error.strerror or str(error)).lower()}); choose another "
+                "--port, or 0 for any that is free"
+            ) from None
+        desk.screen.start()
+        config = uvicorn.Config(make_app(desk, token), log_level="warning", lifespan="off", ws="websockets-sansio")
+        ready(place.getsockname()[1])
+        uvicorn.Server(config).run([place])
+    desk.session.flush()

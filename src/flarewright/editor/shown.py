@@ -1,0 +1,199 @@
+"""From light to a picture for the screen: exposure, look, background, JPEG."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import FlarewrightError, ProjectError
+from ..render.display import view
+from .view import View
+
+Floats = NDArray[np.float32]
+
+_LUMINANCE = np.array([0.2126, 0.7152, 0.0722], dtype=np.float32)
+MIDDLE_GREY = 0.18
+# stops below and above middle grey, and the colour that stands for what is up to there
+FALSE_COLOURS: tuple[tuple[float, tuple[int, int, int]], ...] = (
+    (-8.0, (8, 8, 10)),
+    (-6.0, (58, 28, 92)),
+    (-4.0, (36, 56, 150)),
+    (-2.0, (30, 120, 160)),
+    (-0.5, (40, 130, 80)),
+    (0.5, (128, 128, 128)),
+    (1.5, (150, 160, 60)),
+    (2.5, (215, 180, 60)),
+    (3.5, (225, 120, 50)),
+    (99.0, (214, 50, 48)),
+)
+
+
+def pixels_of(light: Floats, exposure_stops: float, look: View, plate: Floats | None = None) -> NDArray[np.uint8]:
+    """Return sRGB pixels of a linear picture.
+
+    Parameters
+    ----------
+    light : ndarray, shape (H, W, 3)
+        Linear Rec.709.
+    exposure_stops : float
+    look : View
+    plate : ndarray, shape (H, W, 3), optional
+        Linear background of its own brightness, added in front of the look.
+
+    Returns
+    -------
+    ndarray, shape (H, W, 3), uint8
+    """
+    if plate is not None:
+        light = light * np.float32(2.0**exposure_stops) + plate * np.float32(2.0**look.plate_stops)
+        exposure_stops = 0.0
+    if look.look == "false-colour":
+        return _false_colour(light * np.float32(2.0**exposure_stops))
+    if look.look == "aces":
+        return _aces(light * np.float32(2.0**exposure_stops))
+    return view(light, exposure_stops, look.look)
+
+
+def _false_colour(light: Floats) -> NDArray[np.uint8]:
+    stops = np.log2(np.maximum(light @ _LUMINANCE, 1e-12) / MIDDLE_GREY)
+    limits = np.array([limit for limit, _ in FALSE_COLOURS[:-1]])
+    colours = np.array([colour for _, colour in FALSE_COLOURS], dtype=np.uint8)
+    return np.asarray(colours[np.searchsorted(limits, stops)])
+
+
+# the cube that stands for an ACES view: side, and the stops around 1 that it covers
+_CUBE, _LOW, _HIGH = 40, -14.0, 12.0
+
+
+def aces_available() -> bool:
+    """Tell whether opencolorio is installed."""
+    from importlib.util import find_spec
+
+    return find_spec("PyOpenColorIO") is not None
+
+
+@lru_cache(maxsize=1)
+def _aces_cube() -> NDArray[np.float32]:
+    """Bake the ACES view of opencolorio's built-in configuration: a picture through it would take 0.2 s."""
+    if not aces_available():
+        raise ProjectError("the ACES view needs opencolorio: pip install opencolorio, or choose filmic")
+    import PyOpenColorIO
+
+    config: Any = PyOpenColorIO.Config.CreateFromFile("ocio://default")
+    display = config.getDefaultDisplay()
+    chosen = PyOpenColorIO.DisplayViewTransform(
+        src="lin_rec709_scene", display=display, view=config.getDefaultView(display)
+    )
+    processor = config.getProcessor(chosen).getDefaultCPUProcessor()
+    axis = np.exp2(np.linspace(_LOW, _HIGH, _CUBE, dtype=np.float32))
+    axis[0] = 0.0
+    grid = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1).reshape(-1, 1, 3)
+    baked = np.ascontiguousarray(grid, dtype=np.float32)
+    processor.applyRGB(baked)
+    return np.clip(baked.reshape(_CUBE, _CUBE, _CUBE, 3), 0.0, 1.0)
+
+
+def _aces(light: Floats) -> NDArray[np.uint8]:
+    """Look colours up in the baked cube, linear between its corners."""
+    cube = _aces_cube()
+    place = (np.log2(np.maximum(light, 2.0**_LOW)) - _LOW) / (_HIGH - _LOW) * (_CUBE - 1)
+    place = np.clip(place, 0.0, _CUBE - 1.001).astype(np.float32)
+    low = place.astype(np.intp)
+    part = place - low
+    out = np.zeros_like(light)
+    for corner in range(8):
+        step = np.array([corner >> 2 & 1, corner >> 1 & 1, corner & 1])
+        weight = np.prod(np.where(step == 1, part, 1.0 - part), axis=2, keepdims=True)
+        at = low + step
+        out += weight * cube[at[..., 0], at[..., 1], at[..., 2]]
+    return (np.clip(out, 0.0, 1.0) * 255.0 + 0.5).astype(np.uint8)
+
+
+@lru_cache(maxsize=4)
+def read_plate(path: str, changed_ns: int, size_px: tuple[int, int]) -> Floats:
+    """Read a background picture, cut and scaled to fill a size.
+
+    Parameters
+    ----------
+    path : str
+        EXR, PNG or JPEG.
+    changed_ns : int
+        When the file was changed: a new file is read anew.
+    size_px : tuple of int
+
+    Returns
+    -------
+    ndarray, shape (H, W, 3)
+        Linear.
+
+    Raises
+    ------
+    ProjectError
+        The file is no picture.
+    """
+    del changed_ns
+    linear = _read_exr(Path(path)) if path.lower().endswith(".exr") else _read_image(Path(path))
+    width, height = size_px
+    high, wide = linear.shape[:2]
+    zoom = max(width / wide, height / high)
+    rows = np.clip(((np.arange(height) + 0.5 - height / 2) / zoom + high / 2).astype(int), 0, high - 1)
+    columns = np.clip(((np.arange(width) + 0.5 - width / 2) / zoom + wide / 2).astype(int), 0, wide - 1)
+    return np.ascontiguousarray(linear[rows[:, None], columns[None, :]])
+
+
+def plate_for(look: View, size_px: tuple[int, int]) -> Floats | None:
+    """Return the background of a view; None where there is none."""
+    if look.plate is None:
+        return None
+    try:
+        changed = Path(look.plate).stat().st_mtime_ns
+    except OSError:
+        raise ProjectError(f"the background {look.plate} is gone; choose another") from None
+    return read_plate(look.plate, changed, size_px)
+
+
+def _read_image(path: Path) -> Floats:
+    from PIL import Image, UnidentifiedImageError
+
+    try:
+        with Image.open(path) as image:
+            coded = np.asarray(image.convert("RGB"), dtype=np.float32) / 255.0
+    except (OSError, UnidentifiedImageError, ValueError):
+        raise ProjectError(f"{path.name} is no picture that can be read; give an EXR, PNG or JPEG file") from None
+    return np.where(coded <= 0.04045, coded / 12.92, ((coded + 0.055) / 1.055) ** 2.4).astype(np.float32)
+
+
+def _read_exr(path: Path) -> Floats:
+    import OpenEXR
+
+    try:
+        channels = OpenEXR.File(str(path), separate_channels=True).channels()
+        return np.stack([np.asarray(channels[c].pixels, dtype=np.float32) for c in "RGB"], axis=-1)
+    except (RuntimeError, OSError, KeyError, ValueError):
+        raise ProjectError(f"{path.name} is no EXR picture with channels R, G and B") from None
+
+
+def jpeg(pixels: NDArray[np.uint8], quality: int = 82) -> bytes:
+    """Encode sRGB pixels as JPEG; from a quality of 90 on without colour subsampling."""
+    from PIL import Image
+
+    buffer = BytesIO()
+    Image.fromarray(pixels).save(buffer, format="JPEG", quality=quality, subsampling=0 if quality >= 90 else 2)
+    return buffer.getvalue()
+
+
+def png(pixels: NDArray[np.uint8]) -> bytes:
+    """Encode pixels, with or without an alpha channel, as PNG."""
+    from PIL import Image
+
+    buffer = BytesIO()
+    Image.fromarray(pixels).save(buffer, format="PNG", compress_level=1)
+    return buffer.getvalue()
+
+
+__all__ = ["FlarewrightError", "aces_available", "jpeg", "pixels_of", "plate_for", "png"]

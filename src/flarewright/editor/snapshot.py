@@ -1,0 +1,148 @@
+"""What the page is made of: the session as JSON."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ..errors import FlarewrightError
+from ..io.spectrum_text import spectrum_text
+from ..model import Project
+from ..render.prepare import as_lens
+from .edit_ghosts import hand, soloed
+from .edit_lens import prescription
+from .edit_shot import coating_text
+from .edit_wishes import direction
+from .screen import Screen
+from .shown import aces_available
+from .solving import Solver
+from .studio import view_size
+
+
+def state_of(screen: Screen, solver: Solver) -> dict[str, Any]:
+    """Return everything that the page shows, but for pictures and the table of ghosts.
+
+    Parameters
+    ----------
+    screen : Screen
+    solver : Solver
+
+    Returns
+    -------
+    dict
+        Ready for JSON.
+    """
+    session = screen.session
+    project, history = session.project, session.history
+    table = prescription(project)
+    shown = screen.picture
+    return {
+        "revision": session.revision,
+        "file": session.file,
+        "clean": session.clean,
+        "undo": history.undo_label,
+        "redo": history.redo_label,
+        "steps": {"at": history.at, "count": len(history.moments)},
+        "lens": _lens(project, table.facts, table.problem) | {"rows": list(table.rows)},
+        "lights": [_light(project, k) for k in range(len(project.lights))],
+        "camera": project.camera.model_dump(mode="json") | {"sensor": list(project.camera.sensor)},
+        "iris": _iris(project),
+        "dirt": project.dirt.model_dump(mode="json"),
+        "starburst": project.starburst.model_dump(mode="json"),
+        "coating": coating_text(project),
+        "quality": project.quality.model_dump(mode="json"),
+        "pass_gain": dict(project.art.gain),
+        "solo": list(soloed(project.art)),
+        "by_hand": len(project.art.rules) + len(project.art.gain),
+        "design": _design(project),
+        "view": session.view.model_dump(mode="json") | {"stops": round(screen.exposure_stops, 2)},
+        "frame": {"size": list(view_size(project)), "sensor": list(project.camera.sensor)},
+        "direction": list(direction(project)),
+        "picture": _picture(screen),
+        "remarks": list(shown.remarks) if shown is not None else [],
+        "solve": solve_of(solver),
+        "aces": aces_available(),
+    }
+
+
+def _picture(screen: Screen) -> dict[str, Any]:
+    shown = screen.picture
+    return {
+        "number": screen.number,
+        "grade": "" if shown is None else shown.grade,
+        "seconds": 0.0 if shown is None else round(shown.seconds, 3),
+        "problem": screen.problem,
+    }
+
+
+def picture_of(screen: Screen) -> dict[str, Any]:
+    """Return what is said beside the picture."""
+    return _picture(screen) | {"stops": round(screen.exposure_stops, 2)}
+
+
+def solve_of(solver: Solver) -> dict[str, Any]:
+    """Return how the search stands."""
+    progress = solver.progress
+    return {
+        "running": progress.running, "words": progress.words, "seconds": round(progress.seconds, 1),
+        "number": progress.number, "found": [found.words for found in progress.found],
+    }  # fmt: skip
+
+
+def _lens(project: Project, facts: dict[str, float], problem: str) -> dict[str, Any]:
+    try:
+        lens = as_lens(project.lens)
+    except FlarewrightError:
+        if isinstance(project.lens, str):
+            return {"name": project.lens, "source": "", "notes": "", "facts": facts, "problem": problem}
+        lens = project.lens
+    return {
+        "name": lens.name, "source": lens.source, "notes": lens.notes, "facts": facts, "problem": problem,
+        "open": lens.f_number, "f_number": project.f_number, "zoom": project.zoom,
+        "positions": [position.name for position in lens.positions],
+        "presets": list(lens.coating_presets), "stop_row": lens.stop_row,
+        "shipped": project.lens if isinstance(project.lens, str) else None,
+    }  # fmt: skip
+
+
+def _light(project: Project, k: int) -> dict[str, Any]:
+    light = project.lights[k]
+    return {
+        "name": light.name, "field_deg": list(light.field_deg), "intensity": light.intensity,
+        "spectrum": spectrum_text(light.spectrum) or light.spectrum.kind, "diameter_deg": light.diameter_deg,
+        "distance": light.distance, "shape": None if light.shape is None else light.shape.kind,
+    }  # fmt: skip
+
+
+def _iris(project: Project) -> dict[str, Any]:
+    iris = project.iris
+    if iris is None:
+        try:
+            iris = as_lens(project.lens).iris
+        except FlarewrightError:
+            return {}
+    return iris.model_dump(mode="json")
+
+
+def _design(project: Project) -> dict[str, Any] | None:
+    design = project.design
+    if design is None:
+        return None
+    return design.model_dump(mode="json", exclude={"bounds"})
+
+
+def ghosts_of(screen: Screen) -> dict[str, Any]:
+    """Return the table of ghosts; `fresh` tells whether it belongs to the project as it stands."""
+    seen, project = screen.seen, screen.session.project
+    if seen is None:
+        return {"fresh": False, "ghosts": []}
+    brightest = seen.ghosts[0].flux if seen.ghosts else 1.0
+    rows = []
+    for ghost in seen.ghosts:
+        mine = hand(project.art, ghost.name)
+        rows.append(
+            {
+                "name": ghost.name, "share": ghost.flux / brightest, "flux": ghost.flux, "size": ghost.size_mm,
+                "centre": list(ghost.centre), "muted": mine.muted, "gain": mine.gain, "tint": list(mine.tint),
+            }
+        )  # fmt: skip
+    return {"fresh": seen.project == project, "ghosts": rows}

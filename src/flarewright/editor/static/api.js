@@ -1,0 +1,48 @@
+// Asking the server, and telling a person what went wrong in its words.
+import { toast } from './ui.js';
+
+export async function get(path) {
+  const answer = await fetch(path);
+  const data = await answer.json();
+  if (!answer.ok) throw new Error(data.error || answer.statusText);
+  return data;
+}
+
+export async function post(path, body) {
+  const raw = body instanceof Blob || body instanceof ArrayBuffer;
+  const answer = await fetch(path, {
+    method: 'POST',
+    headers: raw ? {} : { 'Content-Type': 'application/json' },
+    body: raw ? body : JSON.stringify(body ?? {}),
+  });
+  const data = await answer.json();
+  if (!answer.ok) throw new Error(data.error || answer.statusText);
+  return data;
+}
+
+export const sentence = (text) => {
+  const plain = String(text).trim();
+  return plain.charAt(0).toUpperCase() + plain.slice(1) + (/[.!?]$/.test(plain) ? '' : '.');
+};
+
+export function complain(error) {
+  const lost = error instanceof TypeError && /fetch/i.test(error.message);
+  toast(lost ? 'The editor does not answer. Start flarewright edit again; nothing is lost.' : sentence(error.message), 'error');
+}
+
+// Only the newest call counts: while one is under way, the last of the others waits.
+export function latest(work) {
+  let busy = false;
+  let next = null;
+  return async function call(...values) {
+    next = values;
+    if (busy) return;
+    busy = true;
+    while (next) {
+      const now = next;
+      next = null;
+      try { await work(...now); } catch (error) { complain(error); }
+    }
+    busy = false;
+  };
+}

@@ -1,0 +1,371 @@
+// The page: one state from the server, drawn by panels; every change is a deed that the server does or refuses.
+import { complain, get, latest, post, sentence } from './api.js';
+import { button, dialog, h, menu, stroke, tips, toast, slider } from './ui.js';
+import { viewport } from './viewport.js';
+import { coatingPanel } from './panel_coating.js';
+import { ghostPanel } from './panel_ghosts.js';
+import { irisPanel } from './panel_iris.js';
+import { lensPanel } from './panel_lens.js';
+import { libraryPanel } from './panel_library.js';
+import { lightPanel } from './panel_light.js';
+import { targetPanel } from './panel_target.js';
+
+const app = { state: null, light: 0, ghost: null, wish: null, ghosts: { fresh: false, ghosts: [] }, tab: 'light', row: null };
+window.flarewright = app;
+const $ = (id) => document.getElementById(id);
+
+// ------------------------------------------------------------------------------------------------------------- state
+function take(state) {
+  if (app.state && state.revision < app.state.revision) return;
+  const old = app.state;
+  app.state = state;
+  app.light = Math.min(app.light, state.lights.length - 1);
+  const shot = (s) => JSON.stringify([s.lights, s.lens, s.camera, s.iris, s.dirt, s.coating, s.pass_gain, s.by_hand, s.view.grey, s.view.unclipped]);
+  const moved = !old || shot(old) !== shot(state);
+  if (moved) { app.view.outline = null; drawSection(); }
+  if (moved || JSON.stringify(old?.design) !== JSON.stringify(state.design)) { app.places(); app.view.refreshTarget(); }
+  update();
+  if (!old || old.picture.number !== state.picture.number || old.revision !== state.revision) app.view.refresh(Boolean(old));
+}
+app.take = take;
+export const reload = latest(async () => take(await get('/api/state')));
+
+function update() {
+  const state = app.state;
+  for (const part of parts) part.update?.(state);
+  panels[app.tab].update?.(state);
+  $('problem').hidden = !state.picture.problem;
+  $('problem').textContent = state.picture.problem ? `${sentence(state.picture.problem)} The last good picture is shown.` : '';
+  document.title = `${state.clean ? '' : '• '}${fileName(state)} – Flarewright`;
+  status();
+  app.view.redraw();
+}
+const fileName = (state) => (state.file ? state.file.split(/[\\/]/).pop() : state.lens.name);
+
+// In the order in which they were asked for, so that the last word of a hand is the last.
+let line = Promise.resolve();
+app.deed = (name, values, group = '') => {
+  line = line.then(() => post('/api/do', { name, values, group })).then(take);
+  const answer = line;
+  line = line.catch(() => {});
+  return answer.catch((error) => { complain(error); reload(); throw error; });
+};
+const slow = new Map();
+// A slider may ask faster than the server answers: only its newest value is sent.
+app.lively = (name, values, group, key = name) => {
+  if (!slow.has(key)) slow.set(key, latest((...asked) => app.deed(...asked).catch(() => {})));
+  slow.get(key)(name, values, group);
+};
+app.setView = latest(async (values) => take(await post('/api/view', values)));
+app.ask = async (path, body) => { try { const state = await post(path, body); take(state); return state; } catch (error) { complain(error); return null; } };
+
+// ------------------------------------------------------------------------------------------------------------- ghosts
+app.choose = (name, walking = false) => {
+  app.ghost = name;
+  app.wish = null;
+  if (!walking && !name) { app.view.stack = []; app.view.spot = null; }
+  app.view.refreshOutline();
+  drawSection();
+  panels[app.tab].update?.(app.state);
+  app.hint();
+};
+app.chooseWish = (number) => { app.wish = number; app.ghost = null; app.view.outline = null; panels[app.tab].update?.(app.state); app.view.redraw(); };
+app.chooseLight = (k) => { if (app.light !== k) { app.light = k; panels[app.tab].update?.(app.state); } };
+app.lightMoved = (k, angles) => { app.light = k; panels.light.moved?.(angles); };
+app.hint = () => {
+  const { stack, at } = app.view;
+  const place = stack.length > 1 && stack[at] === app.ghost ? ` – ${at + 1} of ${stack.length} here, scroll to walk through them` : '';
+  $('hint').textContent = app.ghost ? `Ghost ${app.ghost}${place}` : '';
+};
+app.places = latest(async () => {
+  if (app.tab !== 'target') return;
+  try { app.view.places = (await get('/api/places')).places; } catch { app.view.places = []; }
+  panels.target.update?.(app.state);
+  app.view.redraw();
+});
+const loadGhosts = latest(async () => {
+  app.ghosts = await get('/api/ghosts');
+  if (!app.state) return;
+  panels[app.tab].update?.(app.state);
+  if (app.ghost) app.view.refreshOutline();
+});
+
+// ------------------------------------------------------------------------------------------------------ cross-section
+let shut = localStorage.getItem('section') === 'shut';
+const drawing = h('div', { class: 'drawing' });
+const told = h('span');
+const fold = button('', () => { shut = !shut; localStorage.setItem('section', shut ? 'shut' : 'open'); folded(); drawSection(); }, { kind: 'quiet', tip: 'Show or hide the cross-section (X).' });
+function folded() { $('section').classList.toggle('shut', shut); fold.textContent = shut ? 'show section' : 'hide'; app.view.redraw(); }
+const drawSection = latest(async () => {
+  if (!app.state) return;
+  told.replaceChildren(...facts(app.state));
+  if (shut) return;
+  const answer = await fetch(`/api/section${app.ghost ? `?ghost=${encodeURIComponent(app.ghost)}` : ''}`);
+  if (answer.ok) { drawing.innerHTML = await answer.text(); trim(drawing.firstElementChild); }
+});
+// The drawing's own headline and foot stand in the head of this strip already.
+function trim(svg) {
+  if (!svg) return;
+  const [, , width, height] = svg.getAttribute('viewBox').split(' ').map(Number);
+  svg.querySelectorAll('text').forEach((text) => { if (Number(text.getAttribute('y')) < 30) text.remove(); });
+  svg.querySelector('title')?.remove();
+  svg.querySelector('rect')?.remove();
+  svg.removeAttribute('width');
+  svg.removeAttribute('height');
+  svg.querySelectorAll('text').forEach((text) => { if (Number(text.getAttribute('y')) > height - 30) text.remove(); });
+  svg.querySelectorAll('line').forEach((each) => { if (Number(each.getAttribute('y1')) > height - 30) each.remove(); });
+  // as large as the strip allows
+  const box = svg.getBBox();
+  const clip = svg.querySelector('clipPath rect');
+  const top = Math.max(box.y, clip ? Number(clip.getAttribute('y')) : 0);
+  const low = Math.min(box.y + box.height, clip ? Number(clip.getAttribute('y')) + Number(clip.getAttribute('height')) : height);
+  svg.setAttribute('viewBox', `${Math.max(0, box.x) - 4} ${top - 2} ${Math.min(box.width, width) + 8} ${low - top + 4}`);
+}
+export function facts(state) {
+  const { facts: f, name } = state.lens;
+  const say = (label, value, digits, unit = '') => (value === undefined ? [] : [h('span', {}, `${label} `, h('b', {}, `${Number(value.toPrecision(digits))}${unit}`))]);
+  return [h('b', {}, name), ...say('focal length', f.efl, 5, ' mm'), ...say('f/', f.f_number, 3), ...say('back focus', f.bfl, 5, ' mm'),
+    ...(app.ghost ? [h('span', {}, 'rays of ghost ', h('b', {}, app.ghost))] : [])];
+}
+
+// ------------------------------------------------------------------------------------------------------------- header
+function header() {
+  const file = h('span', { class: 'file' });
+  const undo = button('↶', () => app.ask('/api/undo'), { kind: 'quiet', 'aria-label': 'Undo', id: 'undo' });
+  const redo = button('↷', () => app.ask('/api/redo'), { kind: 'quiet', 'aria-label': 'Redo', id: 'redo' });
+  const look = h('select', { id: 'look', 'aria-label': 'View', tip: 'How linear light becomes a picture for the screen; files stay linear.' },
+    h('option', { value: 'srgb' }, 'sRGB'), h('option', { value: 'filmic' }, 'Filmic'), h('option', { value: 'aces' }, 'ACES'), h('option', { value: 'false-colour' }, 'False colour'));
+  look.addEventListener('change', () => app.setView({ look: look.value }));
+  const exposure = slider({
+    label: 'Exposure', tip: 'Stops: each step of one doubles the light. It changes the screen, no file.', min: -6, max: 30, step: 0.1, digits: 1, name: 'exposure',
+    get: (s) => s.view.stops, set: (value) => app.setView({ exposure_stops: value }),
+  });
+  const auto = button('Auto', () => app.ask('/api/expose'), { tip: 'Find the exposure that shows the ghosts (A). It stays while the light moves, so brightness can be compared.' });
+  const exposed = exposure.element;
+  exposed.className = 'exposure';
+  $('bar').append(
+    h('span', { class: 'brand' }, 'Flarewright'),
+    button('Open', openFile, { tip: 'Open a project, a lens file or a lens by its name (O).', id: 'open' }),
+    button('Save', () => save(), { tip: 'Save the project file (Ctrl+S).', id: 'save' }),
+    button('Export ▾', (event) => menu(event.currentTarget, exports), { id: 'export' }),
+    file, h('span', { class: 'split' }), undo, redo, h('span', { class: 'gap' }), exposed, auto, look,
+    button('?', help, { kind: 'quiet', tip: 'All shortcuts (?).', 'aria-label': 'Help', id: 'help' }),
+  );
+  return {
+    update(state) {
+      file.textContent = `${fileName(state)}${state.clean ? '' : ' •'}`;
+      file.title = state.file ?? 'not saved as a file yet; kept in the autosave';
+      undo.disabled = !state.undo; redo.disabled = !state.redo;
+      undo.dataset.tip = state.undo ? `Undo: ${state.undo} (Ctrl+Z)` : 'Nothing to undo.';
+      redo.dataset.tip = state.redo ? `Redo: ${state.redo} (Ctrl+Shift+Z)` : 'Nothing to redo.';
+      look.value = state.view.look;
+      look.children[2].disabled = !state.aces;
+      look.children[2].textContent = state.aces ? 'ACES' : 'ACES (pip install opencolorio)';
+      exposure.update(state);
+      auto.classList.toggle('on', state.view.exposure_stops === null);
+    },
+  };
+}
+const exports = [
+  ['EXR with layers', () => download('exr'), 'Rendered at the size and quality of the project; takes as long as a render.'],
+  ['PNG as shown', () => download('png')],
+  ['Lens file', () => download('lens')],
+  ['Project file', () => download('project')],
+  ['Ghosts as CSV', () => download('csv')],
+  ['Copy as command line', copyCommand],
+];
+async function download(kind) {
+  if (kind === 'exr') toast('Rendering the EXR…');
+  try {
+    const answer = await fetch(`/api/export/${kind}`);
+    if (!answer.ok) throw new Error((await answer.json()).error);
+    const name = /filename="([^"]+)"/.exec(answer.headers.get('Content-Disposition'))?.[1] ?? `flare.${kind}`;
+    const link = h('a', { href: URL.createObjectURL(await answer.blob()), download: name });
+    link.click();
+    setTimeout(() => URL.revokeObjectURL(link.href), 60000);
+    toast(`Exported ${name}`, 'good');
+  } catch (error) { complain(error); }
+  working('', 1);
+}
+async function copyCommand() {
+  try {
+    const { text } = await get('/api/command');
+    await navigator.clipboard.writeText(text).catch(() => {});
+    toast(text, 'good');
+  } catch (error) { complain(error); }
+}
+function asking(title, words, value, work) {
+  const box = h('input', { type: 'text', value, style: 'width:420px', name: 'path', spellcheck: 'false' });
+  const form = h('form', { method: 'dialog' }, h('p', { class: 'quietly' }, words), box, h('div', { class: 'buttons', style: 'justify-content:end;margin-top:10px' },
+    button('Cancel', () => window_.close()), h('button', { class: 'main', type: 'submit' }, title)));
+  const window_ = dialog(title, form);
+  form.addEventListener('submit', () => work(box.value));
+  box.focus(); box.select();
+}
+function openFile() { asking('Open', 'A project file, a lens file, or a lens’ name. Files can also be dropped on the page.', '', (text) => text.trim() && app.ask('/api/open', { text })); }
+async function save(text = app.state.file) {
+  if (!text) { asking('Save', 'Where the project file shall lie, like shot.toml.', 'flare.toml', save); return; }
+  const state = await app.ask('/api/save', { text });
+  if (state) toast(state.told, 'good');
+}
+
+// ------------------------------------------------------------------------------------------------------------- status
+const grade = h('span', { id: 'grade' });
+const what = h('span');
+const bar = h('i');
+const meter = h('span', { class: 'bar', hidden: true }, bar);
+const remark = h('span', { class: 'remark' });
+const size = h('span');
+function working(words, part) {
+  meter.hidden = part >= 1 || !words;
+  what.textContent = meter.hidden ? '' : words;
+  bar.style.width = `${100 * part}%`;
+}
+const GRADES = { moving: 'moving', draft: 'draft, by matrices', final: 'final, by traced rays', working: 'working view, by matrices' };
+function status() {
+  const { picture, frame, camera } = app.state;
+  grade.textContent = `${GRADES[picture.grade] ?? ''}${picture.seconds ? ` · ${Math.round(picture.seconds * 1000)} ms` : ''}`;
+  size.textContent = `${camera.size_px.join(' × ')} px · ${frame.sensor.map((mm) => Number(mm.toFixed(2))).join(' × ')} mm`;
+  remark.textContent = app.state.remarks.join(' · ');
+  remark.title = app.state.remarks.join('\n');
+}
+
+// --------------------------------------------------------------------------------------------------------------- tabs
+const panels = {
+  light: lightPanel(app), ghosts: ghostPanel(app), lens: lensPanel(app), iris: irisPanel(app),
+  coating: coatingPanel(app), target: targetPanel(app), library: libraryPanel(app),
+};
+const NAMES = { light: 'Light', ghosts: 'Ghosts', lens: 'Lens', iris: 'Iris', coating: 'Coating', target: 'Target', library: 'Library' };
+app.panels = panels;
+app.open = (tab) => {
+  app.tab = tab;
+  for (const each of $('tabs').children) { each.setAttribute('aria-selected', each.dataset.tab === tab); each.tabIndex = each.dataset.tab === tab ? 0 : -1; }
+  $('page').replaceChildren(panels[tab].element);
+  app.view.annotate = tab === 'target';
+  if (tab !== 'target') app.view.compare = 'physical';
+  panels[tab].shown?.();
+  if (app.state) { panels[tab].update?.(app.state); app.places(); }
+  app.view.redraw();
+};
+function tabs() {
+  Object.entries(NAMES).forEach(([key, name], k) => $('tabs').append(
+    h('button', { role: 'tab', type: 'button', 'data-tab': key, onclick: () => app.open(key), tip: `Key ${k + 1}` }, name)));
+  $('tabs').addEventListener('keydown', (event) => {
+    const step = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
+    if (!step) return;
+    const keys = Object.keys(NAMES);
+    app.open(keys[(keys.indexOf(app.tab) + step + keys.length) % keys.length]);
+    document.querySelector('[role=tab][aria-selected=true]').focus();
+  });
+}
+
+// ---------------------------------------------------------------------------------------------------------- shortcuts
+const KEYS = [
+  ['Drag', 'move the light, also out of the frame'], ['Click', 'choose the ghost under the pointer'],
+  ['Scroll on it', 'walk through the ghosts there'], ['Scroll', 'zoom'], ['Alt + drag', 'pan, also the middle button'],
+  ['Arrows', 'move the light by 0.1°, Shift 1°'], ['F', 'fit the frame'], ['Z', 'zoom to 1:1'], ['A', 'exposure found anew'], ['+  −', 'exposure by half a stop'],
+  ['V', 'next view'], ['G', 'grey: every ghost reflects alike'], ['E', 'no entrance clipping'], ['H', 'safe frame'],
+  ['S', 'solo the chosen ghost'], ['M', 'mute the chosen ghost'], ['N  P', 'next, previous ghost of the list'],
+  ['X', 'show or hide the cross-section'], ['1 – 7', 'panels'], ['W', 'physical, target, wipe, side by side'], ['Ctrl+Z', 'undo'],
+  ['Ctrl+Shift+Z', 'redo'], ['Ctrl+S', 'save'], ['O', 'open'], ['Esc', 'let go of the ghost'], ['?', 'this sheet'],
+];
+function help() { dialog('Keys and hands', h('div', { class: 'keys' }, ...KEYS.flatMap(([key, words]) => [h('kbd', {}, key), h('span', {}, words)]))); }
+let nudging = null;
+function nudge(dx, dy, big) {
+  const light = app.state.lights[app.light];
+  nudging ??= stroke();
+  const [x, y] = light.field_deg;
+  const by = big ? 1 : 0.1;
+  light.field_deg = [x + dx * by, y + dy * by];
+  app.lively('move_light', { light: app.light, x: light.field_deg[0], y: light.field_deg[1] }, nudging);
+}
+addEventListener('keyup', (event) => { if (event.key.startsWith('Arrow')) nudging = null; if (event.key === ' ') app.view.space = false; });
+addEventListener('keydown', (event) => {
+  if (!app.state || document.querySelector('dialog[open]')) return;
+  const typing = event.target.matches('input:not([type=range]):not([type=checkbox]), select, textarea');
+  if (event.ctrlKey || event.metaKey) {
+    const key = event.key.toLowerCase();
+    if (key === 's') { event.preventDefault(); document.activeElement.blur(); save(); }
+    if (typing) return;
+    if (key === 'z') { event.preventDefault(); app.ask(event.shiftKey ? '/api/redo' : '/api/undo'); }
+    if (key === 'y') { event.preventDefault(); app.ask('/api/redo'); }
+    return;
+  }
+  if (typing || event.altKey) return;
+  const onPage = event.target === $('view') || event.target === document.body;
+  const { view } = app.state;
+  const steps = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] }[event.key];
+  if (steps && onPage) { event.preventDefault(); nudge(...steps, event.shiftKey); return; }
+  if (event.key === ' ' && onPage) { event.preventDefault(); app.view.space = true; return; }
+  const looks = ['srgb', 'filmic', ...(app.state.aces ? ['aces'] : []), 'false-colour'];
+  const work = {
+    f: () => app.view.fit(), z: () => app.view.fit(app.state.frame.size[0] / app.view.frame().w * app.view.zoom / (devicePixelRatio || 1)), a: () => app.ask('/api/expose'),
+    '+': () => app.setView({ exposure_stops: view.stops + 0.5 }), '=': () => app.setView({ exposure_stops: view.stops + 0.5 }), '-': () => app.setView({ exposure_stops: view.stops - 0.5 }),
+    v: () => app.setView({ look: looks[(looks.indexOf(view.look) + 1) % looks.length] }), g: () => app.setView({ grey: !view.grey }),
+    e: () => app.setView({ unclipped: !view.unclipped }), h: () => app.setView({ safe_frame: !view.safe_frame }),
+    s: () => panels.ghosts.solo(), m: () => panels.ghosts.mute(), n: () => panels.ghosts.step(1), p: () => panels.ghosts.step(-1),
+    x: () => fold.click(), w: () => { app.open('target'); panels.target.next(); }, o: openFile, '?': help, Escape: () => app.choose(null),
+  }[event.key.length === 1 ? event.key.toLowerCase() : event.key];
+  if (work) { event.preventDefault(); work(); return; }
+  const tab = Object.keys(NAMES)[Number(event.key) - 1];
+  if (tab && !event.shiftKey) app.open(tab);
+});
+
+// ---------------------------------------------------------------------------------------------------------- dropping
+export async function importFile(file, as = '') {
+  const answer = await app.ask(`/api/import?name=${encodeURIComponent(file.name)}${as ? `&as=${as}` : ''}`, file);
+  if (answer) toast(`Opened ${file.name}`, 'good');
+}
+app.importFile = importFile;
+let over = 0;
+addEventListener('dragenter', (event) => { event.preventDefault(); over += 1; $('drop').hidden = false; });
+addEventListener('dragleave', () => { over -= 1; if (over <= 0) $('drop').hidden = true; });
+addEventListener('dragover', (event) => event.preventDefault());
+addEventListener('drop', async (event) => {
+  event.preventDefault();
+  over = 0;
+  $('drop').hidden = true;
+  for (const file of event.dataTransfer.files) await importFile(file);
+});
+
+// ---------------------------------------------------------------------------------------------------------- listening
+function listen() {
+  const socket = new WebSocket(`${location.protocol === 'https:' ? 'wss' : 'ws'}://${location.host}/ws`);
+  socket.onopen = () => { if (listen.lost) { toast('The editor is back.', 'good'); listen.lost = false; app.state = null; } reload(); loadGhosts(); };
+  socket.onmessage = (message) => hear(JSON.parse(message.data));
+  socket.onclose = () => {
+    if (!listen.lost) toast('The editor does not answer. Everything up to here is saved; start flarewright edit again.', 'error');
+    listen.lost = true;
+    setTimeout(listen, 1000);
+  };
+}
+function hear(event) {
+  const { state } = app;
+  if (event.type === 'changed') { if (!state || event.revision > state.revision) reload(); return; }
+  if (event.type === 'message') { toast(event.text, event.kind === 'warning' ? 'error' : 'info'); return; }
+  if (event.type === 'progress') { working(event.what, event.part); return; }
+  if (event.type === 'export') { working('EXR', event.part); return; }
+  if (event.type === 'ghosts') { working('', 1); loadGhosts(); return; }
+  if (!state) return;
+  if (event.type === 'picture') {
+    const sharper = state.picture.grade !== event.grade || event.number !== state.picture.number;
+    state.picture = event;
+    state.view.stops = event.stops;
+    working('', 1);
+    if (sharper) app.view.refresh(true);
+    update();
+    if (event.grade === 'final') app.remarks();
+  }
+  if (event.type === 'solve') { state.solve = event; panels.target.update?.(state); }
+}
+app.remarks = latest(async () => { const fresh = await get('/api/state'); if (app.state) { app.state.remarks = fresh.remarks; status(); } });
+
+app.view = viewport($('view'), app);
+const parts = [header()];
+$('section').append(h('div', { class: 'head' }, told, h('span', { class: 'gap' }), fold), drawing);
+$('status').append(grade, meter, what, h('span', { class: 'gap' }), remark, size);
+tabs();
+folded();
+app.open('light');
+tips();
+listen();

@@ -1,0 +1,68 @@
+// Coatings: of the whole lens, of one row, and the colours that a ghost can have.
+import { latest } from './api.js';
+import { button, choice, entry, group, h } from './ui.js';
+
+const KNOWN = [['lens', 'as the lens file says'], ['none', 'bare glass'], ['quarter-wave:550', 'quarter wave at 550 nm'], ['quarter-wave:450', 'quarter wave at 450 nm'], ['uncoated-1930s', 'uncoated, 1930s'], ['single-1950s', 'single film, 1950s'], ['early-multicoat', 'early multicoat'], ['modern-broadband', 'modern broadband']];
+// ends of the map, as the server draws it
+const LOW = 380;
+const HIGH = 750;
+
+export function coatingPanel(app) {
+  const coat = (text) => app.deed('set_coating', { text }).catch(() => {});
+  const whole = group('Whole lens', [
+    choice({ label: 'Coating', tip: 'Every glass-air surface gets it. A coating takes light out of some colours; what is left is the colour of the ghosts.', name: 'coating', options: (s) => [...KNOWN, ...(s.lens.presets ?? []).map((name) => [`preset:${name}`, `preset ${name}`]), ['per-row', 'each row its own', true]], get: (s) => s.coating, set: coat }),
+    entry({ label: 'Or as text', tip: 'quarter-wave:550, film:1.38:96, stack:1.38:96,2.1:120 and so on: films from the air to the glass.', words: true, name: 'coating_text', get: (s) => s.coating, set: coat }),
+  ]);
+  const rows = h('div', { class: 'buttons' });
+  const field = entry({ label: 'Its coating', tip: 'none, quarter-wave:NM, film:INDEX:NM, stack:…, or the name of a standard coating.', words: true, name: 'row_coating', get: (s) => line(s)?.coating ?? '', set: (text) => app.deed('set_cell', { row: row(), column: 'coating', text }).catch(() => {}) });
+  const plot = h('div', { class: 'plot' });
+  const pair = h('div', { class: 'group', hidden: true });
+  const mapTold = h('span', { class: 'quietly' });
+  const mark = h('i');
+  const image = h('img', { alt: 'Colours of the ghost by the centre wavelengths of its two mirrors', draggable: 'false' });
+  pair.append(h('h3', {}, 'Colours of the chosen ghost'), h('p', { class: 'quietly' }, 'Quarter-wave films on its two mirrors: up, the centre wavelength of the first; to the right, of the second. Click to choose.'), h('div', { class: 'map' }, image, mark), mapTold);
+  let seen = '';
+  let seenMap = '';
+
+  const surfaces = (state) => state.lens.rows.filter((each) => !each.stop);
+  function row() {
+    const known = app.state.lens.rows.find((each) => each.row === app.row && !each.stop);
+    return known ? known.row : surfaces(app.state)[0]?.row;
+  }
+  const line = (state) => state.lens.rows.find((each) => each.row === row());
+  const drawPlot = latest(async (key) => {
+    if (key === seen) return;
+    seen = key;
+    const answer = await fetch(`/api/coating?row=${row()}`);
+    if (!answer.ok) { plot.replaceChildren(h('p', { class: 'quietly' }, (await answer.json()).error)); return; }
+    plot.innerHTML = await answer.text();
+    plot.querySelector('title')?.remove();
+  });
+  const at = (event) => {
+    const place = image.getBoundingClientRect();
+    const nm = (part) => Math.round((LOW + (HIGH - LOW) * Math.max(0, Math.min(1, part))) / 2) * 2;
+    return [nm(1 - (event.clientY - place.top) / place.height), nm((event.clientX - place.left) / place.width)];
+  };
+  image.addEventListener('pointermove', (event) => { const [first, second] = at(event); const [j, i] = app.ghost.split('-'); mapTold.textContent = `row ${j}: ${first} nm, row ${i}: ${second} nm`; });
+  image.addEventListener('click', async (event) => {
+    const [first, second] = at(event);
+    const [j, i] = app.ghost.split('-');
+    mark.style.left = `${event.offsetX}px`; mark.style.top = `${event.offsetY}px`;
+    try { await app.deed('set_row_wavelengths', { values: { [j]: first, [i]: second } }); } catch (error) { void error; }
+  });
+  return {
+    element: h('div', {}, whole.element, h('div', { class: 'group' }, h('h3', {}, 'One row'), rows, field.element), plot, pair),
+    update(state) {
+      whole.update(state);
+      const here = row();
+      rows.replaceChildren(...surfaces(state).map((each) => button(String(each.row), () => { app.row = each.row; app.panels.coating.update(app.state); }, { kind: each.row === here ? 'on' : '', tip: each.coating || 'no coating' })));
+      field.update(state);
+      drawPlot(JSON.stringify([here, line(state)]));
+      const two = app.ghost && /^\d+-\d+$/.test(app.ghost);
+      pair.hidden = !two;
+      const key = two ? `${app.ghost}|${state.lens.name}|${JSON.stringify(state.lens.rows.map((each) => each.n_d))}` : '';
+      if (two && key !== seenMap) { image.src = `/api/map?ghost=${app.ghost}&n=${Date.now()}`; mark.style.left = '-99px'; mapTold.textContent = ''; }
+      seenMap = key;
+    },
+  };
+}

@@ -1,0 +1,80 @@
+// The table of ghosts, and what is done to the chosen one by hand.
+import { button, group, h, row, slider } from './ui.js';
+
+const COLUMNS = [['name', 'Ghost', 'First mirror – second mirror, rows counted from the front.'], ['share', 'Light', 'Light of it in the picture, against the brightest ghost.'], ['size', 'Size', 'Root mean square radius in the picture, mm.']];
+
+export function ghostPanel(app) {
+  let by = 'share';
+  let down = true;
+  const body = h('tbody');
+  const heads = COLUMNS.map(([key, words, tip]) => h('th', { class: 'sort', scope: 'col', tip, tabindex: 0, style: key === 'share' ? 'text-align:left' : null, onclick: () => order(key), onkeydown: (event) => event.key === 'Enter' && order(key) }, words));
+  const table = h('table', { class: 'ghosts' }, h('thead', {}, h('tr', {}, ...heads, h('th', { scope: 'col' }, 'By hand'))), body);
+  const told = h('span');
+  const order = (key) => { down = by === key ? !down : key !== 'name'; by = key; draw(); };
+  const rowNumber = (name) => name.split('-').reduce((sum, part) => sum * 1000 + (part === 'sensor' ? 999 : Number(part)), 0);
+  const sorted = () => [...app.ghosts.ghosts].sort((a, b) => (by === 'name' ? rowNumber(a.name) - rowNumber(b.name) : a[by] - b[by]) * (down ? -1 : 1));
+  const chosen = () => app.ghosts.ghosts.find((ghost) => ghost.name === app.ghost);
+  const solos = () => app.state.solo;
+  const setGhost = (values, held = '') => {
+    const ghost = chosen();
+    if (!ghost) return;
+    Object.assign(ghost, values);
+    app.lively('set_ghost', { name: app.ghost, values }, held, `ghost${app.ghost}${Object.keys(values)}`);
+  };
+  const tint = h('input', { type: 'color' });
+  const hex = (rgb) => `#${rgb.map((part) => Math.round(255 * Math.min(1, part) ** (1 / 2.2)).toString(16).padStart(2, '0')).join('')}`;
+  tint.addEventListener('change', () => {
+    const linear = [1, 3, 5].map((k) => Number(((parseInt(tint.value.slice(k, k + 2), 16) / 255) ** 2.2).toFixed(4)));
+    setGhost({ tint: linear });
+  });
+  const hands = group('Chosen ghost', [
+    slider({ label: 'Gain', tip: 'Multiplies the light of this ghost; 1 is physics.', min: 0, max: 20, step: 0.01, curve: 3, name: 'ghost_gain', get: () => chosen()?.gain ?? 1, set: (gain, held) => setGhost({ gain }, held) }),
+    row('Tint', 'Multiplies its colour; white is physics. To get a colour from real coatings, use the Coating panel.', [tint, button('White', () => setGhost({ tint: [1, 1, 1] }), { kind: 'quiet' })], () => { tint.value = hex(chosen()?.tint ?? [1, 1, 1]); }),
+  ]);
+  const solo = button('Solo', () => self.solo(), { tip: 'Show this ghost alone (S).', id: 'solo' });
+  const mute = button('Mute', () => self.mute(), { tip: 'Leave this ghost out (M).', id: 'mute' });
+  const reset = button('Physics again', () => app.deed('reset_art', {}).catch(() => {}), { tip: 'Forget all gains, tints, mutes and solos.' });
+  const head = h('div', { class: 'group' }, h('h3', {}, 'Ghosts', h('span', { class: 'gap' }), told), h('div', { class: 'buttons' }, solo, mute, reset));
+
+  function line(ghost) {
+    const muted = ghost.muted || (solos().length > 0 && !solos().includes(ghost.name));
+    const bar = h('span', { class: 'bar' });
+    bar.style.width = `${Math.max(1, 110 * Math.sqrt(ghost.share))}px`;
+    const element = h('tr', { class: `${ghost.name === app.ghost ? 'chosen' : ''} ${muted ? 'muted' : ''}`, 'data-ghost': ghost.name, tabindex: 0 },
+      h('td', {}, ghost.name), h('td', { style: 'text-align:left' }, bar, ` ${(100 * ghost.share).toPrecision(2) < 0.01 ? '<0.01' : Number((100 * ghost.share).toPrecision(2))} %`), h('td', {}, ghost.size.toFixed(2)),
+      h('td', {}, ghost.muted ? 'muted' : ghost.gain !== 1 ? `× ${Number(ghost.gain.toPrecision(3))}` : ''));
+    element.addEventListener('click', () => app.choose(ghost.name === app.ghost ? null : ghost.name));
+    element.addEventListener('keydown', (event) => { if (event.key === 'Enter') app.choose(ghost.name); });
+    element.addEventListener('pointerenter', () => { element.classList.add('over'); app.view.hoverGhost(ghost.name); });
+    element.addEventListener('pointerleave', () => { element.classList.remove('over'); app.view.hoverGhost(null); });
+    return element;
+  }
+  function draw() {
+    heads.forEach((head_, k) => { head_.textContent = COLUMNS[k][1] + (by === COLUMNS[k][0] ? (down ? ' ▾' : ' ▴') : ''); });
+    body.replaceChildren(...sorted().map(line));
+    body.querySelector('.chosen')?.scrollIntoView({ block: 'nearest' });
+  }
+  const self = {
+    element: h('div', {}, head, hands.element, table),
+    update(state) {
+      const mine = chosen();
+      told.textContent = app.ghosts.fresh ? `${app.ghosts.ghosts.length} in the picture` : 'being measured…';
+      hands.element.hidden = !mine;
+      if (mine) hands.update(state);
+      solo.disabled = mute.disabled = !app.ghost;
+      solo.classList.toggle('on', Boolean(app.ghost) && state.solo.includes(app.ghost));
+      mute.classList.toggle('on', Boolean(mine?.muted));
+      reset.disabled = !state.by_hand;
+      draw();
+    },
+    solo() { if (app.ghost) app.deed('set_solo', { names: solos().includes(app.ghost) ? [] : [app.ghost] }).catch(() => {}); else if (solos().length) app.deed('set_solo', { names: [] }).catch(() => {}); },
+    mute() { const ghost = chosen(); if (ghost) setGhost({ muted: !ghost.muted }); },
+    step(by_) {
+      const names = sorted().map((ghost) => ghost.name);
+      if (!names.length) return;
+      const at = names.indexOf(app.ghost);
+      app.choose(names[at < 0 ? 0 : (at + by_ + names.length) % names.length]);
+    },
+  };
+  return self;
+}

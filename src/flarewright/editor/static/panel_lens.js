@@ -1,0 +1,110 @@
+// The prescription: every cell can be written; what is to be said stands beside it.
+import { get, latest, sentence } from './api.js';
+import { button, entry, group, h } from './ui.js';
+
+const COLUMNS = [
+  ['radius', 'Radius', 'Of curvature, mm: positive when its centre lies behind the surface; "flat" for a plane.'],
+  ['thickness', 'Gap', 'Distance to the next surface, mm.'],
+  ['glass', 'Glass', 'What fills the gap behind the surface: a catalogue name, or empty for air.'],
+  ['n_d', 'n_d', 'Index at 587.6 nm: how strongly the glass bends light, and how much bare glass reflects.'],
+  ['v_d', 'V_d', 'Abbe number: the smaller, the more the glass spreads colours.'],
+  ['semi_diameter', 'Semi-ø', 'Half the clear diameter, mm: rims cut ghosts. In italics: estimated.'],
+  ['coating', 'Coating', 'none, quarter-wave:550, film:1.38:96, early-multicoat… What is coated well makes faint ghosts.'],
+];
+const WIDTHS = ['24px', '62px', '52px', '74px', '50px', '44px', '50px', ''];
+
+export function lensPanel(app) {
+  const body = h('tbody');
+  const head = h('tr', {}, h('th', {}, '#'), ...COLUMNS.map(([, words, tip]) => h('th', { scope: 'col', tip }, words)));
+  const table = h('table', { class: 'rows', style: 'table-layout:fixed' }, h('colgroup', {}, ...WIDTHS.map((width) => h('col', { style: width ? `width:${width}` : '' }))), h('thead', {}, head), body);
+  const wrong = h('div', { class: 'wrong', role: 'alert' });
+  const glasses = h('datalist', { id: 'glasses' });
+  const facts = h('div', { class: 'facts' });
+  const source = h('p', { class: 'quietly' });
+  let refused = null;
+  const search = latest(async (words) => { glasses.replaceChildren(...(await get(`/api/glasses?q=${encodeURIComponent(words)}`)).glasses.map((name) => h('option', { value: name }))); });
+
+  async function write(box, row, column, text) {
+    refused = null;
+    try { await app.deed_quiet('set_cell', { row, column, text }); wrong.textContent = ''; } catch (error) {
+      refused = { row, column, text, why: sentence(error.message) };
+      mark(box);
+    }
+  }
+  function mark(box) {
+    box.classList.add('bad');
+    box.dataset.tip = refused.why;
+    wrong.textContent = refused.why;
+  }
+  function cell(line, column) {
+    const value = line[column] ?? '';
+    const note = line.notes[column];
+    const guess = column === 'semi_diameter' && line.estimated;
+    const box = h('input', { type: 'text', value, tip: note, class: `${note ? 'note' : ''} ${guess ? 'guess' : ''}`, 'aria-label': `row ${line.row} ${column}`, 'data-row': line.row, 'data-column': column, spellcheck: 'false', list: column === 'glass' ? 'glasses' : null });
+    if (refused && refused.row === line.row && refused.column === column) { box.value = refused.text; mark(box); }
+    box.addEventListener('focus', () => { app.row = line.row; choose(); if (column === 'glass') search(box.value); box.select(); });
+    box.addEventListener('input', () => { if (column === 'glass') search(box.value); });
+    box.addEventListener('change', () => write(box, line.row, column, box.value));
+    box.addEventListener('keydown', (event) => {
+      if (event.key === 'Escape') { refused = null; wrong.textContent = ''; box.value = value; box.classList.remove('bad'); box.blur(); event.stopPropagation(); }
+      const step = { ArrowDown: 1, ArrowUp: -1, Enter: 1 }[event.key];
+      if (step && !(column === 'glass' && event.key !== 'Enter')) {
+        event.preventDefault();
+        const next = body.querySelector(`input[data-row="${line.row + step}"][data-column="${column}"]`);
+        if (next) next.focus(); else box.blur();
+      }
+    });
+    return h('td', { class: column === 'glass' || column === 'coating' ? 'name' : '' }, box);
+  }
+  function draw(state) {
+    const active = document.activeElement;
+    const here = active && body.contains(active) ? { row: active.dataset.row, column: active.dataset.column, text: active.value, dirty: active.value !== active.defaultValue } : null;
+    body.replaceChildren(...state.lens.rows.map((line) => {
+      const first = h('td', { onclick: () => { app.row = line.row; choose(); app.panels.coating.rowChosen?.(); }, tip: Object.values(line.notes).join(' ') || null }, String(line.row));
+      if (line.stop) {
+        const [box] = [cell(line, 'thickness')];
+        return h('tr', { class: 'stop', 'data-line': line.row }, first, h('td', { style: 'padding:0 4px' }, 'stop'), box, h('td', { colspan: 5, style: 'text-align:left;padding-left:6px' }, `ø ${state.lens.facts.stop ? state.lens.facts.stop.toFixed(2) : '–'} mm at this f-number`));
+      }
+      return h('tr', { 'data-line': line.row }, first, ...COLUMNS.map(([column]) => cell(line, column)));
+    }));
+    choose();
+    if (here) {
+      const box = body.querySelector(`input[data-row="${here.row}"][data-column="${here.column}"]`);
+      if (box) { box.focus(); if (here.dirty) box.value = here.text; }
+    }
+  }
+  function choose() {
+    for (const line of body.children) line.classList.toggle('chosen', Number(line.dataset.line) === app.row);
+    const line = app.state?.lens.rows.find((each) => each.row === app.row);
+    for (const each of [add, copy, remove, stop]) each.disabled = !line;
+    if (line) { copy.disabled = remove.disabled = stop.disabled = line.stop; }
+  }
+  const rowDeed = (name) => () => app.deed(name, { row: app.row }).catch(() => {});
+  const add = button('Add row', rowDeed('add_row'), { tip: 'A plane surface behind the chosen row, in the middle of its gap.', id: 'add-row' });
+  const copy = button('Duplicate', rowDeed('duplicate_row'));
+  const remove = button('Remove', rowDeed('remove_row'), { id: 'remove-row' });
+  const stop = button('Make it the stop', rowDeed('move_stop'), { tip: 'The iris moves there: which ghosts it bounds, and so their size, changes. The old stop is taken out.' });
+  const own = group('Lens', [
+    entry({ label: 'Name', tip: 'Of the lens.', words: true, name: 'lens_name', get: (s) => s.lens.name, set: (name) => name && app.deed('set_lens_facts', { values: { name } }).catch(() => {}) }),
+    entry({ label: 'Wide open', tip: 'The smallest f-number: sets how far the stop opens.', name: 'open', get: (s) => s.lens.open, set: (f_number) => f_number && app.deed('set_lens_facts', { values: { f_number } }).catch(() => {}) }),
+  ]);
+  app.deed_quiet = async (name, values) => {
+    const answer = await fetch('/api/do', { method: 'POST', headers: { 'Content-Type': 'application/json' }, body: JSON.stringify({ name, values }) });
+    const data = await answer.json();
+    if (!answer.ok) throw new Error(data.error);
+    app.take(data);
+  };
+  const picker = h('input', { type: 'file', accept: '.lens,.toml,.zmx', hidden: true });
+  picker.addEventListener('change', async () => { if (picker.files[0]) await app.importFile(picker.files[0]); picker.value = ''; });
+  return {
+    element: h('div', {}, own.element, h('div', { class: 'group' }, facts, source, h('div', { class: 'buttons' }, add, copy, remove, stop, button('Import…', () => picker.click(), { tip: 'A lens file; it can also be dropped on the page.' })), picker), table, wrong, glasses),
+    update(state) {
+      own.update(state);
+      const f = state.lens.facts;
+      const say = (label, value, unit = ' mm') => h('span', {}, `${label} `, h('b', {}, value === undefined ? '–' : `${Number(value.toPrecision(6))}${unit}`));
+      facts.replaceChildren(say('focal length', f.efl), say('f/', f.f_number, ''), say('back focus', f.bfl), say('sensor at', f.sensor_distance), say('entrance pupil', f.entrance_pupil));
+      source.textContent = state.lens.problem ? sentence(state.lens.problem) : state.lens.source;
+      draw(state);
+    },
+  };
+}

@@ -1,0 +1,29 @@
+// The lenses that ship, each with its flare.
+import { get } from './api.js';
+import { h } from './ui.js';
+
+export function libraryPanel(app) {
+  let lenses = null;
+  const box = h('input', { type: 'text', placeholder: 'Search by name, maker or patent', name: 'search', style: 'width:100%', 'aria-label': 'Search lenses' });
+  const shelf = h('div', { class: 'library' });
+  const told = h('p', { class: 'quietly' });
+  const watcher = new IntersectionObserver((entries) => { for (const each of entries) if (each.isIntersecting) { each.target.src = each.target.dataset.src; watcher.unobserve(each.target); } });
+  box.addEventListener('input', draw);
+  async function choose(name) { try { await app.deed('choose_lens', { lens: name }); } catch (error) { void error; } }
+  function draw() {
+    if (!lenses) return;
+    const words = box.value.toLowerCase().split(/\s+/).filter(Boolean);
+    const all = lenses.filter((lens) => words.every((word) => lens.words.includes(word)));
+    told.textContent = all.length ? '' : 'No lens is called like this. A lens file can be dropped on the page.';
+    shelf.replaceChildren(...all.map((lens) => {
+      const image = h('img', { alt: '', 'data-src': `/api/thumbnail/${lens.name}`, loading: 'lazy' });
+      watcher.observe(image);
+      return h('button', { type: 'button', class: app.state?.lens.shipped === lens.name ? 'on' : '', 'data-lens': lens.name, onclick: () => choose(lens.name), tip: lens.source }, image, h('span', {}, lens.title), h('small', {}, `f/${lens.f_number} · ${lens.rows - 1} surfaces`));
+    }));
+  }
+  return {
+    element: h('div', {}, h('div', { class: 'group' }, box, told), shelf),
+    async shown() { if (!lenses) { try { lenses = (await get('/api/library')).lenses; draw(); } catch (error) { void error; } } },
+    update(state) { for (const each of shelf.children) each.classList.toggle('on', each.dataset.lens === state.lens.shipped); },
+  };
+}

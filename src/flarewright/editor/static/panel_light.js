@@ -1,0 +1,62 @@
+// Lights, camera, view.
+import { button, choice, entry, group, h, slider, tick } from './ui.js';
+
+const SPECTRA = [['d65', 'Daylight D65'], ['equal-energy', 'Equal energy'], ['black-body:3200', 'Tungsten 3200 K'], ['black-body:5600', 'Black body 5600 K'], ['black-body:2000', 'Candle 2000 K'], ['lines:589.0,589.6', 'Sodium lamp'], ['rgb:1,0.25,0.1', 'Red light'], ['rgb:0.15,0.4,1', 'Blue light']];
+const SENSORS = [['', 'as stated'], ['36x24', 'Full frame 36 × 24'], ['36x20.25', 'Full frame 16:9'], ['24.89x18.66', 'Super 35 4-perf'], ['23.6x15.7', 'APS-C'], ['17.3x13', 'Four Thirds'], ['54.12x25.58', 'Large format 65'], ['43.8x32.9', 'Medium 44 × 33']];
+const SIZES = [['1280x720', '1280 × 720'], ['1920x1080', '1920 × 1080'], ['2048x1080', '2K DCI'], ['3840x2160', '3840 × 2160'], ['4096x2160', '4K DCI'], ['1500x1000', '3:2 1500 × 1000'], ['1440x1080', '4:3 1440 × 1080'], ['1080x1080', 'Square'], ['2048x858', '2.39:1']];
+
+export function lightPanel(app) {
+  const one = (state) => state.lights[app.light];
+  const set = (values, held = '') => app.lively('set_light', { light: app.light, values }, held, `light${app.light}${Object.keys(values)}`);
+  const across = entry({ label: 'Right', tip: 'Field angle: the direct image lies focal length × tan(angle) to the right of the middle.', unit: '°', name: 'light_x', digits: 3, get: (s) => one(s).field_deg[0], set: (x) => x !== null && app.deed('move_light', { light: app.light, x, y: one(app.state).field_deg[1] }).catch(() => {}) });
+  const up = entry({ label: 'Up', tip: 'Field angle upwards. A light out of the frame has no direct image, but its ghosts may still come in.', unit: '°', name: 'light_y', digits: 3, get: (s) => one(s).field_deg[1], set: (y) => y !== null && app.deed('move_light', { light: app.light, x: one(app.state).field_deg[0], y }).catch(() => {}) });
+  const choose = h('div', { class: 'buttons' });
+  const lights = group('Lights', [
+    choose, across, up,
+    slider({ label: 'Intensity', tip: 'Irradiance that the light gives on a plane facing it; all ghosts of it scale with this.', min: 0, max: 10, step: 0.01, curve: 2, name: 'intensity', get: (s) => one(s).intensity, set: (intensity, held) => set({ intensity }, held) }),
+    choice({ label: 'Spectrum', tip: 'What wavelengths it sends: coatings reflect each differently, so the spectrum colours the ghosts.', name: 'spectrum', options: SPECTRA, get: (s) => one(s).spectrum, set: (spectrum) => set({ spectrum }) }),
+    slider({ label: 'Disc', tip: 'Angle across the light: 0 is a point, 0.53° the sun. A wide light softens every ghost by its own image of it.', min: 0, max: 10, step: 0.01, curve: 2, unit: '°', get: (s) => one(s).diameter_deg, set: (diameter_deg, held) => set({ diameter_deg }, held) }),
+    entry({ label: 'Distance', tip: 'From the first vertex; left empty the light is so far away that its rays are parallel.', unit: 'mm', placeholder: 'far', name: 'distance', get: (s) => one(s).distance, set: (distance) => set({ distance }) }),
+  ]);
+  const view = (values) => app.setView(values);
+  const plate = h('span', { class: 'quietly' });
+  const picker = h('input', { type: 'file', accept: '.exr,.png,.jpg,.jpeg', hidden: true });
+  picker.addEventListener('change', async () => { if (picker.files[0]) await app.importFile(picker.files[0]); picker.value = ''; });
+  const seeing = group('View', [
+    tick({ label: 'Grey', name: 'grey', tip: 'Every ghost reflects alike, whatever its coating, so that ghosts which coatings hide can be seen and pulled (G).', get: (s) => s.view.grey, set: (grey) => view({ grey }) }),
+    tick({ label: 'No entrance clip', name: 'unclipped', tip: 'The first surface has no rim: ghosts appear that the entrance hides at this angle (E).', get: (s) => s.view.unclipped, set: (unclipped) => view({ unclipped }) }),
+    tick({ label: 'Safe frame', name: 'safe', tip: 'Lines at 90 % and 80 % of the frame (H).', get: (s) => s.view.safe_frame, set: (safe_frame) => view({ safe_frame }) }),
+    { element: h('div', { class: 'row', tip: 'A picture under the flare, to judge it in its scene; light adds, so it is added before the view. It is no part of any file.' }, h('label', {}, 'Background'), h('div', { class: 'fields' }, button('Choose…', () => picker.click()), button('None', () => view({ plate: null })), plate, picker)), update: (s) => { plate.textContent = s.view.plate ? s.view.plate.split(/[\\/]/).pop() : ''; } },
+    slider({ label: 'Its brightness', tip: 'Stops of the background alone.', min: -8, max: 8, step: 0.1, digits: 1, unit: 'st', get: (s) => s.view.plate_stops, set: (plate_stops) => view({ plate_stops }) }),
+  ]);
+  const camera = (values, held = '') => app.lively('set_camera', { values }, held, `camera${Object.keys(values)}`);
+  const pair = (text) => text.split('x').map(Number);
+  const shot = group('Camera', [
+    slider({ label: 'f-number', tip: 'Closing the iris makes the ghosts that it bounds smaller, each with the same brightness; the starburst grows.', min: 0.7, max: 32, step: 0.1, digits: 1, curve: 2, name: 'f_number', get: (s) => s.lens.f_number ?? s.lens.open, set: (value, held) => app.lively('set_fields', { values: { f_number: Math.max(value, app.state.lens.open ?? value) } }, held) }),
+    choice({ label: 'Zoom position', tip: 'The positions that the lens file knows: gaps between its groups change.', options: (s) => [['', 'as its rows stand'], ...(s.lens.positions ?? []).map((name) => [name, name])], get: (s) => s.lens.zoom ?? '', set: (zoom) => app.deed('set_fields', { values: { zoom: zoom || null } }).catch(() => {}) }),
+    choice({ label: 'Picture', tip: 'Pixels of the rendered file; the viewport shows its shape.', name: 'size', options: SIZES, get: (s) => s.camera.size_px.join('x'), set: (text) => camera({ size_px: pair(text).map(Math.round) }) }),
+    choice({ label: 'Sensor', tip: 'Millimetres that the picture covers: a smaller sensor sees a smaller part of the same flare.', name: 'sensor', options: SENSORS, get: (s) => (s.camera.sensor_mm ? s.camera.sensor_mm.join('x') : ''), set: (text) => camera({ sensor_mm: text ? pair(text) : null }) }),
+    entry({ label: 'Focus distance', tip: 'Plane in focus in front of the lens; focusing moves the sensor, and the ghosts with it.', unit: 'mm', placeholder: 'infinity', get: (s) => s.camera.focus_distance, set: (focus_distance) => camera({ focus_distance }) }),
+    slider({ label: 'Sensor reflects', tip: 'The sensor mirrors light back into the lens, which makes ghosts of its own.', min: 0, max: 0.3, step: 0.005, digits: 3, get: (s) => s.camera.sensor_reflectance, set: (sensor_reflectance, held) => camera({ sensor_reflectance }, held) }),
+  ]);
+  const work = group('Final picture', [
+    slider({ label: 'Wavelengths', tip: 'Traced wavelengths: glass bends each differently, so few of them show as steps of colour.', min: 3, max: 31, step: 1, digits: 0, get: (s) => s.quality.wavelengths, set: (wavelengths, held) => app.lively('set_quality', { values: { wavelengths } }, held) }),
+    choice({ label: 'Rings in ghosts', tip: 'Diffraction at the iris draws rings into the ghosts; Collins’ integral does it for each ghost by its own matrix.', options: [['off', 'off'], ['collins', 'exact (Collins)'], ['frft', 'Hullin’s estimate']], get: (s) => s.quality.ringing, set: (ringing) => app.deed('set_quality', { values: { ringing } }).catch(() => {}) }),
+    choice({ label: 'Reflections', tip: 'Four reflections make fainter ghosts; they are found by chance and drawn by rays.', options: [['2', 'two'], ['4', 'two and four']], get: (s) => String(s.quality.orders), set: (orders) => app.deed('set_quality', { values: { orders: Number(orders) } }).catch(() => {}) }),
+    slider({ label: 'Ghosts ×', tip: 'Artist’s factor on all ghosts; 1 is physics.', min: 0, max: 10, step: 0.01, curve: 2, get: (s) => s.pass_gain.ghosts ?? 1, set: (gain, held) => app.lively('set_pass_gain', { name: 'ghosts', gain }, held, 'gain ghosts') }),
+    slider({ label: 'Starburst ×', tip: 'Artist’s factor on the direct image and its diffraction; 1 is physics.', min: 0, max: 10, step: 0.01, curve: 2, get: (s) => s.pass_gain.starburst ?? 1, set: (gain, held) => app.lively('set_pass_gain', { name: 'starburst', gain }, held, 'gain starburst') }),
+  ]);
+  return {
+    element: h('div', {}, lights.element, shot.element, seeing.element, work.element),
+    update(state) {
+      choose.replaceChildren(...state.lights.map((light, k) => button(light.name === 'light' ? `Light ${k + 1}` : light.name, () => { app.chooseLight(k); app.panels.light.update(app.state); app.view.redraw(); }, { kind: k === app.light ? 'on' : '' })),
+        button('+', () => app.deed('add_light', {}).catch(() => {}), { kind: 'quiet', tip: 'Add a light.' }),
+        button('Remove', () => app.deed('remove_light', { light: app.light }).catch(() => {}), { kind: 'quiet', disabled: state.lights.length < 2 }));
+      for (const part of [lights, shot, seeing, work]) part.update(state);
+    },
+    moved(angles) {
+      across.element.querySelector('input').value = angles[0].toFixed(2);
+      up.element.querySelector('input').value = angles[1].toFixed(2);
+    },
+  };
+}

@@ -1,0 +1,78 @@
+// Annotate and solve: what the ghosts shall be, and the lenses that make them so.
+import { button, choice, entry, group, h, row, slider, tick } from './ui.js';
+
+const COMPARE = [['physical', 'Physical'], ['target', 'Target'], ['wipe', 'Wipe'], ['side', 'Side by side']];
+
+export function targetPanel(app) {
+  const wishes = () => app.state.design?.wishes ?? [];
+  const own = () => app.view.places.find((one) => one.name === app.ghost);
+  const mine = () => (app.wish !== null ? wishes()[app.wish] : wishes().find((wish) => wish.ghost === app.ghost));
+  const set = (values, held = '') => (app.wish !== null
+    ? app.lively('set_new_wish', { number: app.wish, values }, held, 'wish')
+    : app.ghost && app.lively('set_wish', { ghost: app.ghost, values }, held, 'wish'));
+  const compare = h('div', { class: 'buttons', role: 'group', 'aria-label': 'What is shown' });
+  const looks = COMPARE.map(([key, words]) => button(words, () => see(key), { 'data-compare': key }));
+  compare.append(...looks);
+  const see = (key) => { app.view.compare = key; app.view.refreshTarget(); self.update(app.state); app.view.redraw(); };
+  const list = h('div', { class: 'buttons' });
+  const told = h('p', { class: 'quietly' });
+  const colour = h('input', { type: 'color', value: '#ffffff' });
+  colour.addEventListener('change', () => set({ color: [1, 3, 5].map((k) => Number(((parseInt(colour.value.slice(k, k + 2), 16) / 255) ** 2.2).toFixed(4))) }));
+  const drop = button('Remove ghost', () => set({ action: mine()?.action === 'remove' ? 'want' : 'remove' }), { tip: 'It shall not be seen at all.', id: 'wish-remove' });
+  const ignore = button('Any', () => set({ action: mine()?.action === 'ignore' ? 'want' : 'ignore' }), { tip: 'Whatever becomes of this ghost is fine; the solver is freer.' });
+  const back = button('Take back', () => (app.wish !== null ? app.deed('remove_wish', { number: app.wish }).then(() => { app.wish = null; }) : app.deed('remove_wish', { number: wishes().indexOf(mine()) })).catch(() => {}), { kind: 'quiet' });
+  const fields = group('What it shall be', [
+    slider({ label: 'Move', tip: 'Along the line from the middle of the picture to the light, mm: no ghost of a lens of revolution can leave it.', min: -20, max: 20, step: 0.05, unit: 'mm', name: 'wish_move', get: () => (app.wish !== null ? mine()?.place_mm : mine()?.move_mm) ?? 0, set: (value, held) => set(app.wish !== null ? { place_mm: value } : { move_mm: value }, held) }),
+    slider({ label: 'Size ×', tip: 'Of its radius. Its light stays, so a smaller ghost is brighter.', min: 0.05, max: 5, step: 0.01, curve: 2, name: 'wish_size', get: () => mine()?.height ?? 1, set: (height, held) => set({ height }, held) }),
+    row('Colour', 'Its hue; Solve colours then looks for coatings that give it.', [colour, button('As it is', () => set({ color: null }), { kind: 'quiet' })], () => { colour.value = mine()?.color ? `#${mine().color.map((part) => Math.round(255 * Math.min(1, part) ** (1 / 2.2)).toString(16).padStart(2, '0')).join('')}` : '#ffffff'; }),
+    h('div', { class: 'buttons' }, drop, ignore, back),
+  ]);
+  const design = (values) => app.deed('set_design', { values }).catch(() => {});
+  const how = group('Solve', [
+    choice({ label: 'Search among', tip: 'Lenses built like this one keep glass, air and stop where they are; any structure may put them elsewhere.', name: 'structure', options: [['lens', 'lenses built like this one'], ['any', 'any structure']], get: (s) => s.design?.structure ?? 'lens', set: (structure) => design({ structure }) }),
+    tick({ label: 'From scratch', tip: 'Only the ghosts that were added count; the lens’ own are left out (thesis section 5.7).', get: (s) => s.design?.own_ghosts === false, set: (scratch) => design(scratch ? { own_ghosts: false, structure: 'any' } : { own_ghosts: true }) }),
+    entry({ label: 'Surfaces', tip: 'Of the new lens; empty: as many as this one, or as the ghosts need.', placeholder: 'as needed', digits: 0, get: (s) => s.design?.surfaces, set: (surfaces) => design({ surfaces, ...(surfaces ? { structure: 'any' } : {}) }) }),
+  ]);
+  let seconds = 20;
+  const time = entry({ label: 'Seconds', tip: 'Stop it any time; the best lenses so far are kept.', digits: 0, name: 'seconds', get: () => seconds, set: (value) => { if (value > 0) seconds = value; } });
+  const solve = button('Solve', () => app.ask('/api/solve', { seconds }), { kind: 'main', id: 'solve' });
+  const colors = button('Solve colours', () => app.ask('/api/colors', { kind: 'quarter-wave' }), { tip: 'Quarter-wave coatings for all rows, so that ghosts get the wished colours and the others keep theirs.', id: 'solve-colors' });
+  const films = button('…with free films', () => app.ask('/api/colors', { kind: 'film' }), { tip: 'Films of any index and thickness: more colours, less like real lenses.' });
+  const stop = button('Stop', () => app.ask('/api/stop'), { id: 'stop' });
+  const clear = button('Take all back', () => app.deed('clear_wishes', {}).catch(() => {}), { kind: 'quiet' });
+  const add = button('Add a ghost', () => app.deed('add_ghost', { place_mm: 5, radius_mm: 1.5 }).then(() => app.chooseWish(wishes().length - 1)).catch(() => {}), { tip: 'One that the lens has not; drag it along the line.', id: 'wish-add' });
+  const progress = h('p', { class: 'quietly', id: 'solve-words' });
+  const found = h('div', { class: 'candidates' });
+
+  const self = {
+    element: h('div', {}, h('div', { class: 'group' }, h('h3', {}, 'Target'), compare, told, list, h('div', { class: 'buttons' }, add, clear)), fields.element, how.element, h('div', { class: 'group' }, time.element, h('div', { class: 'buttons' }, solve, stop, colors, films), progress, found)),
+    shown() { if (app.state) app.places?.(); },
+    next() { const keys = COMPARE.map(([key]) => key); see(keys[(keys.indexOf(app.view.compare) + 1) % keys.length]); },
+    update(state) {
+      for (const look of looks) look.classList.toggle('on', look.dataset.compare === app.view.compare);
+      const chosen = app.wish !== null || Boolean(own());
+      told.textContent = app.ghost && !own() && app.wish === null ? `Ghost ${app.ghost} reflects on both sides of the stop; design moves those that reflect twice on one side.`
+        : chosen ? 'Drag it along the line, or its rim to resize it.' : 'Click a ghost to say what it shall become.';
+      list.replaceChildren(...(state.design?.wishes ?? []).map((wish, number) => button(wish.ghost ?? `new ${number + 1}`, () => (wish.ghost ? app.choose(wish.ghost) : app.chooseWish(number)), { kind: (wish.ghost ? wish.ghost === app.ghost && app.wish === null : number === app.wish) ? 'on' : '' })));
+      fields.element.hidden = !chosen;
+      if (chosen) fields.update(state);
+      drop.classList.toggle('on', mine()?.action === 'remove');
+      ignore.classList.toggle('on', mine()?.action === 'ignore');
+      drop.disabled = app.wish !== null;
+      back.disabled = !mine();
+      clear.disabled = !state.design;
+      how.update(state);
+      time.update(state);
+      const run = state.solve;
+      solve.disabled = colors.disabled = films.disabled = run.running;
+      stop.disabled = !run.running;
+      progress.textContent = run.words ? `${run.words}${run.seconds ? ` · ${run.seconds.toFixed(0)} s` : ''}` : '';
+      if (found.dataset.number !== String(run.number)) {
+        found.dataset.number = String(run.number);
+        found.replaceChildren(...run.found.map((words, k) => h('figure', {}, h('img', { src: `/api/candidate/${k}?n=${run.number}`, alt: `Lens ${k + 1}` }), h('figcaption', {}, words,
+          button('Accept', () => app.ask('/api/accept', { number: k }), { kind: 'main', disabled: run.running, 'data-accept': k })))));
+      }
+    },
+  };
+  return self;
+}

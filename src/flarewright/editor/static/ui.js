@@ -1,0 +1,192 @@
+// Small building blocks. Every control reads its value from the state and asks for a change; none keeps one of its own.
+export function h(tag, attributes = {}, ...children) {
+  const element = document.createElement(tag);
+  for (const [key, value] of Object.entries(attributes)) {
+    if (value === null || value === undefined || value === false) continue;
+    if (key.startsWith('on')) element.addEventListener(key.slice(2), value);
+    else if (key === 'class') element.className = value;
+    else if (key === 'tip') { element.dataset.tip = value; } else if (value === true) element.setAttribute(key, '');
+    else element.setAttribute(key, value);
+  }
+  element.append(...children.flat().filter((child) => child !== null && child !== undefined));
+  return element;
+}
+
+let strokes = 0;
+export const stroke = () => `s${Date.now().toString(36)}${strokes++}`;
+
+export function toast(text, kind = 'info') {
+  const box = h('div', { class: `toast ${kind}` }, text);
+  const shelf = document.getElementById('toasts');
+  shelf.append(box);
+  while (shelf.children.length > 4) shelf.firstChild.remove();
+  setTimeout(() => box.remove(), kind === 'error' ? 9000 : 4500);
+}
+
+export function number(text) {
+  const value = Number(String(text).replace(',', '.'));
+  return Number.isFinite(value) && String(text).trim() !== '' ? value : null;
+}
+
+const shown = (value, digits) => (value === null || value === undefined ? '' : String(Number(Number(value).toFixed(digits))));
+
+// A control is {element, update(state)}.
+export function group(title, controls, extra = []) {
+  const head = title ? h('h3', {}, title, h('span', { class: 'gap' }), ...extra) : null;
+  const element = h('div', { class: 'group' }, head, ...controls.map((control) => control.element ?? control));
+  return { element, update: (state) => controls.forEach((control) => control.update?.(state)) };
+}
+
+export function row(label, tip, fields, update) {
+  const id = `c${strokes++}`;
+  fields[0].id = id;
+  const element = h('div', { class: 'row', tip }, h('label', { for: id }, label), h('div', { class: 'fields' }, ...fields));
+  return { element, update };
+}
+
+// Slider and box. `set` is called with the value and a group, so that one stroke is one step of the history.
+export function slider({ label, tip, get, set, min, max, step = 0.01, digits = 2, unit = '', curve = 1, name }) {
+  const to = (value) => Math.pow(Math.max(0, (value - min) / (max - min)), 1 / curve);
+  const from = (part) => min + (max - min) * Math.pow(part, curve);
+  const bar = h('input', { type: 'range', min: 0, max: 1, step: curve === 1 ? step / (max - min) : 0.001, 'aria-label': label });
+  const box = h('input', { class: 'number', type: 'text', inputmode: 'decimal', 'aria-label': label, name });
+  let held = null;
+  let kept = null;
+  const rounded = (value) => Number((Math.round(value / step) * step).toFixed(6));
+  bar.addEventListener('pointerdown', () => { held = stroke(); });
+  bar.addEventListener('keydown', () => { held ??= stroke(); });
+  bar.addEventListener('keyup', () => { held = null; });
+  bar.addEventListener('input', () => {
+    const value = rounded(from(Number(bar.value)));
+    box.value = shown(value, digits);
+    set(value, held ?? '');
+  });
+  bar.addEventListener('change', () => { held = null; });
+  box.addEventListener('change', () => {
+    const value = number(box.value);
+    box.classList.toggle('bad', value === null);
+    if (value !== null) set(value, '');
+  });
+  escapes(box, () => shown(kept, digits));
+  return row(label, tip, [bar, box, h('span', { class: 'unit' }, unit)], (state) => {
+    kept = get(state);
+    if (!bar.matches(':active')) bar.value = to(kept ?? min);
+    if (document.activeElement !== box) { box.value = shown(kept, digits); box.classList.remove('bad'); }
+  });
+}
+
+export function entry({ label, tip, get, set, digits = 4, unit = '', placeholder = '', words = false, name, list }) {
+  const box = h('input', { class: words ? '' : 'number', type: 'text', placeholder, name, list, spellcheck: 'false' });
+  let kept = '';
+  box.addEventListener('change', () => {
+    const text = box.value.trim();
+    const value = words ? text : text === '' ? null : number(text);
+    const bad = !words && text !== '' && value === null;
+    box.classList.toggle('bad', bad);
+    if (!bad) set(value);
+  });
+  escapes(box, () => kept);
+  return row(label, tip, [box, h('span', { class: 'unit' }, unit)], (state) => {
+    const value = get(state);
+    kept = words ? value ?? '' : shown(value, digits);
+    if (document.activeElement !== box) { box.value = kept; box.classList.remove('bad'); }
+  });
+}
+
+function escapes(box, text) {
+  box.addEventListener('keydown', (event) => {
+    if (event.key === 'Escape') { box.value = text(); box.classList.remove('bad'); box.blur(); event.stopPropagation(); }
+    if (event.key === 'Enter') box.blur();
+  });
+}
+
+export function choice({ label, tip, get, set, options, name }) {
+  const box = h('select', { name });
+  let listed = '';
+  const element = row(label, tip, [box, h('span', { class: 'unit' })], (state) => {
+    const all = typeof options === 'function' ? options(state) : options;
+    const value = String(get(state) ?? '');
+    const whole = all.some(([key]) => key === value) ? all : [...all, [value, value]];
+    const text = JSON.stringify(whole);
+    if (text !== listed) {
+      box.replaceChildren(...whole.map(([key, words, off]) => h('option', { value: key, disabled: off }, words)));
+      listed = text;
+    }
+    if (document.activeElement !== box || box.value !== value) box.value = value;
+  });
+  box.addEventListener('change', () => set(box.value));
+  return element;
+}
+
+export function tick({ label, tip, get, set, name }) {
+  const box = h('input', { type: 'checkbox', name });
+  box.addEventListener('change', () => set(box.checked));
+  return row(label, tip, [box], (state) => { box.checked = Boolean(get(state)); });
+}
+
+export const button = (words, work, { tip, kind = '', ...rest } = {}) =>
+  h('button', { class: kind, tip, onclick: work, type: 'button', ...rest }, words);
+
+export function dialog(title, ...content) {
+  const box = h('dialog', { 'aria-label': title }, h('h2', {}, title), ...content);
+  box.addEventListener('close', () => box.remove());
+  box.addEventListener('click', (event) => { if (event.target === box) box.close(); });
+  document.body.append(box);
+  box.showModal();
+  return box;
+}
+
+export function menu(anchor, entries) {
+  document.querySelector('.menu')?.remove();
+  const place = anchor.getBoundingClientRect();
+  const box = h('div', { class: 'menu', role: 'menu' }, ...entries.map(([words, work, tip]) =>
+    h('button', { role: 'menuitem', type: 'button', tip, onclick: () => { box.remove(); work(); } }, words)));
+  box.style.left = `${place.left}px`;
+  box.style.top = `${place.bottom + 3}px`;
+  document.body.append(box);
+  box.firstChild?.focus();
+  const shut = (event) => {
+    if (event.type === 'keydown' && event.key !== 'Escape') return;
+    if (event.type === 'pointerdown' && box.contains(event.target)) return;
+    box.remove();
+    removeEventListener('pointerdown', shut, true);
+    removeEventListener('keydown', shut, true);
+  };
+  addEventListener('pointerdown', shut, true);
+  addEventListener('keydown', shut, true);
+}
+
+// Tooltips: one sentence of optics, for the mouse after a moment and for the keyboard at once.
+export function tips() {
+  let timer = 0;
+  const box = h('div', { id: 'tip', role: 'tooltip', hidden: true });
+  document.body.append(box);
+  const show = (element) => {
+    box.textContent = element.dataset.tip;
+    box.hidden = false;
+    const place = element.getBoundingClientRect();
+    const own = box.getBoundingClientRect();
+    const panel = document.getElementById('panel');
+    // beside the panel, where it covers no other control
+    if (panel.contains(element) && !element.closest('#tabs')) {
+      box.style.left = `${panel.getBoundingClientRect().left - own.width - 8}px`;
+      box.style.top = `${Math.min(place.top, innerHeight - own.height - 8)}px`;
+      return;
+    }
+    const left = Math.min(place.left, innerWidth - own.width - 8);
+    const below = place.bottom + 6 + own.height < innerHeight;
+    box.style.left = `${Math.max(8, left)}px`;
+    box.style.top = `${below ? place.bottom + 6 : place.top - own.height - 6}px`;
+  };
+  addEventListener('pointerover', (event) => {
+    clearTimeout(timer);
+    box.hidden = true;
+    const element = event.target.closest?.('[data-tip]');
+    if (element) timer = setTimeout(() => { if (element.isConnected) show(element); }, 550);
+  });
+  addEventListener('pointerdown', () => { clearTimeout(timer); box.hidden = true; });
+  addEventListener('focusin', (event) => {
+    const element = event.target.matches(':focus-visible') ? event.target.closest('[data-tip]') : null;
+    if (element) show(element); else box.hidden = true;
+  });
+}

@@ -1,0 +1,399 @@
+// The picture: light and ghosts are touched here. All pixels come from the server; this file only places them.
+import { complain, get, latest, post } from './api.js';
+import { stroke } from './ui.js';
+
+const FADE_MS = 160;
+const NEAR_PX = 16;
+const CLICK_PX = 4;
+const STEEPEST = 80;
+const INK = 'rgba(240,176,84,.95)';
+
+export function viewport(canvas, app) {
+  const pen = canvas.getContext('2d', { alpha: false });
+  const self = {
+    image: null, before: null, fadeFrom: 0, target: null, outline: null, hover: null, compare: 'physical', wipe: 0.5,
+    zoom: 1, panX: 0, panY: 0, drag: null, stack: [], at: 0, spot: null, annotate: false, places: [], preview: null,
+    stats: { shown: [], latency: [], server: [] },
+  };
+  let wanted = false;
+
+  // ------------------------------------------------------------------------------------------------------ geometry
+  const box = () => ({ w: canvas.clientWidth, h: canvas.clientHeight });
+  const doubled = () => self.compare === 'side';
+  function frame() {
+    const [width, height] = app.state.frame.size;
+    const { w, h } = box();
+    const room = doubled() ? w / 2 : w;
+    const fit = Math.min((room - 28) / width, (h - 28) / height) * self.zoom;
+    const fw = width * fit;
+    const fh = height * fit;
+    return { x: room / 2 - fw / 2 + self.panX, y: h / 2 - fh / 2 + self.panY, w: fw, h: fh, mm: fw / app.state.frame.sensor[0], shift: w / 2 };
+  }
+  const efl = () => app.state.lens.facts.efl || self.efl || 50;
+  // millimetres in the upright picture to pixels of the page, and back
+  const toPage = (x, y, f = frame()) => [f.x + f.w / 2 + x * f.mm, f.y + f.h / 2 - y * f.mm * stretch(f)];
+  const stretch = (f) => (f.h / app.state.frame.sensor[1]) / f.mm;
+  const toMm = (px, py, f = frame()) => [(px - f.x - f.w / 2) / f.mm, -(py - f.y - f.h / 2) / (f.mm * stretch(f))];
+  const angle = (mm) => Math.max(-STEEPEST, Math.min(STEEPEST, Math.atan(mm / efl()) * 180 / Math.PI));
+  const place = (light) => light.field_deg.map((deg) => efl() * Math.tan(deg * Math.PI / 180));
+  const lightAt = (k) => (self.drag?.kind === 'light' && self.drag.light === k && self.drag.now) || app.state.lights[k].field_deg;
+  const lightPage = (k) => toPage(...place({ field_deg: lightAt(k) }));
+  // a handle far outside is held at the border, so that it can always be taken
+  function handle(k) {
+    const [x, y] = lightPage(k);
+    const { w, h } = box();
+    const room = doubled() ? w / 2 : w;
+    const cx = Math.max(12, Math.min(room - 12, x));
+    const cy = Math.max(12, Math.min(h - 12, y));
+    return [cx, cy, cx !== x || cy !== y];
+  }
+
+  // ------------------------------------------------------------------------------------------------------- drawing
+  function redraw() {
+    if (wanted) return;
+    wanted = true;
+    requestAnimationFrame(draw);
+  }
+  function draw(now) {
+    wanted = false;
+    const { w, h } = box();
+    const ratio = devicePixelRatio || 1;
+    if (canvas.width !== Math.round(w * ratio) || canvas.height !== Math.round(h * ratio)) {
+      canvas.width = Math.round(w * ratio);
+      canvas.height = Math.round(h * ratio);
+    }
+    pen.setTransform(ratio, 0, 0, ratio, 0, 0);
+    pen.fillStyle = '#121212';
+    pen.fillRect(0, 0, w, h);
+    if (!app.state) return;
+    const f = frame();
+    pen.imageSmoothingEnabled = self.zoom < 3;
+    pen.imageSmoothingQuality = 'high';
+    picture(f, now);
+    border(f);
+    if (doubled()) { pen.save(); pen.translate(f.shift, 0); border(f); pen.restore(); }
+    if (app.state.view.safe_frame) safe(f);
+    overlays(f);
+    lights();
+    if (self.measure) { self.measure(now); }
+  }
+  function picture(f, now) {
+    const part = Math.min(1, (now - self.fadeFrom) / FADE_MS);
+    if (self.before && part < 1) {
+      pen.drawImage(self.before, f.x, f.y, f.w, f.h);
+      pen.globalAlpha = part;
+    }
+    if (self.image) pen.drawImage(self.image, f.x, f.y, f.w, f.h);
+    pen.globalAlpha = 1;
+    if (part < 1) redraw(); else self.before = null;
+    if (self.compare === 'physical' || !self.target) return;
+    pen.save();
+    if (self.compare === 'side') pen.translate(f.shift, 0);
+    pen.beginPath();
+    const from = self.compare === 'wipe' ? f.w * self.wipe : 0;
+    pen.rect(f.x + from, f.y, f.w - from, f.h);
+    pen.clip();
+    pen.drawImage(self.target, f.x, f.y, f.w, f.h);
+    pen.restore();
+    if (self.compare === 'wipe') {
+      pen.fillStyle = INK;
+      pen.fillRect(f.x + f.w * self.wipe - 0.5, f.y, 1, f.h);
+      pen.beginPath();
+      pen.arc(f.x + f.w * self.wipe, f.y + f.h - 18, 7, 0, 7);
+      pen.fill();
+      label('physical', f.x + f.w * self.wipe - 10, f.y + f.h - 14, 'right');
+      label('target', f.x + f.w * self.wipe + 10, f.y + f.h - 14, 'left');
+    }
+    if (self.compare === 'side') { label('physical', f.x + 8, f.y + 16, 'left'); label('target', f.x + f.shift + 8, f.y + 16, 'left'); }
+    if (self.compare === 'target') label('target', f.x + 8, f.y + 16, 'left');
+  }
+  function label(text, x, y, align) {
+    pen.font = '11px system-ui, sans-serif';
+    pen.textAlign = align;
+    pen.fillStyle = '#000a';
+    pen.fillText(text, x + 1, y + 1);
+    pen.fillStyle = '#ddd';
+    pen.fillText(text, x, y);
+  }
+  function border(f) {
+    pen.strokeStyle = '#3c3c3c';
+    pen.lineWidth = 1;
+    pen.strokeRect(Math.round(f.x) - 0.5, Math.round(f.y) - 0.5, Math.round(f.w) + 1, Math.round(f.h) + 1);
+  }
+  function safe(f) {
+    pen.strokeStyle = 'rgba(220,220,220,.35)';
+    for (const part of [0.9, 0.8]) pen.strokeRect(f.x + f.w * (1 - part) / 2, f.y + f.h * (1 - part) / 2, f.w * part, f.h * part);
+    pen.beginPath();
+    const [cx, cy] = [f.x + f.w / 2, f.y + f.h / 2];
+    pen.moveTo(cx - 9, cy); pen.lineTo(cx + 9, cy); pen.moveTo(cx, cy - 9); pen.lineTo(cx, cy + 9);
+    pen.stroke();
+  }
+  function overlays(f) {
+    if (self.drag?.kind !== 'light') {
+      if (self.hover) { pen.globalAlpha = 0.55; pen.drawImage(self.hover, f.x, f.y, f.w, f.h); pen.globalAlpha = 1; }
+      if (self.outline) pen.drawImage(self.outline, f.x, f.y, f.w, f.h);
+    }
+    if (!self.annotate) return;
+    const [ax, ay] = toPage(...line(-400));
+    const [bx, by] = toPage(...line(400));
+    pen.strokeStyle = 'rgba(240,176,84,.28)';
+    pen.setLineDash([5, 5]);
+    pen.beginPath(); pen.moveTo(ax, ay); pen.lineTo(bx, by); pen.stroke();
+    pen.setLineDash([]);
+    for (const one of wished()) {
+      const chosen = one.key === self.chosenKey();
+      if (!chosen && !one.changed) continue;
+      const [x, y] = toPage(...line(one.place));
+      pen.strokeStyle = chosen ? INK : 'rgba(240,176,84,.5)';
+      pen.lineWidth = chosen ? 1.6 : 1;
+      pen.setLineDash(one.removed ? [3, 4] : []);
+      pen.beginPath(); pen.arc(x, y, Math.max(3, Math.abs(one.radius) * f.mm), 0, 7); pen.stroke();
+      pen.setLineDash([]);
+      if (chosen) { pen.fillStyle = INK; pen.beginPath(); pen.arc(x, y, 3, 0, 7); pen.fill(); }
+      if (one.removed) label('removed', x, y - 6, 'center');
+    }
+    pen.lineWidth = 1;
+  }
+  function lights() {
+    app.state.lights.forEach((light, k) => {
+      const [x, y, held] = handle(k);
+      const chosen = k === app.light;
+      pen.strokeStyle = '#000a'; pen.lineWidth = 3;
+      for (let pass = 0; pass < 2; pass++) {
+        pen.beginPath(); pen.arc(x, y, 8, 0, 7);
+        pen.moveTo(x - 13, y); pen.lineTo(x - 8, y); pen.moveTo(x + 8, y); pen.lineTo(x + 13, y);
+        pen.moveTo(x, y - 13); pen.lineTo(x, y - 8); pen.moveTo(x, y + 8); pen.lineTo(x, y + 13);
+        pen.stroke();
+        pen.strokeStyle = chosen ? '#ffe0ad' : '#bbb'; pen.lineWidth = 1.2;
+      }
+      if (held) label(lightAt(k).map((deg) => `${deg.toFixed(1)}°`).join(', '), x < 80 ? x + 16 : x - 16, y + 4, x < 80 ? 'left' : 'right');
+    });
+    pen.lineWidth = 1;
+  }
+
+  // ------------------------------------------------------------------------------------------------------ pictures
+  self.show = (bitmap, fade) => {
+    if (fade && self.image) { self.before = self.image; self.fadeFrom = performance.now(); } else { self.before = null; self.fadeFrom = 0; }
+    self.image = bitmap;
+    redraw();
+  };
+  self.refresh = latest(async (fade) => {
+    const answer = await fetch(`/api/picture?n=${app.state.picture.number}`);
+    if (!answer.ok || self.drag?.kind === 'light') return;
+    const grade = app.state.picture.grade;
+    const bitmap = await createImageBitmap(await answer.blob());
+    self.show(bitmap, fade);
+    self.shownGrade = grade;
+    self.shownNumber = app.state.picture.number;
+    if (grade === 'final' && self.released) { self.stats.final = performance.now() - self.released; self.released = 0; }
+  });
+  self.refreshTarget = latest(async () => {
+    if (self.compare === 'physical') return;
+    const answer = await fetch('/api/target');
+    if (!answer.ok) return;
+    self.target = await createImageBitmap(await answer.blob());
+    redraw();
+  });
+  async function overlay(name) {
+    const answer = await fetch(`/api/outline?ghost=${encodeURIComponent(name)}`);
+    return answer.ok ? createImageBitmap(await answer.blob()) : null;
+  }
+  self.refreshOutline = latest(async () => {
+    const name = app.ghost;
+    self.outline = name ? await overlay(name) : null;
+    redraw();
+  });
+  self.hoverGhost = latest(async (name) => {
+    self.hover = name && name !== app.ghost ? await overlay(name) : null;
+    redraw();
+  });
+
+  // ----------------------------------------------------------------------------------------------------- the light
+  // As many pictures as the server makes, and always of the newest place; two are under way, so that neither side waits.
+  let under = 0;
+  let next = null;
+  let sent = 0;
+  let received = 0;
+  async function pump() {
+    while (next && under < 2) {
+      const now = next;
+      next = null;
+      const number = ++sent;
+      under += 1;
+      ask(now, number).finally(() => { under -= 1; pump(); });
+    }
+  }
+  async function ask(now, number) {
+    try {
+      const answer = await fetch(`/api/moving?light=${now.light}&x=${now.x}&y=${now.y}`);
+      if (!answer.ok) throw new Error((await answer.json()).error);
+      const bitmap = await createImageBitmap(await answer.blob());
+      if (number < received || self.drag?.kind !== 'light') return;
+      received = number;
+      self.show(bitmap, false);
+      self.shownGrade = 'moving';
+      self.stats.server.push(Number(answer.headers.get('X-Seconds')));
+      requestAnimationFrame((time) => { self.stats.shown.push(time); self.stats.latency.push(performance.now() - now.time); });
+    } catch (error) { complain(error); }
+  }
+  function moveLight(px, py, time) {
+    const drag = self.drag;
+    const [mx, my] = toMm(px - drag.offX, py - drag.offY);
+    drag.now = [angle(mx), angle(my)];
+    next = { light: drag.light, x: drag.now[0].toFixed(4), y: drag.now[1].toFixed(4), time };
+    app.lightMoved(drag.light, drag.now);
+    pump();
+    redraw();
+  }
+  async function dropLight() {
+    const { light, now, group } = self.drag;
+    next = null;
+    self.released = performance.now();
+    try {
+      if (now) {
+        app.state.lights[light].field_deg = now.map((deg) => Number(deg.toFixed(4)));
+        self.drag = null;
+        await app.deed('move_light', { light, x: now[0], y: now[1] }, group);
+      } else { self.drag = null; await post('/api/rest'); }
+    } finally { self.drag = null; redraw(); }
+  }
+
+  // ---------------------------------------------------------------------------------------------------- annotating
+  const line = (mm) => app.state.direction.map((part) => part * mm);
+  self.chosenKey = () => (app.wish !== null && app.wish !== undefined ? `w${app.wish}` : app.ghost);
+  function wished() {
+    const wishes = app.state.design?.wishes ?? [];
+    const out = self.places.map((one) => {
+      const wish = wishes.find((each) => each.ghost === one.name);
+      const place = (wish?.place_mm ?? one.place) + (wish?.move_mm ?? 0);
+      return { key: one.name, name: one.name, own: one, place, radius: one.radius * (wish?.height ?? 1), changed: Boolean(wish), removed: wish?.action === 'remove' };
+    });
+    wishes.forEach((wish, number) => {
+      if (!wish.ghost) out.push({ key: `w${number}`, number, place: wish.place_mm + wish.move_mm, radius: wish.radius_mm * wish.height, changed: true });
+    });
+    if (self.preview) for (const one of out) if (one.key === self.preview.key) Object.assign(one, self.preview);
+    return out;
+  }
+  function grab(px, py) {
+    if (!self.annotate) return null;
+    const f = frame();
+    const order = wished().sort((a, b) => (b.key === self.chosenKey()) - (a.key === self.chosenKey()));
+    for (const one of order) {
+      if (one.key !== self.chosenKey() && !one.key.startsWith('w')) continue;
+      const [x, y] = toPage(...line(one.place), f);
+      const away = Math.hypot(px - x, py - y);
+      const rim = Math.max(3, Math.abs(one.radius) * f.mm);
+      if (Math.abs(away - rim) < 7 && rim > 9) return { kind: 'rim', one };
+      if (away < Math.max(rim, 9)) return { kind: 'ghost', one, start: along(px, py) - one.place };
+    }
+    return null;
+  }
+  const along = (px, py) => { const [x, y] = toMm(px, py); return x * app.state.direction[0] + y * app.state.direction[1]; };
+  function pull(px, py) {
+    const { kind, one, start } = self.drag;
+    if (kind === 'ghost') self.preview = { key: one.key, place: along(px, py) - start, radius: one.radius };
+    else {
+      const [x, y] = toPage(...line(one.place));
+      self.preview = { key: one.key, place: one.place, radius: Math.sign(one.radius || 1) * Math.max(0.02, Math.hypot(px - x, py - y) / frame().mm) };
+    }
+    redraw();
+  }
+  async function dropGhost() {
+    const { one, group } = self.drag;
+    const now = self.preview;
+    self.drag = null;
+    if (!now) return;
+    const round = (value) => Number(value.toFixed(3));
+    if (one.number !== undefined) await app.deed('set_new_wish', { number: one.number, values: { place_mm: round(now.place), move_mm: 0, radius_mm: round(now.radius), height: 1 } }, group);
+    else await app.deed('set_wish', { ghost: one.name, values: { move_mm: round(now.place - one.own.place), height: Number(Math.max(0.01, Math.abs(now.radius / one.own.radius)).toFixed(4)) } }, group);
+    self.preview = null;
+    redraw();
+  }
+
+  // -------------------------------------------------------------------------------------------------------- choosing
+  async function pick(px, py) {
+    const f = frame();
+    const u = (px - f.x) / f.w;
+    const v = (py - f.y) / f.h;
+    if (u < 0 || v < 0 || u >= 1 || v >= 1) { app.choose(null); return; }
+    try {
+      const { ghosts } = await get(`/api/pick?u=${u}&v=${v}`);
+      self.stack = ghosts;
+      self.at = 0;
+      self.spot = [px, py];
+      app.choose(ghosts[0] ?? null);
+      app.hint();
+    } catch (error) { complain(error); }
+  }
+  self.walk = (step) => {
+    if (!self.stack.length) return;
+    self.at = (self.at + step + self.stack.length) % self.stack.length;
+    app.choose(self.stack[self.at], true);
+    app.hint();
+  };
+
+  // ---------------------------------------------------------------------------------------------------------- hands
+  const local = (event) => { const rect = canvas.getBoundingClientRect(); return [event.clientX - rect.left, event.clientY - rect.top]; };
+  canvas.addEventListener('pointerdown', (event) => {
+    if (!app.state) return;
+    canvas.focus();
+    canvas.setPointerCapture(event.pointerId);
+    const [px, py] = local(event);
+    const f = frame();
+    if (event.button === 1 || (event.button === 0 && (event.altKey || self.space))) { self.drag = { kind: 'pan', px, py, x: self.panX, y: self.panY }; return; }
+    if (event.button !== 0) return;
+    if (self.compare === 'wipe' && Math.abs(px - f.x - f.w * self.wipe) < 7) { self.drag = { kind: 'wipe' }; return; }
+    const near = app.state.lights.map((_, k) => [k, ...handle(k)]).find(([, x, y]) => Math.hypot(px - x, py - y) < NEAR_PX);
+    const taken = near ? null : grab(px, py);
+    if (taken) { self.drag = { ...taken, px, py, group: stroke() }; return; }
+    const light = near ? near[0] : app.light;
+    if (near) app.chooseLight(light);
+    const [lx, ly] = near ? [near[1], near[2]] : lightPage(light);
+    // far away from the handle, the light moves as the hand does
+    self.drag = { kind: 'maybe', near: Boolean(near), light, px, py, offX: px - lx, offY: py - ly, group: stroke() };
+  });
+  canvas.addEventListener('pointermove', (event) => {
+    const drag = self.drag;
+    if (!drag) { const [px, py] = local(event); cursor(px, py); return; }
+    const [px, py] = local(event);
+    if (drag.kind === 'pan') { self.panX = drag.x + px - drag.px; self.panY = drag.y + py - drag.py; redraw(); return; }
+    if (drag.kind === 'wipe') { const f = frame(); self.wipe = Math.max(0, Math.min(1, (px - f.x) / f.w)); redraw(); return; }
+    if (drag.kind === 'ghost' || drag.kind === 'rim') { pull(px, py); return; }
+    if (drag.kind === 'maybe' && Math.hypot(px - drag.px, py - drag.py) >= CLICK_PX) { drag.kind = 'light'; self.hover = null; }
+    if (drag.kind === 'light') moveLight(px, py, performance.now());
+  });
+  canvas.addEventListener('pointerup', async (event) => {
+    const drag = self.drag;
+    if (!drag) return;
+    if (drag.kind === 'light') await dropLight();
+    else if (drag.kind === 'ghost' || drag.kind === 'rim') await dropGhost();
+    else { self.drag = null; if (drag.kind === 'maybe' && !drag.near) pick(...local(event)); }
+    redraw();
+  });
+  canvas.addEventListener('wheel', (event) => {
+    event.preventDefault();
+    const [px, py] = local(event);
+    if (self.spot && self.stack.length > 1 && Math.hypot(px - self.spot[0], py - self.spot[1]) < 12) { self.walk(event.deltaY > 0 ? 1 : -1); return; }
+    const before = frame();
+    const u = (px - before.x) / before.w;
+    const v = (py - before.y) / before.h;
+    self.zoom = Math.max(0.15, Math.min(24, self.zoom * Math.exp(-event.deltaY * 0.0015)));
+    const after = frame();
+    self.panX += px - (after.x + u * after.w);
+    self.panY += py - (after.y + v * after.h);
+    redraw();
+  }, { passive: false });
+  function cursor(px, py) {
+    const near = app.state && app.state.lights.some((_, k) => { const [x, y] = handle(k); return Math.hypot(px - x, py - y) < NEAR_PX; });
+    const taken = !near && app.state ? grab(px, py) : null;
+    canvas.style.cursor = near ? 'grab' : taken ? (taken.kind === 'rim' ? 'nwse-resize' : 'move') : 'crosshair';
+  }
+  self.fit = (zoom = 1) => { self.zoom = zoom; self.panX = 0; self.panY = 0; redraw(); };
+  self.redraw = redraw;
+  self.frame = frame;
+  self.lightPage = lightPage;
+  self.toPage = toPage;
+  self.line = line;
+  new ResizeObserver(redraw).observe(canvas);
+  return self;
+}

@@ -1,0 +1,197 @@
+"""Pictures for the viewport, all of them by `render`: small ones while something moves, final ones when it rests."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..model import Art, Layer, Output, Project, Quality
+from ..render.display import auto_exposure
+from ..render.render import render
+from ..render.working import working_ghosts
+from .view import View
+
+Floats = NDArray[np.float32]
+Grade = Literal["moving", "draft", "final", "working"]
+
+# the viewport's picture fits into this
+WIDEST, HIGHEST = 960, 540
+DRAFT_WAVELENGTHS = 3
+_LUMINANCE = np.array([0.2126, 0.7152, 0.0722], dtype=np.float32)
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A rendered picture, linear.
+
+    Attributes
+    ----------
+    project : Project
+        That it shows.
+    grade : {"moving", "draft", "final", "working"}
+    ghosts, rest : ndarray, shape (H, W, 3)
+        The ghosts, and everything else: starburst and scatter.
+    seconds : float
+        It took.
+    remarks : tuple of str
+    """
+
+    project: Project
+    grade: Grade
+    ghosts: Floats
+    rest: Floats
+    seconds: float
+    remarks: tuple[str, ...] = ()
+
+    @property
+    def ghost_light(self) -> float:
+        """Mean luminance of the ghosts."""
+        return float(self.ghosts.reshape(-1, 3).mean(axis=0, dtype=np.float64) @ _LUMINANCE.astype(np.float64))
+
+
+def view_size(project: Project, scale: float = 1.0) -> tuple[int, int]:
+    """Return the size of the viewport's picture: that of the project, made to fit."""
+    width, height = project.camera.size_px
+    zoom = min(WIDEST / width, HIGHEST / height) * scale
+    return max(16, round(width * zoom)), max(16, round(height * zoom))
+
+
+def staged(project: Project, grade: Grade, scale: float = 1.0) -> Project:
+    """Return the project as the viewport draws it: its frame at another size, its quality as far as is needed.
+
+    Parameters
+    ----------
+    project : Project
+    grade : {"moving", "draft", "final", "working"}
+    scale : float
+        Of the picture's sides.
+
+    Returns
+    -------
+    Project
+    """
+    camera = project.camera.replace(size_px=view_size(project, scale), sensor_mm=project.camera.sensor)
+    own = project.quality
+    if grade == "final":
+        # reference quality is for files: it never ends
+        quality = own.replace(mode="final") if own.mode != "final" else own
+    else:
+        quality = Quality(mode="draft", wavelengths=DRAFT_WAVELENGTHS, paths=own.paths)
+    output = Output(layers="passes", starburst=project.output.starburst)
+    found: Project = project.replace(camera=camera, quality=quality, output=output)
+    return found
+
+
+def take(
+    project: Project,
+    grade: Grade,
+    look: View,
+    *,
+    scale: float = 1.0,
+    progress: Callable[[float, str], None] | None = None,
+) -> Picture:
+    """Render a picture for the viewport.
+
+    Parameters
+    ----------
+    project : Project
+    grade : {"moving", "draft", "final", "working"}
+        "working" draws what `look` asks for by `working_ghosts`.
+    look : View
+    scale : float
+    progress : callable, optional
+        What it raises ends the render.
+
+    Returns
+    -------
+    Picture
+
+    Raises
+    ------
+    FlarewrightError
+        When the project cannot be rendered.
+    """
+    begun = time.perf_counter()
+    stage = staged(project, grade, scale)
+    size = stage.camera.size_px
+    if look.grey or look.unclipped:
+        layer = working_ghosts(stage, grey=look.grey, unclipped=look.unclipped)
+        light = spread([layer], size)
+        return Picture(project, "working", light, np.zeros_like(light), time.perf_counter() - begun)
+    rendering = render(stage, progress=progress)
+    parts = [layer for layer in rendering.layers if layer.name != "beauty"]
+    ghosts = spread([layer for layer in parts if layer.name.startswith("ghosts")], size)
+    rest = spread([layer for layer in parts if not layer.name.startswith("ghosts")], size)
+    return Picture(project, grade, ghosts, rest, time.perf_counter() - begun, rendering.remarks)
+
+
+def spread(layers: list[Layer], size_px: tuple[int, int]) -> Floats:
+    """Add layers on a sheet of the picture's size."""
+    sheet = np.zeros((size_px[1], size_px[0], 3), dtype=np.float32)
+    for layer in layers:
+        x, y, width, height = layer.window
+        sheet[y : y + height, x : x + width] += layer.pixels
+    return sheet
+
+
+@dataclass(frozen=True)
+class Match:
+    """What makes drafts as bright as final pictures: matrices know no inner rims, so their ghosts are too bright.
+
+    Attributes
+    ----------
+    gain : float
+        Of a draft's ghosts.
+    exposure_stops : float
+        Found for the lens, and held while the light moves.
+    """
+
+    gain: float = 1.0
+    exposure_stops: float = 0.0
+
+
+def matched(draft: Picture | None, final: Picture, held: Match) -> Match:
+    """Compare a draft with the final picture of the same project.
+
+    Parameters
+    ----------
+    draft : Picture or None
+    final : Picture
+    held : Match
+        What holds until now; kept where there is nothing to compare.
+
+    Returns
+    -------
+    Match
+    """
+    if draft is None or draft.project != final.project or draft.ghost_light <= 0.0 or final.ghost_light <= 0.0:
+        return held
+    return Match(float(np.clip(final.ghost_light / draft.ghost_light, 0.02, 4.0)), held.exposure_stops)
+
+
+def exposure_of(picture: Picture, gain: float = 1.0) -> float:
+    """Find an exposure that shows the ghosts, of a picture whose ghosts are multiplied by `gain`."""
+    return auto_exposure(picture.ghosts * np.float32(gain))
+
+
+def light_of(picture: Picture, match: Match) -> Floats:
+    """Return the whole picture, a draft's ghosts matched to what final ones would be."""
+    gain = match.gain if picture.grade in ("moving", "draft") else 1.0
+    return np.asarray(picture.ghosts * np.float32(gain) + picture.rest)
+
+
+def same_scene(one: Project, other: Project) -> bool:
+    """Tell whether two projects differ by their lights, art and design alone, so that one exposure is fair to both."""
+    kept = other.replace(lights=one.lights, art=one.art, design=one.design, quality=one.quality)
+    return bool(kept == one)
+
+
+def without_art(project: Project) -> Project:
+    """Return the project as physics has it."""
+    bare: Project = project.replace(art=Art())
+    return bare
