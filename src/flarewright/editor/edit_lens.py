@@ -10,7 +10,7 @@ from typing import Any
 from ..errors import FlarewrightError, GlassError, LensError
 from ..io.coating_text import UNCOATED, coating_from, format_coating
 from ..io.media import attach
-from ..model import AsLens, Iris, Lens, PerRow, Project, Row, Stop, Surface
+from ..model import AsLens, CoatingChoice, Iris, Lens, PerRow, Preset, Project, Row, Stop, Surface
 from ..model.art import Art
 from ..render.prepare import as_lens, first_order
 
@@ -20,7 +20,8 @@ MOST_ROWS = 200
 
 def own_lens(project: Project) -> Lens:
     """Return the project's lens as a prescription, estimates left open so that they follow what is changed."""
-    lens = as_lens(project.lens)
+    # one that makes no image cannot be completed, but it can be mended
+    lens = as_lens(project.lens) if isinstance(project.lens, str) else project.lens
     rows = tuple(
         row.replace(semi_diameter=None, semi_diameter_estimated=False)
         if isinstance(row, Surface) and row.semi_diameter_estimated
@@ -256,9 +257,16 @@ def choose_lens(project: Project, lens: str | Lens) -> Project:
     stopped = None if project.f_number is None else max(project.f_number, known.f_number)
     iris = known.iris if known.iris != Iris() else project.iris
     changed: Project = project.replace(
-        lens=lens, f_number=stopped, iris=iris, coating=AsLens(), lights=lights, art=Art(), zoom=None, design=None
-    )
+        lens=lens, f_number=stopped, iris=iris, coating=first_coating(known), lights=lights, art=Art(), zoom=None,
+        design=None,
+    )  # fmt: skip
     return changed
+
+
+def first_coating(lens: Lens) -> CoatingChoice:
+    """Return the first of a lens' coating presets; as its rows say where it has none."""
+    name = next(iter(lens.coating_presets), None)
+    return AsLens() if name is None else Preset(name=name)
 
 
 def _kept_place(angle_deg: float, zoom: float) -> float:

@@ -21,7 +21,7 @@ from ..io.text_file import read_toml
 from ..model import Camera, Iris, Lens, Light, Preset, Project
 from ..render.prepare import complete_lens, first_order, load_lens, settle
 from ..render.render import render
-from .edit_lens import own_lens
+from .edit_lens import first_coating, own_lens
 from .seen import Seen
 
 SAMPLE = "heliar-tronnier"
@@ -50,8 +50,8 @@ def project_for_lens(lens: str | Lens) -> Project:
     efl = first_order(known).efl
     x, y = (round(degrees(atan(mm / efl)), 3) for mm in PLACE_MM)
     return Project(
-        lens=lens, iris=iris, f_number=max(known.f_number, F_NUMBER), lights=(Light(field_deg=(x, y)),),
-        camera=Camera(size_px=(1920, 1080)),
+        lens=lens, iris=iris, coating=first_coating(known), f_number=max(known.f_number, F_NUMBER),
+        lights=(Light(field_deg=(x, y)),), camera=Camera(size_px=(1920, 1080)),
     )  # fmt: skip
 
 

@@ -26,8 +26,10 @@ from .edit_lens import choose_lens
 from .guard import Application, Guard
 from .screen import Screen
 from .session import Session
+from .shown import plate_for
 from .snapshot import ghosts_of, picture_of, solve_of, state_of
 from .solving import Solver
+from .view import View
 
 STATIC = Path(__file__).parent / "static"
 MOST_BYTES = 256 * 2**20
@@ -228,6 +230,8 @@ def _import(desk: Desk, request: Request, body: Any) -> Any:
             read_mask(picture)
             desk.session.do("set_iris", {"mask": picture})
         else:
+            # what is no picture is refused here, not when it is shown
+            plate_for(View(plate=picture), (16, 16))
             desk.session.set_view({"plate": picture})
     elif project is not None:
         desk.session.put(project, f"Import {name}")

@@ -109,7 +109,7 @@ function trim(svg) {
   const [, , width, height] = svg.getAttribute('viewBox').split(' ').map(Number);
   svg.querySelectorAll('text').forEach((text) => { if (Number(text.getAttribute('y')) < 30) text.remove(); });
   svg.querySelector('title')?.remove();
-  svg.querySelector('rect')?.remove();
+  svg.querySelector('rect[width="100%"]')?.remove();
   svg.removeAttribute('width');
   svg.removeAttribute('height');
   svg.querySelectorAll('text').forEach((text) => { if (Number(text.getAttribute('y')) > height - 30) text.remove(); });

@@ -37,6 +37,8 @@ export function coatingPanel(app) {
     if (!answer.ok) { plot.replaceChildren(h('p', { class: 'quietly' }, (await answer.json()).error)); return; }
     plot.innerHTML = await answer.text();
     plot.querySelector('title')?.remove();
+    // the panel is narrow: the legend says the angles alone
+    plot.querySelectorAll('text').forEach((text) => { text.textContent = text.textContent.replace(/ degrees, mean.*$/, '°'); });
   });
   const at = (event) => {
     const place = image.getBoundingClientRect();

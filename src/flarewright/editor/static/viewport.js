@@ -179,7 +179,8 @@ export function viewport(canvas, app) {
   };
   self.refresh = latest(async (fade) => {
     const answer = await fetch(`/api/picture?n=${app.state.picture.number}`);
-    if (!answer.ok || self.drag?.kind === 'light') return;
+    if (!answer.ok) throw new Error((await answer.json()).error);
+    if (self.drag?.kind === 'light') return;
     const grade = app.state.picture.grade;
     const bitmap = await createImageBitmap(await answer.blob());
     self.show(bitmap, fade);

@@ -1,0 +1,241 @@
+"""Pictures of the editor: hit test, outline, matched drafts, working views, looks."""
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from flarewright.editor import studio
+from flarewright.editor.screen import Screen
+from flarewright.editor.seen import Seen, SeenGhost, alone, is_there, outline, see, under
+from flarewright.editor.session import begin
+from flarewright.editor.shown import FALSE_COLOURS, jpeg, pixels_of, plate_for
+from flarewright.editor.view import View
+from flarewright.errors import ProjectError
+from flarewright.model import Camera, Everywhere, Light, Output, Quality, QuarterWave
+from flarewright.optics.color import luminance_weights
+from flarewright.render.render import render
+from flarewright.render.working import GREY_R, working_ghosts
+
+
+@pytest.fixture(scope="module")
+def seen_and_picture():
+    from flarewright.model import Iris, Preset, Project
+
+    project = Project(
+        lens="heliar-tronnier", f_number=11.0, iris=Iris(blades=6), coating=Preset(name="thesis"),
+        lights=(Light(field_deg=(6.0, 3.0)),), camera=Camera(size_px=(320, 180)),
+    )  # fmt: skip
+    return see(project, "final"), project
+
+
+def test_what_is_under_a_place_is_what_has_light_there(seen_and_picture):
+    seen, project = seen_and_picture
+    # an independent judge: every ghost as its own layer of an ordinary render, at the size of the project
+    judge = render(project.replace(output=Output(layers="ghosts", starburst=False), quality=Quality(wavelengths=3)))
+    width, height = project.camera.size_px
+    singles = [layer for layer in judge.layers if layer.name.startswith("ghost.")]
+    for u, v in ((0.31, 0.62), (0.5, 0.5), (0.72, 0.2), (0.12, 0.88)):
+        column, row = int(u * width), int(v * height)
+        wanted = {}
+        for layer in singles:
+            x, y, w, h = layer.window
+            patch = layer.pixels[
+                max(row - 2 - y, 0) : max(row + 3 - y, 0), max(column - 2 - x, 0) : max(column + 3 - x, 0)
+            ]
+            # at a border either answer is right
+            if patch.shape[:2] == (5, 5) and x <= column < x + w and y <= row < y + h:
+                light = patch @ luminance_weights("rec709")
+                if light.min() > 0.0:
+                    wanted[layer.name.removeprefix("ghost.")] = float(light.mean())
+        found = under(seen, u, v)
+        assert set(wanted) <= set(found)
+        clear = [name for name in found if name in wanted]
+        ranked = sorted(wanted, key=lambda name: -wanted[name])
+        # brightest first, as far as they differ by more than a shade
+        for one, other in pairwise(clear):
+            assert wanted[one] > 0.9 * wanted[other]
+        assert clear[0] in ranked[:2]
+
+
+def test_the_table_agrees_with_the_picture(seen_and_picture):
+    seen, project = seen_and_picture
+    whole = render(project.replace(output=Output(starburst=False), quality=Quality(wavelengths=3)))
+    across = project.camera.sensor[0] / project.camera.size_px[0]
+    light = next(layer for layer in whole.layers if layer.name == "ghosts").pixels @ luminance_weights("rec709")
+    assert sum(ghost.flux for ghost in seen.ghosts) == pytest.approx(float(light.sum()) * across**2, rel=0.01)
+    assert [ghost.flux for ghost in seen.ghosts] == sorted((g.flux for g in seen.ghosts), reverse=True)
+
+
+def test_a_ghost_alone_is_where_it_is_listed_and_its_outline_is_its_border(seen_and_picture):
+    seen, project = seen_and_picture
+    # one that neither fills the picture nor is a speck
+    ghost = next(g for g in seen.ghosts if 0.05 < (g.light > 0.0).sum() / (seen.size_px[0] * seen.size_px[1]) < 0.6)
+    light = alone(project, ghost.name, "final")
+    assert light.shape == (540, 960)
+    assert is_there(light, *ghost.centre)
+    drawn = outline(light, (240, 176, 84))
+    line = drawn[..., 3] == 255
+    inside = light > 0.0
+    assert line.any()
+    rows, columns = np.nonzero(line)
+    for row, column in list(zip(rows, columns, strict=True))[::97]:
+        near = inside[max(row - 1, 0) : row + 2, max(column - 1, 0) : column + 2]
+        assert near.any()
+        assert not near.all()
+    assert not drawn[..., 3][~line & ~inside & (drawn[..., 3] != 70)].any()
+
+
+def test_hits_know_clipped_shapes():
+    # a ghost like an L: its box is hit in a corner where it has no light
+    light = np.zeros((4, 4), np.float32)
+    light[:, 0] = light[3, :] = 2.0
+    dim = np.full((4, 4), 1.0, np.float32)
+    seen = Seen(
+        None, (8, 8),
+        (SeenGhost("2-1", 9.0, 2.0, 1.0, (0.5, 0.5), (2, 2, 4, 4), light),
+         SeenGhost("3-1", 8.0, 1.0, 1.0, (0.5, 0.5), (2, 2, 4, 4), dim)),
+    )  # fmt: skip
+    assert under(seen, 2.5 / 8, 2.5 / 8) == ("2-1", "3-1")
+    assert under(seen, 5.5 / 8, 2.5 / 8) == ("3-1",)
+    assert under(seen, 6.5 / 8, 2.5 / 8) == ()
+    assert under(seen, 0.999, 0.999) == ()
+
+
+def test_muted_ghosts_are_listed_and_can_be_outlined(project):
+    from flarewright.editor.deeds import done
+
+    muted = done(project, "set_ghost", {"name": "8-6", "values": {"muted": True}})[0]
+    assert "8-6" in {ghost.name for ghost in see(muted, "draft").ghosts}
+    assert alone(muted, "8-6", "draft").max() > 0.0
+
+
+def test_drafts_are_as_bright_as_final_pictures(project):
+    look = View()
+    draft, final = (studio.take(project, grade, look) for grade in ("draft", "final"))
+    match = studio.matched(draft, final, studio.Match())
+    shown = [studio.light_of(replace(picture, rest=0 * picture.rest), match).mean() for picture in (draft, final)]
+    assert shown[0] == pytest.approx(shown[1], rel=0.05)
+    # and stay so while the hand goes on
+    moved = project.replace(lights=(Light(field_deg=(7.0, 3.6)),))
+    moving, resting = (studio.take(moved, grade, look, scale=s) for grade, s in (("moving", 0.5), ("final", 1.0)))
+    ratio = moving.ghost_light * match.gain / resting.ghost_light
+    assert 0.8 < ratio < 1.25
+    # pictures of other projects tell nothing
+    assert studio.matched(moving, final, match) is match
+
+
+def test_the_final_picture_is_that_of_the_same_project(project):
+    picture = studio.take(project, "final", View())
+    camera = project.camera.replace(size_px=(960, 540), sensor_mm=project.camera.sensor)
+    whole = render(project.replace(camera=camera)).layers[0].pixels
+    np.testing.assert_allclose(picture.ghosts + picture.rest, whole, rtol=2e-5, atol=1e-12)
+
+
+def test_grey_ghosts_differ_by_size_alone(project):
+    grey = working_ghosts(project, grey=True)
+    assert np.ptp(grey.pixels, axis=2).max() == 0.0
+    # coatings make no difference
+    other = project.replace(coating=Everywhere(coating=QuarterWave(center_wavelength_nm=400.0)))
+    np.testing.assert_allclose(working_ghosts(other, grey=True).pixels, grey.pixels, rtol=1e-6)
+    # a surface that reflects R of the light twice, and passes nearly all of it otherwise: R^2 is divided out
+    bare = render(project.replace(quality=Quality(mode="draft", wavelengths=1), output=Output(starburst=False)))
+    ghosts = next(layer for layer in bare.layers if layer.name == "ghosts").pixels
+    assert grey.pixels.mean() * GREY_R**2 < ghosts.mean() < grey.pixels.mean()
+
+
+def test_without_its_rim_the_entrance_hides_nothing(project):
+    # from the side, ghosts that the entrance clips are missing
+    steep = project.replace(f_number=3.5, lights=(Light(field_deg=(16.0, 9.0)),))
+    clipped = working_ghosts(steep)
+    free = working_ghosts(steep, unclipped=True)
+    assert (free.pixels > 0.0).any(axis=2).sum() >= (clipped.pixels > 0.0).any(axis=2).sum()
+    assert free.pixels.sum() > clipped.pixels.sum()
+    # on the axis the iris bounds nearly all of them anyway
+    plain = working_ghosts(project.replace(f_number=22.0, lights=(Light(field_deg=(0.5, 0.0)),)))
+    same = working_ghosts(project.replace(f_number=22.0, lights=(Light(field_deg=(0.5, 0.0)),)), unclipped=True)
+    assert same.pixels.sum() == pytest.approx(plain.pixels.sum(), rel=1e-3)
+
+
+def test_looks_and_background(tmp_path):
+    from PIL import Image
+
+    light = np.full((8, 8, 3), 0.18, np.float32)
+    assert pixels_of(light, 0.0, View())[0, 0].tolist() == [118, 118, 118]
+    # middle grey stays where it is
+    assert abs(int(pixels_of(light, 0.0, View(look="filmic"))[0, 0, 0]) - 118) <= 1
+    grey = next(colour for limit, colour in FALSE_COLOURS if limit == 0.5)
+    assert tuple(pixels_of(light, 0.0, View(look="false-colour"))[0, 0]) == grey
+    assert tuple(pixels_of(light, 20.0, View(look="false-colour"))[0, 0]) == FALSE_COLOURS[-1][1]
+    path = tmp_path / "plate.png"
+    Image.new("RGB", (30, 20), (188, 0, 0)).save(path)
+    look = View(plate=str(path), plate_stops=-1.0)
+    plate = plate_for(look, (8, 8))
+    shown = pixels_of(np.zeros((8, 8, 3), np.float32), 5.0, look, plate)
+    # half of the linear 0.503 is shown as 137
+    assert abs(int(shown[4, 4, 0]) - 137) <= 1
+    assert shown[..., 1:].max() == 0
+    path.write_text("no picture")
+    with pytest.raises(ProjectError, match="no picture"):
+        plate_for(look, (9, 8))
+    with pytest.raises(ProjectError, match="is gone"):
+        plate_for(View(plate=str(tmp_path / "none.png")), (8, 8))
+    assert jpeg(shown)[:2] == b"\xff\xd8"
+
+
+def test_aces_agrees_with_opencolorio():
+    ocio = pytest.importorskip("PyOpenColorIO")
+    config = ocio.Config.CreateFromFile("ocio://default")
+    display = config.getDefaultDisplay()
+    chosen = ocio.DisplayViewTransform(src="lin_rec709_scene", display=display, view=config.getDefaultView(display))
+    rng = np.random.default_rng(1)
+    light = (2.0 ** rng.uniform(-8.0, 6.0, (12, 12, 3))).astype(np.float32)
+    exact = light.copy()
+    config.getProcessor(chosen).getDefaultCPUProcessor().applyRGB(exact)
+    shown = pixels_of(light, 0.0, View(look="aces")).astype(float) / 255.0
+    assert np.abs(shown - np.clip(exact, 0.0, 1.0)).mean() < 0.01
+
+
+def test_the_screen_keeps_the_last_good_picture(project):
+    session, _ = begin(None)
+    screen = Screen(session)
+    screen.start()
+    assert screen.wait(60.0)
+    good = screen.picture
+    assert good.grade == "final"
+    assert screen.seen.project == session.project
+    lens = session.project
+    for row in (0, 1, 2, 3, 4, 7, 8):
+        session.do("set_cell", {"row": row, "column": "radius", "text": "flat"})
+    assert screen.wait(60.0)
+    assert screen.problem
+    assert screen.picture.project != session.project
+    assert len(screen.encoded()) > 1000
+    session.put(lens, "Back")
+    assert screen.wait(60.0)
+    assert screen.problem == ""
+    assert screen.picture.project == lens
+
+
+def test_a_hand_is_followed_and_let_go(project):
+    session, _ = begin(None)
+    screen = Screen(session)
+    screen.start()
+    screen.wait(60.0)
+    before, exposure = screen.picture, screen.exposure_stops
+    data, seconds = screen.moving(0, 3.0, 1.0)
+    assert data[:2] == b"\xff\xd8"
+    assert seconds > 0.0
+    # nothing is decided while the hand holds the light
+    assert session.project == before.project
+    session.do("move_light", {"light": 0, "x": 3.0, "y": 1.0})
+    assert screen.wait(60.0)
+    assert screen.picture.grade == "final"
+    assert screen.picture.project.lights[0].field_deg == (3.0, 1.0)
+    # the exposure is held, so that brightness can be compared
+    assert screen.exposure_stops == exposure
+    names = screen.pick(*screen.seen.ghosts[0].centre)
+    assert screen.seen.ghosts[0].name in names
+    assert screen.outlined(names[0])[:4] == b"\x89PNG"
+    assert screen.target()[:2] == b"\xff\xd8"

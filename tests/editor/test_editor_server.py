@@ -1,0 +1,178 @@
+"""The editor's server as the page talks to it, without a browser."""
+
+import json
+import threading
+import urllib.error
+import urllib.request
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("starlette", reason="the extra ui is not installed")
+pytest.importorskip("uvicorn", reason="the extra ui is not installed")
+
+from flarewright.cli.app import run
+from flarewright.editor.guard import Guard
+from flarewright.editor.server import _GET, _POST, Desk, make_app
+from flarewright.editor.session import begin
+from flarewright.io.lens_file import read_lens
+
+CORPUS = Path(__file__).parents[1]
+
+
+@pytest.fixture
+def desk():
+    import uvicorn
+
+    session, _ = begin(None)
+    desk = Desk(session)
+    server = uvicorn.Server(uvicorn.Config(make_app(desk), port=0, log_level="warning", lifespan="off"))
+    thread = threading.Thread(target=server.run, daemon=True)
+    thread.start()
+    while not server.started:
+        pass
+    desk.address = f"http://127.0.0.1:{server.servers[0].sockets[0].getsockname()[1]}"
+    desk.screen.start()
+    assert desk.screen.wait(60.0)
+    yield desk
+    server.should_exit = True
+    thread.join(5.0)
+
+
+def ask(desk, path, body=None, headers=None):
+    data = None if body is None else body if isinstance(body, bytes) else json.dumps(body).encode()
+    request = urllib.request.Request(desk.address + path, data, headers or {})
+    try:
+        with urllib.request.urlopen(request, timeout=60) as answer:
+            return answer.status, answer.read()
+    except urllib.error.HTTPError as error:
+        return error.code, error.read()
+
+
+def told(desk, path, body=None):
+    code, data = ask(desk, path, body)
+    return code, json.loads(data)
+
+
+def test_the_page_and_every_question_it_asks(desk):
+    assert b"<canvas" in ask(desk, "/")[1]
+    assert ask(desk, "/static/app.js")[0] == 200
+    state = told(desk, "/api/state")[1]
+    assert state["lens"]["facts"]["efl"] == pytest.approx(99.2358, abs=1e-3)
+    assert state["picture"]["grade"] == "final"
+    asked = {
+        "/api/picture", "/api/moving?light=0&x=3&y=1", "/api/target", "/api/outline?ghost=8-6", "/api/section",
+        "/api/section?ghost=8-6", "/api/coating?row=0", "/api/map?ghost=8-6", "/api/thumbnail/tessar-brendel",
+        "/api/export/png",
+    }  # fmt: skip
+    kinds = {b"\xff\xd8": "jpeg", b"\x89P": "png", b"<s": "svg"}
+    for path in sorted(asked):
+        code, data = ask(desk, path)
+        assert (code, data[:2] in kinds) == (200, True), path
+    assert told(desk, "/api/pick?u=0.5&v=0.5")[1]["ghosts"]
+    assert told(desk, "/api/places")[1]["places"]
+    assert "N-BK7" in str(told(desk, "/api/glasses?q=n-bk")[1])
+    assert len(told(desk, "/api/library")[1]["lenses"]) >= 12
+    assert told(desk, "/api/ghosts")[1]["ghosts"][0]["share"] == 1.0
+    spoken = {path.split("?")[0] for path in asked} | {"/api/state", "/api/pick", "/api/places", "/api/glasses"}
+    spoken |= {"/api/library", "/api/ghosts", "/api/command"}
+    missing = {path for path in _GET if "{" not in path} - spoken
+    assert not missing
+
+
+def test_deeds_undo_and_what_is_refused(desk):
+    code, state = told(desk, "/api/do", {"name": "move_light", "values": {"light": 0, "x": 2.0, "y": 1.0}})
+    assert (code, state["lights"][0]["field_deg"], state["undo"]) == (200, [2.0, 1.0], "Move the light")
+    assert told(desk, "/api/undo", {})[1]["lights"][0]["field_deg"] == [8.0, 4.4]
+    assert told(desk, "/api/redo", {})[1]["lights"][0]["field_deg"] == [2.0, 1.0]
+    for path, body in (
+        ("/api/do", {"name": "set_cell", "values": {"row": 0, "column": "glass", "text": "XYZ"}}),
+        ("/api/do", {"name": "fly"}),
+        ("/api/do", {}),
+        ("/api/view", {"look": "sepia"}),
+        ("/api/open", {"text": "no-such-lens"}),
+        ("/api/save", {"text": "/no/such/folder/x.toml"}),
+        ("/api/import?name=notes.pdf", b"%PDF"),
+        ("/api/import?name=bad.toml", b"[[["),
+        ("/api/import?name=bad.lens", b"\x00\x01 nothing"),
+        ("/api/import?name=bad.png", b"no picture"),
+    ):
+        code, answer = told(desk, path, body)
+        assert code == 400, path
+        assert answer["error"]
+        assert "Traceback" not in answer["error"]
+    assert told(desk, "/api/moving?light=7&x=1&y=1")[0] == 400
+    assert told(desk, "/api/coating?row=5")[0] == 400
+    assert ask(desk, "/api/thumbnail/..%2f..%2fsecret")[0] in (400, 404)
+    assert told(desk, "/api/thumbnail/secret")[0] == 400
+    assert told(desk, "/api/export/zip")[0] == 400
+
+
+def test_import_export_and_the_command(desk, tmp_path):
+    lens = Path(str(read_lens.__globals__["__file__"])).parents[1] / "lenses" / "tessar-brendel.toml"
+    code, state = told(desk, "/api/import?name=tessar.toml", lens.read_bytes())
+    assert (code, "Tessar" in state["lens"]["name"]) == (200, True)
+    assert told(desk, "/api/command")[0] == 400
+    saved = tmp_path / "my shot.toml"
+    assert told(desk, "/api/save", {"text": str(saved)})[0] == 200
+    assert told(desk, "/api/command")[1]["text"].startswith("flarewright render --project '")
+    assert run(["project", "check", str(saved)]) == 0
+    exported = ask(desk, "/api/export/lens")[1]
+    path = tmp_path / "x.toml"
+    path.write_bytes(exported)
+    again = read_lens(path).lens
+    assert [row.thickness for row in again.rows] == [row.thickness for row in read_lens(lens).lens.rows]
+    project = ask(desk, "/api/export/project")[1]
+    told(desk, "/api/open", {"text": "heliar-tronnier"})
+    assert told(desk, "/api/import?name=shot.toml", project)[1]["lens"]["name"] == state["lens"]["name"]
+    assert desk.screen.wait(60.0)
+    table = ask(desk, "/api/export/csv")[1].decode().splitlines()
+    assert table[0].startswith("ghost,flux_mm2")
+    assert len(table) == 1 + len(desk.screen.seen.ghosts)
+
+
+def test_a_background_that_is_gone_is_told(desk, tmp_path):
+    told(desk, "/api/view", {"plate": str(tmp_path / "gone.png")})
+    code, answer = told(desk, "/api/picture")
+    assert (code, "is gone" in answer["error"]) == (400, True)
+    told(desk, "/api/view", {"plate": None})
+    assert ask(desk, "/api/picture")[0] == 200
+
+
+def test_strangers_are_kept_out(desk):
+    assert ask(desk, "/api/state", headers={"Host": "evil.example"})[0] == 403
+    assert ask(desk, "/api/undo", {}, {"Origin": "http://evil.example"})[0] == 403
+    assert ask(desk, "/api/state", headers={"Host": "localhost:1"})[0] == 200
+
+    def scope(query=b"", **headers):
+        pairs = [(key.encode(), value.encode()) for key, value in {"host": "box:1", **headers}.items()]
+        return {"type": "http", "headers": pairs, "query_string": query}
+
+    guard = Guard(lambda *_: None, "a-secret-token")
+    assert not guard._welcome(scope())
+    assert not guard._welcome(scope(b"token=wrong"))
+    assert guard._welcome(scope(b"token=a-secret-token"))
+    assert guard._welcome(scope(cookie="x=1; flarewright_token=a-secret-token"))
+    assert not guard._welcome(scope(b"token=a-secret-token", origin="http://other:1"))
+
+
+def test_the_command_line_keeps_to_itself(capsys):
+    for words in (["--host", "0.0.0.0"], ["--host", "0.0.0.0", "--token", "short"], ["no-such-lens"]):
+        assert run(["edit", "--no-browser", *words]) == 2
+        said = capsys.readouterr().err
+        assert said.startswith("flarewright: error: ")
+        assert said.count("\n") == 1
+
+
+def test_a_taken_port_is_told(capsys):
+    import socket
+
+    with socket.socket() as place:
+        place.bind(("127.0.0.1", 0))
+        place.listen()
+        assert run(["edit", "--no-browser", "--port", str(place.getsockname()[1])]) == 2
+    assert "another --port" in " ".join(capsys.readouterr().err.split())
+
+
+def test_posts_are_spoken_for():
+    assert {"/api/do", "/api/undo", "/api/redo", "/api/import", "/api/solve", "/api/accept"} <= set(_POST)

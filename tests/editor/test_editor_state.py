@@ -1,0 +1,327 @@
+"""History, autosave and deeds of the editor, without a browser."""
+
+import json
+import threading
+
+import pytest
+
+from flarewright.editor import history as past
+from flarewright.editor.autosave import Saved, autosave_path, read_autosave, write_autosave
+from flarewright.editor.deeds import DEEDS, done
+from flarewright.editor.edit_ghosts import Hand, hand, soloed
+from flarewright.editor.edit_lens import own_lens, prescription
+from flarewright.editor.edit_wishes import direction, new_discs, target_project
+from flarewright.editor.jobs import Lane
+from flarewright.editor.session import begin
+from flarewright.editor.view import View
+from flarewright.errors import FlarewrightError
+from flarewright.io.project_file import read_project
+from flarewright.model import Light, PerRow, QuarterWave, Stop
+from flarewright.render.prepare import as_lens, first_order
+
+
+def do(project, deed, /, **values):
+    return done(project, deed, values)[0]
+
+
+def test_undo_and_redo_walk_the_same_projects(project):
+    history = past.begun(project)
+    for k in range(5):
+        history = past.committed(history, do(history.present, "move_light", light=0, x=k, y=1.0), "Move the light")
+    shown = [moment.project for moment in history.moments]
+    for k in range(5):
+        assert history.undo_label == "Move the light"
+        history = past.undone(history)
+        assert history.present == shown[4 - k]
+    assert history.undo_label == ""
+    assert past.undone(history) == history
+    for k in range(5):
+        history = past.redone(history)
+        assert history.present == shown[k + 1]
+    assert past.redone(history) == history
+
+
+def test_a_deed_after_undo_forgets_what_was_undone(project):
+    history = past.committed(past.begun(project), do(project, "move_light", light=0, x=1, y=1), "a")
+    other = do(project, "move_light", light=0, x=2, y=2)
+    history = past.committed(past.undone(history), other, "b")
+    assert [moment.label for moment in history.moments] == ["Open", "b"]
+    assert history.present == other
+
+
+def test_one_stroke_is_one_step_and_nothing_is_none(project):
+    history = past.begun(project)
+    for x in (1.0, 2.0, 3.0):
+        history = past.committed(history, do(project, "move_light", light=0, x=x, y=0.0), "Move", "stroke")
+    assert len(history.moments) == 2
+    assert past.undone(history).present == project
+    assert past.committed(history, history.present, "again") is history
+    # the first moment is never replaced, whatever its group
+    assert len(past.committed(past.begun(project), history.present, "Move", "").moments) == 2
+
+
+def test_history_has_an_end(project):
+    history = past.begun(project)
+    for k in range(past.MOST + 30):
+        history = past.committed(history, do(project, "move_light", light=0, x=k / 10.0, y=0.0), str(k))
+    assert len(history.moments) == past.MOST
+    assert history.present.lights[0].field_deg[0] == pytest.approx((past.MOST + 29) / 10.0)
+
+
+def test_autosave_gives_everything_back(project, tmp_path):
+    history = past.committed(past.begun(project), do(project, "set_cell", row=0, column="radius", text="33"), "Edit")
+    history = past.committed(history, do(history.present, "set_wish", ghost="4-1", values={"move_mm": 2.0}), "Wish")
+    saved = Saved(past.undone(history), View(look="filmic", exposure_stops=3.5), "shot.toml", clean=False)
+    path = tmp_path / "a" / "x.json"
+    write_autosave(path, saved)
+    assert read_autosave(path) == saved
+
+
+@pytest.mark.parametrize("text", ["", "{", '{"version": 1}', '{"version": 7}', "[1]"])
+def test_a_damaged_autosave_is_no_obstacle(text, tmp_path):
+    path = tmp_path / "x.json"
+    path.write_text(text)
+    assert read_autosave(path) is None
+
+
+def test_a_session_goes_on_where_it_was_cut_off(project):
+    session, told = begin(None)
+    assert told == ""
+    session.do("move_light", {"light": 0, "x": 3.0, "y": 2.0})
+    session.do("set_iris", {"values": {"blades": 8}})
+    session.set_view({"look": "filmic"})
+    session.flush()
+    # the process is killed here: nothing of it is asked again
+    again, told = begin(None)
+    assert again.history == session.history
+    assert again.view == session.view
+    assert "undo leads back" in told
+    again.undo()
+    again.undo()
+    assert again.project.lights[0].field_deg == (8.0, 4.4)
+
+
+def test_saving_makes_the_autosave_clean_and_the_file_wins(project, tmp_path):
+    session, _ = begin("tessar-brendel")
+    session.do("move_light", {"light": 0, "x": 4.0, "y": 2.0})
+    path = session.save(str(tmp_path / "shot"))
+    session.flush()
+    assert path.name == "shot.toml"
+    assert read_project(path) == session.project
+    again, _ = begin(str(path))
+    assert again.project == session.project
+    assert again.clean
+    again.do("move_light", {"light": 0, "x": 9.0, "y": 2.0})
+    again.flush()
+    third, _ = begin(str(path))
+    assert third.project.lights[0].field_deg == (9.0, 2.0)
+    assert third.file == str(path)
+
+
+def test_a_refused_deed_leaves_everything_as_it_was(project):
+    session, _ = begin(None)
+    before = session.history
+    for name, values in (
+        ("set_cell", {"row": 0, "column": "radius", "text": "round"}),
+        ("set_cell", {"row": 0, "column": "glass", "text": "N-NONSENSE"}),
+        ("set_cell", {"row": 8, "column": "n_d", "text": "1.5"}),
+        ("remove_row", {"row": 5}),
+        ("set_iris", {"values": {"rounding": 2.0}}),
+        ("remove_light", {"light": 0}),
+        ("set_coating", {"text": "gold"}),
+        ("no such deed", {}),
+        ("move_light", {"light": 0}),
+    ):
+        with pytest.raises(FlarewrightError) as told:
+            session.do(name, values)
+        assert "\n" not in str(told.value)
+    assert session.history is before
+    assert json.dumps(str(session.project))
+
+
+def test_every_deed_is_tried_here():
+    tried = (
+        "move_light set_light add_light remove_light set_camera set_quality set_fields set_iris set_dirt set_starburst "
+        "set_pass_gain set_coating set_row_wavelengths set_cell add_row duplicate_row remove_row move_stop choose_lens "
+        "set_lens_facts set_ghost set_solo reset_art set_wish add_ghost remove_wish set_new_wish set_design "
+        "clear_wishes"
+    )
+    assert sorted(tried.split()) == sorted(DEEDS)
+
+
+def test_lights_camera_iris_and_coating(project):
+    two = do(project, "add_light")
+    assert len(two.lights) == 2
+    two = do(two, "set_light", light=1, values={"spectrum": "black-body:2000", "intensity": 0.5})
+    assert two.lights[1].spectrum.temperature_k == 2000.0
+    assert do(two, "remove_light", light=0).lights[0].intensity == 0.5
+    assert do(project, "move_light", light=0, x=500.0, y=-500.0).lights[0].field_deg == (80.0, -80.0)
+    assert do(project, "set_camera", values={"size_px": (640, 480)}).camera.size_px == (640, 480)
+    assert do(project, "set_quality", values={"wavelengths": 11}).quality.wavelengths == 11
+    assert do(project, "set_fields", values={"f_number": 11.0}).f_number == 11.0
+    # a slider on its way from 0 to 3 blades
+    assert do(do(project, "set_iris", values={"blades": 0}), "set_iris", values={"blades": 1}).iris.blades == 3
+    assert do(project, "set_iris", values={"blades": 2}).iris.blades == 0
+    assert do(project, "set_dirt", values={"dust_per_mm2": 1.0}).dirt.dust_per_mm2 == 1.0
+    assert do(project, "set_starburst", values={"size": 2.0}).starburst.size == 2.0
+    gained = do(project, "set_pass_gain", name="ghosts", gain=2.0)
+    assert gained.art.gain == {"ghosts": 2.0}
+    assert do(gained, "set_pass_gain", name="ghosts", gain=1.0) == project
+    assert do(project, "set_coating", text="quarter-wave:500").coating.coating == QuarterWave(center_wavelength_nm=500)
+    mapped = do(project, "set_row_wavelengths", values={"0": 500.0, "4": 600.0})
+    assert isinstance(mapped.coating, PerRow)
+    assert mapped.coating.coatings[4] == QuarterWave(center_wavelength_nm=600.0)
+    # the others keep what the preset gives them
+    assert mapped.coating.coatings[1] == as_lens("heliar-tronnier").coating_presets["thesis"][1]
+
+
+def test_cells_change_the_lens_and_say_what_is_odd(project):
+    edited = do(project, "set_cell", row=0, column="radius", text="33,5")
+    assert own_lens(edited).rows[0].curvature == pytest.approx(1.0 / 33.5)
+    assert do(project, "set_cell", row=6, column="radius", text="flat").lens.rows[6].curvature == 0.0
+    glass = do(project, "set_cell", row=0, column="glass", text="N-BK7").lens.rows[0].medium
+    assert glass.n_d == pytest.approx(1.5168, abs=1e-4)
+    # another index is another glass
+    other = do(project, "set_cell", row=0, column="n_d", text="1.7").lens.rows[0].medium
+    assert (other.glass, other.n_d) == (None, 1.7)
+    assert do(project, "set_cell", row=0, column="semi_diameter", text="").lens.rows[0].semi_diameter is None
+    coated = do(project, "set_cell", row=0, column="coating", text="film:1.38:100")
+    assert coated.coating.coatings[0].thickness_nm == 100.0
+    with pytest.raises(FlarewrightError, match="opening follows from the f-number"):
+        do(project, "set_cell", row=5, column="radius", text="10")
+    crossing = prescription(do(project, "set_cell", row=0, column="thickness", text="0.2"))
+    assert "cross" in crossing.rows[0]["notes"]["thickness"]
+    assert (
+        "equator"
+        in prescription(do(project, "set_cell", row=0, column="radius", text="10")).rows[0]["notes"]["semi_diameter"]
+    )
+
+
+def test_facts_of_the_table_are_those_of_the_lens(project):
+    table = prescription(project)
+    order = first_order(as_lens("heliar-tronnier"), 8.0)
+    assert table.facts["efl"] == order.efl
+    assert table.facts["bfl"] == order.bfl
+    assert [row["stop"] for row in table.rows].index(True) == 5
+    assert table.problem == ""
+
+
+def test_a_lens_without_an_image_tells_why_and_keeps_its_table(project):
+    flat = project
+    for row in (0, 1, 2, 3, 4, 7, 8):
+        flat = do(flat, "set_cell", row=row, column="radius", text="flat")
+    table = prescription(flat)
+    assert table.facts == {}
+    assert table.problem
+    assert table.rows[0]["radius"] == "flat"
+    # and it can be mended from there
+    assert prescription(do(flat, "set_cell", row=0, column="radius", text="30.81")).problem == ""
+
+
+def test_rows_come_and_go_with_everything_that_counts_them(project):
+    lens = as_lens(project.lens)
+    muted = do(project, "set_ghost", name="4-1", values={"muted": True})
+    longer = do(muted, "add_row", row=2)
+    assert len(longer.lens.rows) == len(lens.rows) + 1
+    assert longer.lens.stop_row == 6
+    assert longer.lens.rows[2].thickness + longer.lens.rows[3].thickness == pytest.approx(lens.rows[2].thickness)
+    assert longer.lens.coating_presets["thesis"][4] == lens.coating_presets["thesis"][3]
+    # ghosts have other names now
+    assert longer.art.rules == ()
+    shorter = do(longer, "remove_row", row=3)
+    assert [row.curvature for row in own_lens(shorter).rows if not isinstance(row, Stop)] == [
+        row.curvature for row in lens.rows if not isinstance(row, Stop)
+    ]
+    assert first_order(as_lens(shorter.lens)).efl == pytest.approx(first_order(lens).efl, rel=1e-12)
+    assert len(do(project, "duplicate_row", row=1).lens.rows) == len(lens.rows) + 1
+    assert do(project, "move_stop", row=3).lens.stop_row == 3
+    assert do(project, "set_lens_facts", values={"name": "Mine"}).lens.name == "Mine"
+
+
+def test_zoom_gaps_keep_their_surfaces():
+    zoom = done(begin("canon-70-200")[0].project, "add_row", {"row": 0})[0]
+    before = as_lens("canon-70-200")
+    assert {row + 1 for row, _ in before.positions[0].gaps} == {row for row, _ in zoom.lens.positions[0].gaps}
+
+
+def test_another_lens_keeps_the_light_where_it_was_in_the_picture(project):
+    from math import radians, tan
+
+    other = do(project, "choose_lens", lens="biotar-50-f1.4")
+    place = [first_order(as_lens(one.lens)).efl * tan(radians(one.lights[0].field_deg[0])) for one in (project, other)]
+    assert place[1] == pytest.approx(place[0], rel=1e-4)
+    assert other.f_number == 8.0
+
+
+def test_mute_solo_gain_and_tint_are_rules_that_can_be_taken_back(project):
+    loud = do(project, "set_ghost", name="4-1", values={"gain": 3.0, "tint": [1.0, 0.5, 0.25]})
+    assert hand(loud.art, "4-1") == Hand(False, 3.0, (1.0, 0.5, 0.25))
+    alone = do(loud, "set_solo", names=["4-1", "8-6"])
+    assert soloed(alone.art) == ("4-1", "8-6")
+    # muting a soloed ghost still lets the solo have the last word about the others
+    muted = do(alone, "set_ghost", name="8-6", values={"muted": True})
+    assert soloed(muted.art) == ("4-1", "8-6")
+    assert do(alone, "set_solo", names=[]) == loud
+    assert do(loud, "set_ghost", name="4-1", values={"gain": 1.0, "tint": [1, 1, 1]}) == project
+    assert do(muted, "reset_art") == project
+
+
+def test_wishes_make_the_target(project):
+    wished = do(project, "set_wish", ghost="4-1", values={"move_mm": 2.0, "height": 0.5})
+    wished = do(wished, "set_wish", ghost="8-6", values={"action": "remove"})
+    assert wished.design.structure == "lens"
+    target = target_project(wished)
+    moved, gone = target.art.rules
+    x, y = direction(project)
+    assert moved.offset_mm == pytest.approx((2.0 * x, 2.0 * y))
+    assert moved.scale == 0.5
+    assert gone.enable is False
+    new = do(wished, "add_ghost", place_mm=5.0, radius_mm=1.0)
+    assert new.design.structure == "any"
+    assert new_discs(new) == (pytest.approx((5.0 * x, 5.0 * y, 1.0)),)
+    assert do(new, "set_new_wish", number=2, values={"radius_mm": 2.0}).design.wishes[2].radius_mm == 2.0
+    assert len(do(new, "remove_wish", number=0).design.wishes) == 2
+    assert do(new, "set_design", values={"structure": "any"}).design.structure == "any"
+    assert do(new, "clear_wishes").design is None
+    with pytest.raises(FlarewrightError, match="crosses the stop"):
+        do(project, "set_wish", ghost="8-0", values={"move_mm": 1.0})
+
+
+def test_a_lane_does_the_newest_and_drops_the_rest():
+    lane, gate, began, ran = Lane("test"), threading.Event(), threading.Event(), []
+
+    def first(check):
+        began.set()
+        gate.wait(5.0)
+        ran.append("first began")
+        check()
+        ran.append("first went on")
+
+    lane.submit(first)
+    assert began.wait(5.0)
+    for name in ("a", "b", "c"):
+        lane.submit(lambda check, name=name: ran.append(name))
+    gate.set()
+    assert lane.wait(5.0)
+    assert ran == ["first began", "c"]
+    lane.close()
+
+
+def test_a_lane_outlives_a_job_that_fails(capsys):
+    lane, ran = Lane("test"), []
+
+    def bad(check):
+        raise RuntimeError("ours")
+
+    lane.submit(bad)
+    assert lane.wait(5.0)
+    lane.submit(lambda check: ran.append("next"))
+    assert lane.wait(5.0)
+    assert ran == ["next"]
+    assert "ours" in capsys.readouterr().err
+    lane.close()
+
+
+def test_a_lens_named_on_the_command_line_has_an_autosave_of_its_own():
+    assert autosave_path(None) != autosave_path("tessar-brendel")
+    assert Light(field_deg=(0, 0)) is not None
