@@ -93,7 +93,7 @@ class Screen:
             draft = studio.take(project, "draft", view)
             check()
             if fresh:
-                self.match = Match(1.0, studio.exposure_of(draft))
+                self.match = Match(exposure_stops=studio.exposure_of(draft))
             self._show(draft)
         if not working:
             final = studio.take(project, "final", view, progress=self._progress("final picture", check))
@@ -143,8 +143,7 @@ class Screen:
     def expose(self) -> None:
         """Find the exposure anew, by what is shown now."""
         if self.picture is not None:
-            gain = self.match.gain if self.picture.grade == "draft" else 1.0
-            self.match = replace(self.match, exposure_stops=studio.exposure_of(self.picture, gain))
+            self.match = replace(self.match, exposure_stops=studio.exposure_of(self.picture, self.match))
         self.session.set_view({"exposure_stops": None})
 
     def encoded(self, quality: int = 92) -> bytes:
@@ -210,7 +209,7 @@ class Screen:
 
         project = self.session.project
         picture = studio.take(target_project(project), "draft", self.session.view)
-        ghosts = picture.ghosts * np.float32(self.match.gain) + picture.rest
+        ghosts = studio.light_of(picture, self.match)
         height, width = ghosts.shape[:2]
         across = width / project.camera.sensor[0]
         level = float(np.percentile(ghosts.max(axis=2), 90.0)) + 0.25 * 2.0**-self.exposure_stops

@@ -22,7 +22,6 @@ Grade = Literal["moving", "draft", "final", "working"]
 # the viewport's picture fits into this
 WIDEST, HIGHEST = 960, 540
 DRAFT_WAVELENGTHS = 3
-_LUMINANCE = np.array([0.2126, 0.7152, 0.0722], dtype=np.float32)
 
 
 @dataclass(frozen=True)
@@ -49,9 +48,9 @@ class Picture:
     remarks: tuple[str, ...] = ()
 
     @property
-    def ghost_light(self) -> float:
-        """Mean luminance of the ghosts."""
-        return float(self.ghosts.reshape(-1, 3).mean(axis=0, dtype=np.float64) @ _LUMINANCE.astype(np.float64))
+    def ghost_light(self) -> NDArray[np.float64]:
+        """Mean of the ghosts, R, G, B."""
+        return np.asarray(self.ghosts.reshape(-1, 3).mean(axis=0, dtype=np.float64))
 
 
 def view_size(project: Project, scale: float = 1.0) -> tuple[int, int]:
@@ -141,17 +140,19 @@ def spread(layers: list[Layer], size_px: tuple[int, int]) -> Floats:
 
 @dataclass(frozen=True)
 class Match:
-    """What makes drafts as bright as final pictures: matrices know no inner rims, so their ghosts are too bright.
+    """What gives drafts the light of final pictures.
+
+    Matrices know no inner rims, so a draft's ghosts are too bright, and its few wavelengths shift its colours.
 
     Attributes
     ----------
-    gain : float
-        Of a draft's ghosts.
+    gain : tuple of float
+        Of a draft's ghosts, R, G, B.
     exposure_stops : float
         Found for the lens, and held while the light moves.
     """
 
-    gain: float = 1.0
+    gain: tuple[float, float, float] = (1.0, 1.0, 1.0)
     exposure_stops: float = 0.0
 
 
@@ -169,20 +170,30 @@ def matched(draft: Picture | None, final: Picture, held: Match) -> Match:
     -------
     Match
     """
-    if draft is None or draft.project != final.project or draft.ghost_light <= 0.0 or final.ghost_light <= 0.0:
+    if draft is None or draft.project != final.project:
         return held
-    return Match(float(np.clip(final.ghost_light / draft.ghost_light, 0.02, 4.0)), held.exposure_stops)
+    ours, theirs = draft.ghost_light, final.ghost_light
+    if min(ours.min(), theirs.min()) <= 0.0:
+        return held
+    red, green, blue = (float(gain) for gain in np.clip(theirs / ours, 0.02, 4.0))
+    return Match((red, green, blue), held.exposure_stops)
 
 
-def exposure_of(picture: Picture, gain: float = 1.0) -> float:
-    """Find an exposure that shows the ghosts, of a picture whose ghosts are multiplied by `gain`."""
-    return auto_exposure(picture.ghosts * np.float32(gain))
+def exposure_of(picture: Picture, match: Match | None = None) -> float:
+    """Find an exposure that shows the ghosts of a picture."""
+    return auto_exposure(ghosts_of(picture, match or Match()))
 
 
 def light_of(picture: Picture, match: Match) -> Floats:
     """Return the whole picture, a draft's ghosts matched to what final ones would be."""
-    gain = match.gain if picture.grade in ("moving", "draft") else 1.0
-    return np.asarray(picture.ghosts * np.float32(gain) + picture.rest)
+    return np.asarray(ghosts_of(picture, match) + picture.rest)
+
+
+def ghosts_of(picture: Picture, match: Match) -> Floats:
+    """Return the ghosts alone, matched as in `light_of`."""
+    if picture.grade not in ("moving", "draft"):
+        return picture.ghosts
+    return np.asarray(picture.ghosts * np.array(match.gain, dtype=np.float32))
 
 
 def same_scene(one: Project, other: Project) -> bool:
