@@ -4,7 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from flarewright.kernels.raster import blank_plane, fill_polygon, to_pixels
+from flarewright.kernels import raster
+from flarewright.kernels._jit import for_python
+from flarewright.kernels.raster import blank_plane, to_pixels
+
+fill_polygon = for_python(raster.fill_polygon)
 
 WHITE = np.ones(3)
 

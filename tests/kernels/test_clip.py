@@ -6,10 +6,16 @@ import numpy as np
 import pytest
 from drawing import area
 
-from flarewright.kernels.clip import MAX_VERTICES, PP, PQ, PSTOP, PX, PY, clip_triangle, cut_to_rectangle, polygon_area
+from flarewright.kernels import clip as clipping
+from flarewright.kernels._jit import for_python
+from flarewright.kernels.clip import MAX_VERTICES, PP, PQ, PSTOP, PX, PY
 from flarewright.kernels.trace import ALIVE, REL, STOP_X, WEIGHT, X, Y
 from flarewright.model import Iris
 from flarewright.optics.iris import blade_edges, transmission
+
+clip_triangle = for_python(clipping.clip_triangle)
+cut_to_rectangle = for_python(clipping.cut_to_rectangle)
+polygon_area = for_python(clipping.polygon_area)
 
 IDENTITY = np.eye(2)
 NO_BLADES = np.zeros((0, 4))

@@ -5,12 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from flarewright.kernels import philox as counted
+from flarewright.kernels._jit import for_python
 from flarewright.kernels.montecarlo import AT_BARREL, AT_STOP, ENTERED, IN_PICTURE, LOST, RETURNED, TALLIES
-from flarewright.kernels.philox import philox, refill
 from flarewright.model import Camera, Light, Lines, Project
 from flarewright.render.montecarlo import BALANCE, Sums, ray_source, run_batch
 from flarewright.render.prepare import load_lens, settle
 from flarewright.render.shot import make_opening, make_shots
+
+philox = for_python(counted.philox)
+refill = for_python(counted.refill)
 
 # Random123, kat_vectors: philox4x32, 10 rounds; counter, key, answer
 KNOWN = [

@@ -8,7 +8,10 @@ from drawing import area, blank, channels, fill
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from flarewright.kernels.raster import splat_line
+from flarewright.kernels import raster
+from flarewright.kernels._jit import for_python
+
+splat_line = for_python(raster.splat_line)
 
 
 def convex(rng, count: int, width: float, height: float, size: float) -> np.ndarray:

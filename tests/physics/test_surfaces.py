@@ -125,7 +125,10 @@ def test_a_paraboloid_sends_light_of_its_axis_through_its_focus():
     packed = pack_lens(a_lens, first_order(a_lens, sensor_distance=5.0), (None,) * 3, np.array([D_LINE_NM]))
     x, y = np.random.default_rng(8).uniform(-9.0, 9.0, (2, 80))
     # inside the glass, traced by hand: the ghost's leg between the mirrors points at the focus
-    from flarewright.kernels.shapes import cross_shape
+    from flarewright.kernels._jit import for_python
+    from flarewright.kernels.shapes import cross_shape as kernel
+
+    cross_shape = for_python(kernel)
 
     for u, v in zip(x, y, strict=True):
         at = cross_shape(packed.shapes, 2, d, u, v, 0.0, 0.0, 0.0, 1.0, 1.0, INDEX, 1.0)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any
 
 from numba import njit
@@ -15,6 +16,12 @@ _FASTMATH = {"contract", "reassoc", "arcp", "nsz", "afn"}
 _njit: Any = njit
 # nothing takes a kernel's address, and calls from other kernels do not need it
 _OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": _FASTMATH, "no_cfunc_wrapper": True}
+_INNER: dict[str, Any] = {"no_cpython_wrapper": True}
+# with another Numba its own compiler makes the same code, later
+with suppress(ImportError, AttributeError):
+    from ._inner import InnerCompiler
+
+    _INNER = {"pipeline_class": InnerCompiler}
 
 
 def compiled(function: Callable[..., Any]) -> Any:
@@ -29,19 +36,28 @@ def compiled(function: Callable[..., Any]) -> Any:
 def inner(function: Callable[..., Any]) -> Any:
     """Compile a kernel that only kernels call; from Python it raises TypeError.
 
-    It has neither what Python needs to call it nor a cache of its own, for its callers hold its code: a tenth of the
-    work and several files less.
+    It has neither what Python needs to call it, nor machine code, nor a cache of its own, for its callers hold its
+    code: a third of the work and several files less.
     """
 
     def refuse(*_: Any, **__: Any) -> None:
         raise TypeError(f"{function.__name__} is for kernels; Python may call its py_func")
 
-    kernel = _njit(function, no_cpython_wrapper=True, **_OPTIONS)
+    kernel = _njit(function, **_INNER, **_OPTIONS)
     if hasattr(kernel, "_insert"):
         # Numba itself would jump to the code that is not there
         kernel._insert = lambda *_: None
         kernel._compile_for_args = refuse
     return kernel
+
+
+def for_python(kernel: Any) -> Any:
+    """Make an inner kernel one that Python can call, for tests."""
+
+    def call(*arguments: Any) -> Any:
+        return kernel(*arguments)
+
+    return _njit(call, **_OPTIONS)
 
 
 def inlined(function: Callable[..., Any]) -> Any:

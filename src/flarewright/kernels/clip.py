@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ._jit import compiled, inner
+from ._jit import inner
 from .trace import REL, STOP_X, WEIGHT, X, Y
 
 # columns of a polygon's vertex; then u, v for each crossing of the stop
@@ -54,7 +54,7 @@ def cut_by_blades(polygon, count, crossings, blades, other, values):
     return count if count >= 3 else 0
 
 
-@compiled
+@inner
 def clip_triangle(data, pupil, triangle, mirror, crossings, blades, axes, polygon, other, values):
     """Cut one triangle by rims and blades.
 
@@ -107,7 +107,7 @@ def clip_triangle(data, pupil, triangle, mirror, crossings, blades, axes, polygo
     return cut_by_blades(polygon, count, crossings, blades, other, values)
 
 
-@compiled
+@inner
 def polygon_area(polygon, count, a, b):
     """Signed area of a polygon in two of its columns."""
     area = 0.0
@@ -117,7 +117,7 @@ def polygon_area(polygon, count, a, b):
     return 0.5 * area
 
 
-@compiled
+@inner
 def cut_to_rectangle(polygon, count, other, values, width, height):
     """Cut a polygon whose first two columns are pixels to the picture [0, width] x [0, height]."""
     for side in range(4):

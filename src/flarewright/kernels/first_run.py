@@ -35,15 +35,15 @@ ROOTS = {
     "mesh": (
         "mesh.build_mesh",
         f"{_GEOMETRY}, f8[:,::1], f8[:,:,::1], f8, f8, f8, i8, f8, f8, f8[::1], i8, i8, i8, f8, f8, f8, f8",
-        5.2,
+        5.0,
     ),
-    "prepass": ("prepass.find_box", f"{_GEOMETRY}, f8[::1], f8[:,::1], f8, f8, f8, i8, f8, f8, f8[::1], i8, i8", 3.0),
-    "draw": ("bundle.draw_bundle", f"{_BUNDLE}, f8[::1], i8, f8[:,::1], none, f8, {_CANVAS}, i8", 4.8),
-    "draw masked": ("bundle.draw_bundle", f"{_BUNDLE}, f8[::1], i8, f8[:,::1], f8[:,::1], f8, {_CANVAS}, i8", 6.5),
+    "prepass": ("prepass.find_box", f"{_GEOMETRY}, f8[::1], f8[:,::1], f8, f8, f8, i8, f8, f8, f8[::1], i8, i8", 2.4),
+    "draw": ("bundle.draw_bundle", f"{_BUNDLE}, f8[::1], i8, f8[:,::1], none, f8, {_CANVAS}, i8", 3.5),
+    "draw masked": ("bundle.draw_bundle", f"{_BUNDLE}, f8[::1], i8, f8[:,::1], f8[:,::1], f8, {_CANVAS}, i8", 4.8),
     "draw ringing": (
         "ringing.draw_ringing",
         f"{_BUNDLE}, f8[::1], i8, f4[::1], f8[:,::1], f8[:,::1], f8[::1], f8, f8[::1], f4[:,:,:,::1], i8",
-        5.0,
+        2.5,
     ),
     "densities": ("bundle.node_densities", _BUNDLE, 0.3),
     "measure": ("bundle.measure_bundle", f"{_BUNDLE}, i8, f8[:,::1], f8[:,::1], i8", 0.6),
@@ -51,7 +51,7 @@ ROOTS = {
         "matrix.draw_matrix_ghosts",
         "i8[::1], i8[::1], i8[::1], i8[::1], f8[::1], none, f8[::1], f8[:,::1], f8[:,:,::1], f8, f8, f8, f8, f8, "
         "f8[:,::1], f8, none, f8, f8[:,::1], f8[::1], f8, f8[:,::1], f8[:,:,::1]",
-        4.0,
+        1.9,
     ),
     "blade wings": (
         "resample.blend_blade_wings",

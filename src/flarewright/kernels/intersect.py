@@ -190,7 +190,7 @@ def sag_of_shape(shapes, row, x, y):
     return sag, slope_x, slope_y, room
 
 
-@compiled
+@inner
 def intersect_sag(shapes, row, x, y, z, dx, dy, dz, heading):
     """Step from a point to a surface given by its sag, in its own frame.
 

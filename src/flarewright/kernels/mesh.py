@@ -4,7 +4,7 @@ import numpy as np
 
 from ._jit import compiled, inlined, inner
 from .prepass import rejected
-from .trace import ALIVE, REL, STOP_X, WEIGHT, X, Y, trace_nodes
+from .trace import ALIVE, REL, STOP_X, WEIGHT, X, Y, trace_lanes
 
 # a FLAT leaf is good enough without its edges' middles, a LEAF needs them
 UNKNOWN, LEAF, SPLIT, EMPTY, FLAT = 0, 1, 2, 3, 4
@@ -278,7 +278,7 @@ def _trace(
     for k in range(first, end):
         px[k - first], py[k - first] = pupil[k, 0], pupil[k, 1]
     for v in range(n_gap.shape[0]):
-        trace_nodes(
+        trace_lanes(
             rows, actions, curvature, conic, z_vertex, inv_semi, n_gap[v], reflectance[v], sensor_z, tilt, nearness,
             px, py, data[v, first:end],
         )  # fmt: skip

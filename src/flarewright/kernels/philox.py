@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ._jit import compiled, inner
+from ._jit import inner
 
 _M0, _M1 = np.uint64(0xD2511F53), np.uint64(0xCD9E8D57)
 _W0, _W1 = np.uint64(0x9E3779B9), np.uint64(0xBB67AE85)
@@ -10,7 +10,7 @@ _LOW, _HALF = np.uint64(0xFFFFFFFF), np.uint64(32)
 _ONE = np.uint64(1)
 
 
-@compiled
+@inner
 def philox(c0, c1, c2, c3, k0, k1):
     """Return a block of random bits: Philox 4x32 with ten rounds.
 
@@ -38,7 +38,7 @@ def philox(c0, c1, c2, c3, k0, k1):
     return c0, c1, c2, c3
 
 
-@compiled
+@inner
 def refill(stream, pool):
     """Fill a pool with the next four numbers of a stream, each in (0, 1).
 

@@ -7,7 +7,7 @@ symmetric in x and only x >= 0 is traced (Hullin 2011, section 4.2, "Symmetries"
 import numpy as np
 
 from ._jit import compiled, inner
-from .trace import ALIVE, REL, STOP, STOP_X, WEIGHT, X, Y, trace_nodes
+from .trace import ALIVE, REL, STOP, STOP_X, WEIGHT, X, Y, trace_lanes
 
 # paths seen by fewer cells of the pre-pass than this are searched for spots between its samples
 FEW_CELLS = 12
@@ -64,7 +64,7 @@ def find_box(
     Parameters
     ----------
     rows ... nearness
-        As in `trace_nodes`.
+        As in `trace_lanes`.
     crossings : int
         How often the path crosses the stop.
     iris_radius : float
@@ -103,7 +103,7 @@ def find_box(
             px[a * width + b] = box[0] + a * hx
             py[a * width + b] = box[2] + b * hy
     data = np.empty((count, STOP_X + 2 * crossings))
-    trace_nodes(
+    trace_lanes(
         rows, actions, curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, tilt, nearness, px, py, data
     )
     found = np.array([np.inf, -np.inf, np.inf, -np.inf])
@@ -219,7 +219,7 @@ def _probe(
         px[k] = corners[cell, 0] + (m // PROBES + 0.5) * hx / PROBES
         py[k] = corners[cell, 1] + (m % PROBES + 0.5) * hy / PROBES
     data = np.empty((px.size, STOP_X + 2 * crossings))
-    trace_nodes(
+    trace_lanes(
         rows, actions, curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, tilt, nearness, px, py, data
     )
     for k in range(px.size):
@@ -256,7 +256,7 @@ def _halve(
         for k in range(n_gaps):
             mx[k], my[k] = 0.5 * (gaps[k, 0] + gaps[k, 3]), 0.5 * (gaps[k, 1] + gaps[k, 4])
         middle = np.empty((n_gaps, STOP_X + 2 * crossings))
-        trace_nodes(
+        trace_lanes(
             rows,
             actions,
             curvature,

@@ -193,7 +193,7 @@ def sum_rows(differences):
             differences[row, c, 0], differences[row, c, 1], differences[row, c, 2] = red, green, blue
 
 
-@compiled
+@inner
 def fill_polygon(polygon, count, density, gx, gy, density_low, density_high, rgb, plane, texture=None):
     """Add a convex polygon with linearly varying density to a picture.
 
@@ -288,7 +288,7 @@ def add_to_pixel(plane, row, column, light, rgb):
     plane[row, block, 2, m] += rgb[2] * light
 
 
-@compiled
+@inner
 def splat_line(x0, y0, x1, y1, flux, rgb, plane):
     """Spread flux along a segment, each sample over its four nearest pixels: for slivers without area.
 

@@ -8,7 +8,7 @@ from math import sqrt
 
 import numpy as np
 
-from ._jit import compiled, inner
+from ._jit import inner
 from .bend import ALIVE, REFLECT, REL, STOP, STOP_X, WEIGHT, X, Y, bend_at, ray_from_near
 from .intersect import (
     AXES,
@@ -23,7 +23,7 @@ from .intersect import (
 )
 
 
-@compiled
+@inner
 def cross_shape(shapes, row, vertex, x, y, z, dx, dy, dz, heading, eta, mirror):
     """Carry a ray to a row of the shape table and through it, or back from it.
 
@@ -95,7 +95,7 @@ def _turn_back(shapes, row, x, y, z):
     )
 
 
-@compiled
+@inner
 def trace_shapes(
     rows, actions, shapes, z_vertex, inv_semi, n_gap, reflectance, sensor_z, tilt, nearness, px, py, out,
 ):  # fmt: skip
@@ -150,7 +150,7 @@ def trace_shapes(
         out[k, WEIGHT], out[k, REL], out[k, ALIVE] = weight, sqrt(rel2), alive
 
 
-@compiled
+@inner
 def hit_shapes(rows, actions, shapes, z_vertex, n_gap, sensor_z, tilt, nearness, px, py, hits):
     """Keep every hit, as `kernels.trace.trace_hits` does, through rows of any shape.
 

@@ -4,19 +4,19 @@ from math import sqrt
 
 import numpy as np
 
-from ._jit import compiled
+from ._jit import compiled, inner
 from .bend import ALIVE, LANES, REFLECT, REFRACT, REL, STOP, STOP_X, WEIGHT, X, Y, bend, ray_from_near
 from .intersect import intersect_conic
 from .shapes import hit_shapes, trace_shapes
 
 __all__ = [
     "ALIVE", "LANES", "REFLECT", "REFRACT", "REL", "STOP", "STOP_X", "WEIGHT", "X", "Y", "bend", "trace_hits",
-    "trace_nodes",
+    "trace_lanes", "trace_nodes",
 ]  # fmt: skip
 
 
-@compiled
-def trace_nodes(
+@inner
+def trace_lanes(
     rows, actions, curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, tilt, nearness, px, py, out,
 ):  # fmt: skip
     """Trace rays of one light along one path to the sensor plane.
@@ -167,13 +167,23 @@ def trace_nodes(
 
 
 @compiled
+def trace_nodes(
+    rows, actions, curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, tilt, nearness, px, py, out,
+):  # fmt: skip
+    """Trace rays as `trace_lanes` does, for Python; kernels call that."""
+    trace_lanes(
+        rows, actions, curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, tilt, nearness, px, py, out
+    )
+
+
+@compiled
 def trace_hits(rows, actions, curvature, conic, z_vertex, n_gap, sensor_z, tilt, nearness, px, py, hits):
-    """Trace rays like `trace_nodes` and keep every hit: for drawings and for the size of surfaces.
+    """Trace rays like `trace_lanes` and keep every hit: for drawings and for the size of surfaces.
 
     Parameters
     ----------
     rows ... n_gap
-        As in `trace_nodes`.
+        As in `trace_lanes`.
     sensor_z, tilt, nearness : float
     px, py : ndarray, shape (N,)
     hits : ndarray, shape (N, S + 2, 3)
