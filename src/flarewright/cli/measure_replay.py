@@ -60,6 +60,5 @@ def replay(
     if as_json:
         print_json(facts)
     else:
-        print(
-            f"{output}: {len(layers)} layers, {constellation:.4g} degrees, roll {roll or 0.0:.4g}, brightness {gain:.4g}"
-        )
+        place = f"{constellation:.4g} degrees, roll {roll or 0.0:.4g}"
+        print(f"{output}: {len(layers)} layers, {place}, brightness {gain:.4g}")

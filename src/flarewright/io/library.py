@@ -13,10 +13,10 @@ from flarewright.errors import LensError
 @cache
 def shipped() -> tuple[str, ...]:
     """Return the names of the lenses that ship, in alphabetical order."""
-    folder = files("flarewright") / "lenses"
+    folder = _folder()
     if not folder.is_dir():
         return ()
-    return tuple(sorted(entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml")))
+    return tuple(sorted(entry.stem for entry in folder.iterdir() if entry.suffix == ".toml"))
 
 
 def lens_path(name_or_path: str | Path) -> Path:
@@ -39,7 +39,7 @@ def lens_path(name_or_path: str | Path) -> Path:
     text = str(name_or_path)
     by_key = {_key(name): name for name in shipped()}
     if (name := by_key.get(_key(text))) and not (isinstance(name_or_path, Path) and name_or_path.exists()):
-        return Path(str(files("flarewright") / "lenses" / f"{name}.toml"))
+        return _folder() / f"{name}.toml"
     path = Path(text).expanduser()
     if path.exists():
         return path
@@ -50,6 +50,16 @@ def lens_path(name_or_path: str | Path) -> Path:
     near = difflib.get_close_matches(_key(text), by_key, n=3, cutoff=0.5)
     hint = f": did you mean {' or '.join(by_key[key] for key in near)}?" if near else ""
     raise LensError(f"{text!r} is neither a shipped lens nor a file{hint or ': flarewright lenses lists the names'}")
+
+
+def is_shipped(path: Path) -> bool:
+    """Tell whether a file is one of the lenses that ship."""
+    return path.parent == _folder()
+
+
+@cache
+def _folder() -> Path:
+    return Path(str(files("flarewright") / "lenses"))
 
 
 def _key(name: str) -> str:

@@ -50,7 +50,6 @@ class _LinkedLowering(_Lowering):  # type: ignore[misc]
         entry = object()
         state["cr"] = state["cr"]._replace(cfunc=entry)
         state.targetctx.insert_user_function(entry, state["cr"].fndesc, [library])
-        state.reload_init.extend(library._reload_init)
         return True
 
 

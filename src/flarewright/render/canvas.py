@@ -16,6 +16,8 @@ Plane = NDArray[np.float32] | NDArray[np.float64]
 
 # a canvas can also hold light at half and at a quarter of the resolution
 DETAILS = 3
+# lines of a picture that are looked at together
+_STRIP = 32
 
 
 @dataclass(frozen=True)
@@ -114,10 +116,17 @@ def to_layer(name: str, pixels: Plane, pixel_area: float, about: dict[str, str |
 
 def lit_window(pixels: Plane) -> tuple[int, int, int, int]:
     """Bound the pixels of a picture of shape (H, W, 3) that hold light: x0, y0, x1, y1; all 0 when all is black."""
-    height, width = pixels.shape[:2]
-    lines = pixels.reshape(height, 3 * width)
-    rows = np.flatnonzero(lines.any(axis=1))
-    if rows.size == 0:
-        return 0, 0, 0, 0
-    columns = np.flatnonzero(lines.any(axis=0).reshape(width, 3).any(axis=1))
-    return int(columns[0]), int(rows[0]), int(columns[-1]) + 1, int(rows[-1]) + 1
+    y0, y1 = _lit_span(pixels)
+    x0, x1 = _lit_span(pixels[y0:y1].swapaxes(0, 1))
+    return (x0, y0, x1, y1) if y1 > y0 else (0, 0, 0, 0)
+
+
+def _lit_span(lines: Plane) -> tuple[int, int]:
+    """Bound the lines that hold light, looking in from either end; both 0 when none does."""
+    starts = range(0, len(lines), _STRIP)
+    first = next((start for start in starts if lines[start : start + _STRIP].any()), None)
+    if first is None:
+        return 0, 0
+    last = next(start for start in reversed(starts) if lines[start : start + _STRIP].any())
+    lit = [start + np.flatnonzero(lines[start : start + _STRIP].any(axis=(1, 2))) for start in (first, last)]
+    return int(lit[0][0]), int(lit[1][-1]) + 1

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from math import hypot
 from pathlib import Path
 
 from ..errors import GlassError, LensError, ProjectError
 from ..io.height_image import read_heights
 from ..io.lens_file import read_lens
-from ..io.library import lens_path
+from ..io.library import is_shipped, lens_path
 from ..io.media import attach
 from ..io.media import complete as complete_media
 from ..io.media import remarks as media_remarks
@@ -47,13 +48,26 @@ def load_lens(name_or_path: str | Path, *, remarks: list[str] | None = None) -> 
     GlassError
         For a glass that no catalogue knows.
     """
-    told: list[str] = [] if remarks is None else remarks
     path = lens_path(str(name_or_path))
+    # a person's file may change while a program runs, a shipped one does not
+    lens, told = _shipped_lens(path) if is_shipped(path) else _read_complete(path)
+    if remarks is not None:
+        remarks.extend(told)
+    return lens
+
+
+@lru_cache(maxsize=64)
+def _shipped_lens(path: Path) -> tuple[Lens, tuple[str, ...]]:
+    return _read_complete(path)
+
+
+def _read_complete(path: Path) -> tuple[Lens, tuple[str, ...]]:
+    """Read a lens file and fill in what it leaves out; also returns what there is to tell."""
     reading = read_lens(path)
     # a `.lens` table needs optics to tell diameters from semi-diameters, so it is repaired here
     lens, found = repair(reading) if isinstance(reading, RawLens) else reading
-    told.extend(found)
-    return complete_lens(lens, remarks=told)
+    told = list(found)
+    return complete_lens(lens, remarks=told), tuple(told)
 
 
 def complete_lens(lens: Lens, *, remarks: list[str] | None = None) -> Lens:

@@ -12,10 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..io.mask_image import read_mask
+from ..kernels.trace import REFRACT
 from ..model import Layer, Project
-from ..optics.bundle import incidence
-from ..optics.pack import facing
-from ..optics.paths import ghost_paths
+from ..optics.paths import direct_path, ghost_paths
 from ..optics.shape import ideal
 from .art import ResolvedArt, directed, graded, resolve_art
 from .compose import beauty
@@ -267,15 +266,17 @@ def _scene_scale(settled: Settled, shot: Shot) -> float:
     1 / (2 N), and it shrinks as the sensor moves away for a near plane.
     """
     order = settled.order
-    axis = incidence((0.0, 0.0))
-    on_axis = direct_image(settled.lens, replace(shot, incidence=axis, packed=facing(shot.packed, axis.axes)))
-    sensor_z = shot.packed.sensor_z
+    packed = shot.packed
+    # along the axis every surface is met at right angles, which ends its table
+    path, middle = direct_path(settled.lens), (len(packed.wavelengths_nm) - 1) // 2
+    passed = 1.0 - packed.reflectance[middle, path.rows[path.actions == REFRACT], -1]
+    sensor_z = packed.sensor_z
     slope = 0.5 / order.f_number
     if isfinite(order.exit_pupil_z):
         slope = 0.5 * order.exit_pupil_diameter / abs(sensor_z - order.exit_pupil_z)
     # a mask spans a square, of which the round opening is pi / 4
     opened = shot.opening.mean_transmittance * (1.0 if shot.opening.mask is None else 4.0 / pi)
-    return float(pi * on_axis.transmittance * opened * slope**2)
+    return float(pi * passed.prod() * opened * slope**2)
 
 
 def _summary(settled: Settled, shots: tuple[Shot, ...], images: list[DirectImage], art: ResolvedArt) -> dict[str, Any]:
