@@ -1,0 +1,338 @@
+"""From where the light was seen in each frame to the optical axis, the horizon's tilt and the true angles.
+
+With the camera turned by theta, the light is at `foot + u (f t + k t^3)`, t = tan(theta), where `u` is the direction
+of the turntable in the picture: f is the focal length in pixels and k the distortion. The foot is the axis, moved
+across the path when the camera nods (`symmetry` finds by how much). The jitter of the turntable is what remains.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from math import atan, cos, degrees, hypot, radians, sin, sqrt, tan
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import FlarewrightError
+from .light import Sighting
+
+Floats = NDArray[np.float64]
+
+# a light much fainter than in the frames that show it best is none: it left the picture
+_FAINTEST = 0.05
+# and one that stands out of no frame by this much is none at all
+_LEAST_CONTRAST = 20.0
+# residuals of the path beyond this part of the width are no path of one light
+_WORST_PATH = 0.02
+# fewer distinct angles do not fix the distortion
+_FOR_DISTORTION = 8
+# nearer the axis than this the direction to the light says nothing
+_NEAR_PX = 8.0
+# how far the foot may lie beside the axis by nodding, and the axis beside the picture's middle, when nothing else
+# tells
+_NOD_DEG, _OFF_CENTRE = 0.2, 0.02
+
+
+@dataclass(frozen=True)
+class Seen:
+    """One frame for the geometry: the captures' angles, and the light where it was believed."""
+
+    nominal_deg: float
+    nominal_roll_deg: float
+    light_px: tuple[float, float] | None
+    error_px: float
+
+
+@dataclass(frozen=True)
+class Placed:
+    """Where one frame truly stood: `FrameInfo`'s fields of the same names."""
+
+    constellation_deg: float
+    roll_deg: float
+    light_px: tuple[float, float]
+    light_error_px: float
+    light_found: bool
+
+
+@dataclass(frozen=True)
+class Geometry:
+    """A run's geometry.
+
+    Attributes
+    ----------
+    axis_px, axis_error_px : tuple of float
+    px_per_rad : float
+    cubic_px : float
+        The distortion k.
+    jitter_deg : float
+        Spread of the turntable's angles about the nominal ones.
+    placed : tuple of Placed
+        As the frames were given.
+    remarks : tuple of str
+    """
+
+    axis_px: tuple[float, float]
+    axis_error_px: tuple[float, float]
+    px_per_rad: float
+    cubic_px: float
+    jitter_deg: float
+    placed: tuple[Placed, ...]
+    remarks: tuple[str, ...]
+
+
+def believable(sightings: Sequence[Sighting]) -> list[bool]:
+    """Tell in which frames the light truly is.
+
+    Parameters
+    ----------
+    sightings : sequence of Sighting
+        Of all frames of a run.
+
+    Returns
+    -------
+    list of bool
+
+    Raises
+    ------
+    FlarewrightError
+        No light, two lights, or nothing but clipped pixels.
+    """
+    hopeless = sum(one.clipped_share > 0.5 for one in sightings)
+    if hopeless > 0.5 * len(sightings):
+        raise FlarewrightError(
+            f"{hopeless} of {len(sightings)} frames are saturated over more than half of the picture, even in the "
+            "shortest exposure: add shorter exposures"
+        )
+    best = max(one.flux for one in sightings)
+    found = [one.flux > _FAINTEST * best and not one.at_border and one.clipped_share < 0.5 for one in sightings]
+    contrast = max((one.contrast for one, seen in zip(sightings, found, strict=True) if seen), default=0.0)
+    if contrast < _LEAST_CONTRAST:
+        raise FlarewrightError(
+            f"no light was found: nothing stands out of the pictures by more than {_LEAST_CONTRAST:g} times their "
+            "median; check the photographs, or give light_x_px and light_y_px in captures.csv"
+        )
+    rivals = [
+        k for k, (one, seen) in enumerate(zip(sightings, found, strict=True)) if seen and one.rival_px is not None
+    ]
+    if rivals and len(rivals) > 0.5 * sum(found):
+        one = sightings[rivals[0]]
+        assert one.rival_px is not None
+        (x, y), (other_x, other_y) = one.position_px, one.rival_px
+        raise FlarewrightError(
+            f"two lights were found, at ({x:.0f}, {y:.0f}) and ({other_x:.0f}, {other_y:.0f}) of one frame: cover one "
+            "of them, or give light_x_px and light_y_px in captures.csv"
+        )
+    return found
+
+
+Across = Callable[[tuple[float, float], tuple[float, float]], tuple[float, float] | None]
+
+
+def solve_geometry(
+    frames: Sequence[Seen], size_px: tuple[int, int], across: Across | None = None, px_per_rad: float | None = None
+) -> Geometry:
+    """Find axis, scale, tilt and the true angles.
+
+    Parameters
+    ----------
+    frames : sequence of Seen
+    size_px : tuple of int
+        Width and height.
+    across : callable, optional
+        Called with the path's foot and the unit vector across the path of the roll with most frames; returns by how
+        much the axis lies beside the foot and with which error, or None (`symmetry.axis_beside_path`).
+    px_per_rad : float, optional
+        Focal length in pixels where the light does not tell it.
+
+    Returns
+    -------
+    Geometry
+
+    Raises
+    ------
+    FlarewrightError
+        When the light does not move as the angles say.
+    """
+    seen = [one for one in frames if one.light_px is not None]
+    rolls = list(dict.fromkeys(one.nominal_roll_deg for one in frames))
+    paths = {roll: path for roll in rolls if (path := _fit_path([one for one in seen if one.nominal_roll_deg == roll]))}
+    centre = 0.5 * size_px[0], 0.5 * size_px[1]
+    if not paths:
+        return _without_path(frames, centre, size_px, px_per_rad)
+    worst = max(path.residual_px for path in paths.values())
+    if worst > _WORST_PATH * size_px[0]:
+        raise FlarewrightError(
+            f"the light does not move as the angles say (it is {worst:.0f} pixels off): check constellation_deg and "
+            "roll_deg in captures.csv, and that no other light is in the picture"
+        )
+    remarks: list[str] = []
+    axis, error = _axis(paths, centre, size_px, across, remarks)
+    placed = tuple(_place(one, paths.get(one.nominal_roll_deg), axis, next(iter(paths.values()))) for one in frames)
+    largest = max(paths.values(), key=lambda path: path.count)
+    return Geometry(axis, error, largest.focal_px, largest.cubic_px, largest.jitter_deg, placed, tuple(remarks))
+
+
+@dataclass(frozen=True)
+class _Path:
+    """The light's path of one roll: foot, direction, and the law of its distance."""
+
+    foot: tuple[float, float]
+    foot_error: float
+    direction: tuple[float, float]
+    focal_px: float
+    cubic_px: float
+    jitter_deg: float
+    residual_px: float
+    count: int
+
+    @property
+    def normal(self) -> tuple[float, float]:
+        return -self.direction[1], self.direction[0]
+
+    def distance(self, t: float) -> float:
+        """Return the distance along the path at t = tan(theta)."""
+        return self.focal_px * t + self.cubic_px * t**3
+
+    def angle_deg(self, distance: float) -> float:
+        """Return the angle at which the light stands so far from the axis, by Newton's method."""
+        t = distance / self.focal_px
+        for _ in range(20):
+            t -= (self.distance(t) - distance) / (self.focal_px + 3.0 * self.cubic_px * t * t)
+        return degrees(atan(t))
+
+
+def _fit_path(seen: Sequence[Seen]) -> _Path | None:
+    """Fit the path of one roll by least squares, outliers down-weighted; None when fewer than two angles show it."""
+    nominal = np.array([one.nominal_deg for one in seen])
+    distinct = np.unique(nominal)
+    if distinct.size < 2:
+        return None
+    t = np.tan(np.radians(nominal))
+    lights = np.array([one.light_px for one in seen], dtype=np.float64)
+    roll = radians(seen[0].nominal_roll_deg)
+    u = np.array([cos(roll), -sin(roll)])
+    along, beside = lights @ u, lights @ np.array([-u[1], u[0]])
+    bends = distinct.size >= _FOR_DISTORTION and np.ptp(distinct) > 5.0
+    A = np.stack([np.ones_like(t), t, t**3], axis=1) if bends else np.stack([np.ones_like(t), t], axis=1)
+    fit, errors, rest = _robust(A, along)
+    side, _, rest_beside = _robust(np.stack([np.ones_like(t), t], axis=1), beside)
+    # the turntable's direction in the picture, and the law along it: the tilt is small
+    slope = hypot(fit[1], side[1])
+    direction = (fit[1] * u + side[1] * np.array([-u[1], u[0]])) / slope
+    foot = fit[0] * u + side[0] * np.array([-u[1], u[0]])
+    cubic = float(fit[2]) if bends else 0.0
+    spread = float(np.sqrt(np.mean(np.square([rest, rest_beside]).sum(axis=0))))
+    sign = 1.0 if fit[1] >= 0.0 else -1.0
+    if sign < 0.0:
+        raise FlarewrightError(
+            "the light moves against the angles: with positive angles it should go right in the upright picture; "
+            "change the sign of constellation_deg, or set roll_deg to 180"
+        )
+    jitter = sqrt(max(float(np.var(rest)) - float(np.mean([one.error_px**2 for one in seen])), 0.0))
+    return _Path(
+        (float(foot[0]), float(foot[1])), max(float(errors[0]), 0.01), (float(direction[0]), float(direction[1])),
+        float(slope), cubic, degrees(jitter / slope), spread, len(seen),
+    )  # fmt: skip
+
+
+def _robust(A: Floats, y: Floats) -> tuple[Floats, Floats, Floats]:
+    """Fit y = A x with Huber's weights; return x, its standard errors, and the residuals."""
+    weight = np.ones(y.size)
+    x = np.zeros(A.shape[1])
+    for _ in range(20):
+        x = np.linalg.pinv((A.T * weight) @ A) @ (A.T * weight) @ y
+        rest = y - A @ x
+        scale = max(1.4826 * float(np.median(np.abs(rest))), 1e-3)
+        weight = 1.0 / np.maximum(1.0, np.abs(rest) / (2.0 * scale))
+    rest = y - A @ x
+    freedom = max(y.size - A.shape[1], 1)
+    covariance = np.linalg.pinv((A.T * weight) @ A) * float((weight * rest**2).sum()) / freedom
+    return x, np.sqrt(np.maximum(np.diag(covariance), 0.0)), rest
+
+
+def _axis(
+    paths: dict[float, _Path], centre: tuple[float, float], size_px: tuple[int, int], across: Across | None,
+    remarks: list[str],
+) -> tuple[tuple[float, float], tuple[float, float]]:  # fmt: skip
+    """Combine what is known of the axis: the feet of all paths, the mirror line, and weakly the picture's middle."""
+    information = np.zeros((2, 2))
+    weighted = np.zeros(2)
+
+    def know(direction: tuple[float, float], value: float, error: float) -> None:
+        nonlocal information, weighted
+        unit = np.array(direction)
+        information = information + np.outer(unit, unit) / error**2
+        weighted = weighted + unit * value / error**2
+
+    for unit in ((1.0, 0.0), (0.0, 1.0)):
+        know(unit, centre[0] * unit[0] + centre[1] * unit[1], _OFF_CENTRE * size_px[0])
+    largest = max(paths.values(), key=lambda path: path.count)
+    for path in paths.values():
+        know(path.direction, _dot(path.foot, path.direction), path.foot_error)
+        know(path.normal, _dot(path.foot, path.normal), radians(_NOD_DEG) * path.focal_px)
+    found = None if across is None else across(largest.foot, largest.normal)
+    if found is not None:
+        know(largest.normal, _dot(largest.foot, largest.normal) + found[0], found[1])
+    elif across is not None:
+        remarks.append("the ghosts do not show where the axis lies across the light's path; the path was taken")
+    covariance = np.linalg.inv(information)
+    axis = covariance @ weighted
+    error = np.sqrt(np.diag(covariance))
+    return (float(axis[0]), float(axis[1])), (float(error[0]), float(error[1]))
+
+
+def _dot(a: tuple[float, float], b: tuple[float, float]) -> float:
+    return a[0] * b[0] + a[1] * b[1]
+
+
+def _place(one: Seen, path: _Path | None, axis: tuple[float, float], other: _Path) -> Placed:
+    """Place one frame: its light as seen, or as its path foretells."""
+    law = path or other
+    t = tan(radians(one.nominal_deg))
+    roll = radians(one.nominal_roll_deg)
+    u = path.direction if path is not None else (cos(roll), -sin(roll))
+    foot = path.foot if path is not None else axis
+    sign = 1.0 if one.nominal_deg >= 0.0 else -1.0
+    step = law.distance(t)
+    expected = foot[0] + step * u[0], foot[1] + step * u[1]
+    # the light's own error is weighed against the turntable's
+    table = max(radians(law.jitter_deg) * law.focal_px, 0.02)
+    error = sqrt(law.foot_error**2 + table**2) if one.light_px is None else one.error_px
+    far = hypot(expected[0] - axis[0], expected[1] - axis[1])
+    if one.light_px is None:
+        light, distance = expected, far
+    else:
+        light = one.light_px
+        seen = hypot(light[0] - axis[0], light[1] - axis[1])
+        distance = far + (seen - far) * table**2 / (table**2 + one.error_px**2)
+    direction = sign * (light[0] - axis[0]), sign * (light[1] - axis[1])
+    if hypot(*direction) < _NEAR_PX:
+        direction = u
+    return Placed(
+        sign * law.angle_deg(distance), degrees(np.arctan2(-direction[1], direction[0])), light, error,
+        one.light_px is not None,
+    )  # fmt: skip
+
+
+def _without_path(
+    frames: Sequence[Seen], centre: tuple[float, float], size_px: tuple[int, int], px_per_rad: float | None
+) -> Geometry:
+    """Place frames of which no two angles show the light: the axis is taken to be the picture's middle."""
+    seen = next((one for one in frames if one.light_px is not None and abs(one.nominal_deg) > 0.5), None)
+    if seen is not None and seen.light_px is not None:
+        distance = hypot(seen.light_px[0] - centre[0], seen.light_px[1] - centre[1])
+        px_per_rad = distance / abs(tan(radians(seen.nominal_deg)))
+    if px_per_rad is None or px_per_rad <= 0.0:
+        raise FlarewrightError(
+            "the light was seen at one angle only, so its path is unknown: add captures at other angles, or give "
+            "focal_mm in captures.csv and pitch_um in camera.json"
+        )
+    path = _Path(centre, _OFF_CENTRE * size_px[0], (1.0, 0.0), px_per_rad, 0.0, 0.0, 0.0, 0)
+    placed = []
+    for one in frames:
+        roll = radians(one.nominal_roll_deg)
+        turned = _Path(centre, path.foot_error, (cos(roll), -sin(roll)), px_per_rad, 0.0, 0.0, 0.0, 0)
+        placed.append(_place(one, turned, centre, turned))
+    told = "the light was seen at one angle only; the axis is taken to be the middle of the picture"
+    return Geometry(centre, (path.foot_error, path.foot_error), px_per_rad, 0.0, 0.0, tuple(placed), (told,))

@@ -1,0 +1,259 @@
+"""Find the light in a merged frame.
+
+The light is where the picture is brightest, and clipped if anything is. Its star is the diffraction pattern of the
+iris, which is the same when turned by half a turn about the light, so the light is found to a part of a pixel even
+where its middle is clipped: by the point about which the neighbourhood is symmetric.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import hypot, sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Band = NDArray[np.float32]
+
+# what counts as another light: part of the first's clipped area, or of its flux when nothing is clipped
+_RIVAL = 0.25
+# a clipped area smaller than this may be a hot pixel
+_LEAST_AREA = 4
+# how far beyond the clipped area the star is compared with itself, pixels
+_RIM = 14
+# how much the star may differ from its turned self for other reasons than noise, as part
+_ASYMMETRY = 0.1
+
+
+@dataclass(frozen=True)
+class Sighting:
+    """The light as one frame shows it.
+
+    Attributes
+    ----------
+    position_px : tuple of float
+        (x, y).
+    error_px : float
+        Standard error along an axis.
+    flux : float
+        Of the 15 x 15 pixels around it, clipped ones counted at the level of clipping: at least.
+    contrast : float
+        Brightest pixel over the frame's median.
+    at_border : bool
+        Whether the picture cuts the star's middle.
+    rival_px : tuple of float or None
+        Where another light seems to be.
+    clipped_share : float
+        Part of the pixels that every exposure clipped.
+    glow : float or None
+        Mean of the star around its middle, between 2 and 5 % of the width from it; None when the picture cuts that.
+    """
+
+    position_px: tuple[float, float]
+    error_px: float
+    flux: float
+    contrast: float
+    at_border: bool
+    rival_px: tuple[float, float] | None
+    clipped_share: float
+    glow: float | None = None
+
+
+def find_light(radiance: Band, variance: Band) -> Sighting:
+    """Find the light in a frame; whether it is one shows in the run (`geometry.believable`).
+
+    Parameters
+    ----------
+    radiance, variance : ndarray, shape (height, width, 3)
+        As of `MergedFrame`.
+
+    Returns
+    -------
+    Sighting
+    """
+    clipped: NDArray[np.bool_] = np.asarray(np.isinf(variance).any(axis=2))
+    light = radiance.mean(axis=2, dtype=np.float64)
+    height, width = light.shape
+    blobs = [blob for blob in _blobs(clipped) if blob.area >= _LEAST_AREA]
+    if blobs:
+        first = blobs[0]
+        (x, y), radius = first.middle, first.radius
+        rivals = [
+            blob.middle
+            for blob in blobs[1:]
+            if blob.area > max(9.0, _RIVAL * first.area) and _apart(blob.middle, (x, y)) > 3.0 * (radius + blob.radius)
+        ]
+    else:
+        x, y, rivals = *_brightest(light), _second(light)
+        radius = 2.0
+    reach = radius + _RIM
+    at_border = not (reach / 2 < x < width - reach / 2 and reach / 2 < y < height - reach / 2)
+    (x, y), error = _symmetric(light, variance.mean(axis=2, dtype=np.float64), clipped, (x, y), reach)
+    median = max(float(np.median(light[~clipped])) if not clipped.all() else 0.0, 1e-30)
+    contrast = float(light.max()) / median
+    row, column = (min(max(int(value) - 7, 0), side) for value, side in ((y, height), (x, width)))
+    flux = float(light[row : row + 15, column : column + 15].sum())
+    rival = rivals[0] if rivals else None
+    glow = _glow(light, clipped, (x, y))
+    return Sighting((x, y), error, flux, contrast, at_border, rival, float(clipped.mean()), glow)
+
+
+def _glow(light: Floats, clipped: NDArray[np.bool_], middle: tuple[float, float]) -> float | None:
+    height, width = light.shape
+    inner, outer = 0.02 * width, 0.05 * width
+    (x, y), reach = middle, int(outer) + 1
+    if not (reach < x < width - reach and reach < y < height - reach):
+        return None
+    rows, columns = slice(int(y) - reach, int(y) + reach + 1), slice(int(x) - reach, int(x) + reach + 1)
+    far = np.hypot(
+        np.arange(columns.start, columns.stop) + 0.5 - x, (np.arange(rows.start, rows.stop) + 0.5 - y)[:, None]
+    )
+    # both rims are soft, so that the light may stand anywhere within a pixel
+    weight = np.clip(far - inner, 0.0, 1.0) * np.clip(outer - far, 0.0, 1.0)
+    if clipped[rows, columns][weight > 0.0].any():
+        return None
+    return float((weight * light[rows, columns]).sum() / weight.sum())
+
+
+@dataclass(frozen=True)
+class _Blob:
+    """A connected clipped area."""
+
+    area: int
+    middle: tuple[float, float]
+
+    @property
+    def radius(self) -> float:
+        return sqrt(self.area / np.pi)
+
+
+def _blobs(flags: NDArray[np.bool_]) -> list[_Blob]:
+    """Return the connected areas (8 neighbours), the largest first: runs of each row joined with those above."""
+    parent: list[int] = []
+    sums: list[tuple[int, float, float]] = []
+
+    def root(k: int) -> int:
+        while parent[k] != k:
+            parent[k] = parent[parent[k]]
+            k = parent[k]
+        return k
+
+    above: list[tuple[int, int, int]] = []
+    last = -2
+    for row in np.flatnonzero(flags.any(axis=1)):
+        edges = np.flatnonzero(np.diff(np.concatenate([[0], flags[row].astype(np.int8), [0]])))
+        above = above if row == last + 1 else []
+        current = []
+        for start, end in edges.reshape(-1, 2).tolist():
+            label = len(parent)
+            parent.append(label)
+            count = end - start
+            sums.append((count, count * 0.5 * (start + end), count * (row + 0.5)))
+            for other_start, other_end, other in above:
+                if other_start <= end and start <= other_end:
+                    parent[root(other)] = root(label)
+            current.append((start, end, label))
+        above, last = current, int(row)
+    total: dict[int, list[float]] = {}
+    for k, one in enumerate(sums):
+        entry = total.setdefault(root(k), [0.0, 0.0, 0.0])
+        for part in range(3):
+            entry[part] += one[part]
+    blobs = [_Blob(int(area), (x / area, y / area)) for area, x, y in total.values()]
+    return sorted(blobs, key=lambda blob: -blob.area)
+
+
+def _apart(a: tuple[float, float], b: tuple[float, float]) -> float:
+    return hypot(a[0] - b[0], a[1] - b[1])
+
+
+def _boxed(light: Floats) -> Floats:
+    """Return sums over 3 x 3 pixels, so that one hot pixel is no light."""
+    padded = np.pad(light, 1)
+    height, width = light.shape
+    total = np.zeros_like(light)
+    for i in range(3):
+        for j in range(3):
+            total += padded[i : i + height, j : j + width]
+    return total
+
+
+def _brightest(light: Floats) -> tuple[float, float]:
+    y, x = np.unravel_index(int(_boxed(light).argmax()), light.shape)
+    return float(x) + 0.5, float(y) + 0.5
+
+
+def _second(light: Floats) -> list[tuple[float, float]]:
+    """Return where nearly as much light comes from, far from the brightest place."""
+    boxes = _boxed(light)
+    height, width = light.shape
+    y, x = np.unravel_index(int(boxes.argmax()), light.shape)
+    far = (np.arange(width) - x) ** 2 + (np.arange(height)[:, None] - y) ** 2 > max(15.0, 0.05 * width) ** 2
+    rest = np.where(far, boxes, 0.0)
+    if not far.any() or rest.max() < _RIVAL * boxes.max():
+        return []
+    b, a = np.unravel_index(int(rest.argmax()), light.shape)
+    return [(float(a) + 0.5, float(b) + 0.5)]
+
+
+def _symmetric(
+    light: Floats, variance: Floats, clipped: NDArray[np.bool_], start: tuple[float, float], reach: float
+) -> tuple[tuple[float, float], float]:
+    """Find the point about which the neighbourhood is symmetric, by Gauss-Newton on logarithms; also its error."""
+    height, width = light.shape
+    pad = int(reach) + 6
+    left, top = int(start[0]) - pad, int(start[1]) - pad
+    right, bottom = min(left + 2 * pad + 1, width), min(top + 2 * pad + 1, height)
+    left, top = max(left, 0), max(top, 0)
+    part = light[top:bottom, left:right]
+    known = ~clipped[top:bottom, left:right]
+    floor = max(float(np.percentile(np.abs(part), 5)), 1e-30)
+    f = np.log(np.maximum(part, floor))
+    spread = np.where(known, variance[top:bottom, left:right], 0.0) / np.maximum(part, floor) ** 2
+    gy, gx = np.gradient(f)
+    span = np.arange(-int(reach), int(reach) + 1)
+    dx, dy = (grid.ravel().astype(np.float64) for grid in np.meshgrid(span, span))
+    half = (dx**2 + dy**2 <= reach**2) & ((dy > 0) | ((dy == 0) & (dx > 0)))
+    dx, dy = dx[half], dy[half]
+    unknown = (~known).astype(np.float64)
+    centre = np.array([start[0] - left, start[1] - top])
+    normal, scale = np.eye(2), 1.0
+    for _ in range(30):
+        fields = (f, gx, gy, spread, unknown)
+        one = _sampled(fields, centre[0] + dx, centre[1] + dy)
+        other = _sampled(fields, centre[0] - dx, centre[1] - dy)
+        usable = (one[4] < 1e-9) & (other[4] < 1e-9)
+        if usable.sum() < 12:
+            return start, reach
+        e = (one[0] - other[0])[usable]
+        J = np.stack([(one[1] - other[1])[usable], (one[2] - other[2])[usable]], axis=1)
+        sigma = np.sqrt((one[3] + other[3])[usable] + _ASYMMETRY**2)
+        weight = 1.0 / sigma**2 / np.maximum(1.0, np.abs(e) / sigma / 2.0)
+        normal = (J.T * weight) @ J
+        step = -np.linalg.pinv(normal) @ (J.T * weight) @ e
+        scale = max(1.0, float(np.sqrt(np.mean((e / sigma) ** 2))))
+        length = float(np.hypot(*step))
+        centre = centre + step * min(1.0, 1.0 / max(length, 1e-12))
+        if length < 1e-4:
+            break
+    found = (float(centre[0]) + left, float(centre[1]) + top)
+    if _apart(found, start) > reach:
+        return start, reach
+    # neighbouring pixels of a star do not differ from each other by chance: a few count as one
+    error = 2.0 * scale * sqrt(0.5 * float(np.trace(np.linalg.pinv(normal))))
+    return found, max(error, 0.01)
+
+
+def _sampled(fields: tuple[Floats, ...], x: Floats, y: Floats) -> list[Floats]:
+    """Interpolate pictures linearly at (x, y); outside, the last one is 1 and the others what the border has."""
+    height, width = fields[0].shape
+    u, v = x - 0.5, y - 0.5
+    outside = (u < 0) | (v < 0) | (u > width - 1) | (v > height - 1)
+    u, v = np.clip(u, 0.0, width - 1.001), np.clip(v, 0.0, height - 1.001)
+    i, j = u.astype(np.int64), v.astype(np.int64)
+    a, b = u - i, v - j
+    corners = (((1 - a) * (1 - b), j, i), (a * (1 - b), j, i + 1), ((1 - a) * b, j + 1, i), (a * b, j + 1, i + 1))
+    found = [np.asarray(sum(weight * field[row, column] for weight, row, column in corners)) for field in fields]
+    found[-1] = np.where(outside, 1.0, found[-1])
+    return found

@@ -1,0 +1,208 @@
+"""Merge the exposures of one constellation in linear light.
+
+Each exposure is weighted by the inverse of its variance. That variance is read from the mean of the neighbours, not
+from the pixel itself: weights that know a pixel's noise prefer its low readings, and the result would be too dark.
+Whether an exposure is clipped is foretold by the shorter ones for the same reason.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..io.photo import Photo
+from .noise import Noise, smooth
+
+Floats = NDArray[np.float64]
+Band = NDArray[np.float32]
+
+# an exposure counts where it is foretold to stay this many standard deviations below white
+_SAFE = 4.0
+# rows in memory at a time
+ROWS = 128
+# levels, as parts of full, at which two exposures are compared
+_COMPARE = (0.02, 0.7)
+# a ratio of exposures known worse than this is not corrected
+_WORST_RATIO = 0.02
+
+
+@dataclass(frozen=True)
+class Exposure:
+    """One photograph, ready to be merged.
+
+    Attributes
+    ----------
+    photo : Photo
+    seconds : float
+        Exposure time at the reference ISO; what the number above black grows in.
+    noise : tuple of Noise
+        Of red, green and blue.
+    black : ndarray, shape (3,) or (height, width, 3), float32
+        Level of red, green and blue, or picture of it, in the file's units.
+    white : float
+        Where the file clips; infinite when nothing is.
+    response : ndarray, shape (height, width, 3), or None
+        Each pixel's answer over that of its neighbours; None: even.
+    """
+
+    photo: Photo
+    seconds: float
+    noise: tuple[Noise, Noise, Noise]
+    black: Band
+    white: float
+    response: Band | None = None
+
+    def read(self, low: int, high: int) -> tuple[Band, NDArray[np.bool_]]:
+        """Return numbers above black and where they were clipped, of rows low to high."""
+        raw = self.photo.rows(low, high)
+        clipped = raw >= self.white
+        above = raw - (self.black[low:high] if self.black.ndim == 3 else self.black)
+        if self.response is not None:
+            above = above / self.response[low:high]
+        return above, clipped
+
+    @property
+    def full(self) -> Band:
+        """Clipping level above black of red, green and blue, shape (3,)."""
+        full: Band = np.float32(self.white) - self.black.reshape(-1, 3).mean(axis=0)
+        return full
+
+    def variance(self, units: NDArray[np.floating]) -> NDArray[np.floating]:
+        """Return the variance of numbers above black with mean `units`, shape (..., 3)."""
+        slope = np.array([one.slope for one in self.noise], np.float32)
+        floor = np.array([one.floor for one in self.noise], np.float32)
+        found: NDArray[np.floating] = np.maximum(units, 0.0) * slope + floor
+        return found
+
+
+def merge(exposures: Sequence[Exposure], *, rows: int = ROWS) -> tuple[Band, Band]:
+    """Merge the exposures of one constellation, a band of rows at a time.
+
+    Parameters
+    ----------
+    exposures : sequence of Exposure
+        At least one; all of one size.
+    rows : int
+        Of a band; the result does not depend on it.
+
+    Returns
+    -------
+    radiance, variance : ndarray, shape (height, width, 3), float32
+        Numbers above black per second; a variance of infinity where everything was clipped.
+    """
+    ordered = sorted(exposures, key=lambda one: one.seconds)
+    width, height = ordered[0].photo.size_px
+    radiance, variance = np.empty((height, width, 3), np.float32), np.empty((height, width, 3), np.float32)
+    # whether an exposure counts depends on the neighbours' shorter ones, and so on
+    halo = len(ordered) + 1
+    for low in range(0, height, rows):
+        high = min(low + rows, height)
+        top, bottom = max(low - halo, 0), min(high + halo, height)
+        inside = slice(low - top, high - top)
+        found = _merge_band(ordered, [one.read(top, bottom) for one in ordered])
+        radiance[low:high], variance[low:high] = found[0][inside], found[1][inside]
+    return radiance, variance
+
+
+def _merge_band(
+    exposures: Sequence[Exposure], readings: Sequence[tuple[Band, NDArray[np.bool_]]]
+) -> tuple[NDArray[np.floating], NDArray[np.floating]]:
+    counts = np.zeros(readings[0][0].shape, np.float64)
+    seconds = np.zeros(counts.shape, np.float64)
+    usable: list[NDArray[np.bool_]] = []
+    for one, (above, clipped) in zip(exposures, readings, strict=True):
+        foretold = smooth(above) if not usable else _level(counts, seconds, above / one.seconds) * one.seconds
+        safe = ~clipped & (foretold + _SAFE * np.sqrt(one.variance(foretold)) < one.full)
+        counts += np.where(safe, above, 0.0)
+        seconds += np.where(safe, one.seconds, 0.0)
+        usable.append(safe)
+    level = _level(counts, seconds, None)
+    total, weights = np.zeros(counts.shape), np.zeros(counts.shape)
+    for one, (above, _), safe in zip(exposures, readings, usable, strict=True):
+        weight = np.where(safe, one.seconds**2 / one.variance(level * one.seconds), 0.0)
+        total += weight * above / one.seconds
+        weights += weight
+    with np.errstate(divide="ignore", invalid="ignore"):
+        variance = 1.0 / weights
+        mean = np.where(weights > 0.0, total * variance, _brightest(exposures[0]))
+    return mean, variance
+
+
+def _level(counts: Floats, seconds: Floats, otherwise: NDArray[np.floating] | None) -> NDArray[np.floating]:
+    """Return counts per second of each pixel's neighbourhood; where nothing was counted, `otherwise` or 0."""
+    total, time = smooth(counts), smooth(seconds)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(time > 0.0, total / time, 0.0 if otherwise is None else smooth(otherwise))
+
+
+def _brightest(shortest: Exposure) -> Band:
+    """Return what a pixel has at least that was clipped in every exposure; 0 when nothing is known to clip."""
+    full = shortest.full / np.float32(shortest.seconds)
+    return np.where(np.isfinite(full), full, 0.0).astype(np.float32)
+
+
+@dataclass(frozen=True)
+class Ratio:
+    """Light of an exposure over what its time and ISO promise, the longest's being 1."""
+
+    value: float
+    error: float
+
+
+def exposure_ratios(exposures: Sequence[Exposure], *, rows: int = ROWS) -> list[Ratio]:
+    """Compare each exposure with the next longer one where both are well lit.
+
+    Parameters
+    ----------
+    exposures : sequence of Exposure
+    rows : int
+        Of a band.
+
+    Returns
+    -------
+    list of Ratio
+        In the order given. Shutters differ from what they say (1/60 s is often 1/64 s), and lights flicker.
+
+    Notes
+    -----
+    Pixels are chosen by the mean of their neighbours in the longer exposure, so that noise does not choose.
+    """
+    order = sorted(range(len(exposures)), key=lambda k: exposures[k].seconds)
+    found = [Ratio(1.0, 0.0)] * len(exposures)
+    for k in reversed(range(len(order) - 1)):
+        short, long = exposures[order[k]], exposures[order[k + 1]]
+        one = _ratio(short, long, rows)
+        if one is None or one.error > _WORST_RATIO:
+            one = Ratio(1.0, _WORST_RATIO)
+        longer = found[order[k + 1]]
+        found[order[k]] = Ratio(one.value * longer.value, sqrt(one.error**2 + longer.error**2))
+    return found
+
+
+def _ratio(short: Exposure, long: Exposure, rows: int) -> Ratio | None:
+    height = short.photo.size_px[1]
+    part = short.seconds / long.seconds
+    have = expected = variance = 0.0
+    for low in range(0, height, rows):
+        (a, a_clipped), (b, b_clipped) = (one.read(low, min(low + rows, height)) for one in (short, long))
+        level = smooth(b)
+        chosen = (level > _COMPARE[0] * long.full) & (level < _COMPARE[1] * long.full)
+        if not np.isfinite(long.white):
+            chosen = level > 5.0 * np.sqrt(long.variance(level))
+        chosen &= ~smooth_any(a_clipped | b_clipped)
+        have += float(a[chosen].sum(dtype=np.float64))
+        expected += float(b[chosen].sum(dtype=np.float64)) * part
+        spread = short.variance(level * part) + part**2 * long.variance(level)
+        variance += float(spread[chosen].sum(dtype=np.float64))
+    if expected <= 0.0 or have <= 0.0:
+        return None
+    return Ratio(have / expected, sqrt(variance) / expected)
+
+
+def smooth_any(flags: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return where a pixel or a neighbour of it is flagged."""
+    return np.asarray(smooth(flags.astype(np.float32)) > 0.0)

@@ -1,0 +1,244 @@
+"""How well a number of a photograph is known: photons, reading, digits; and how to find that from the photographs.
+
+A number x above black stands for x g electrons. Its variance is x / g + (s / g)^2 + q^2 / 12: photons are counted
+(Poisson), s is the read noise in electrons, q the step between two numbers (Janesick, "Photon Transfer", 2007,
+chapters 4 and 5).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from math import sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import FlarewrightError
+from ..model.capture import CameraNoise
+
+Floats = NDArray[np.float64]
+Band = NDArray[np.float32]
+
+# bins of signal, and the fewest samples and bins that make a fit
+_BINS, _FEWEST, _FEWEST_BINS = 40, 200, 4
+# smoothing side: what a pixel's own noise contributes to the level that its variance is read from is one ninth
+_SIDE = 3
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Variance of a number x above black: `slope` * max(x, 0) + `floor`.
+
+    Attributes
+    ----------
+    slope : float
+        1 / electrons per unit.
+    floor : float
+        Of reading and digits, units squared.
+    """
+
+    slope: float
+    floor: float
+
+    def variance(self, units: NDArray[np.floating]) -> NDArray[np.floating]:
+        """Return the variance of numbers above black whose mean is `units`."""
+        return np.asarray(np.maximum(units, 0.0) * self.slope + self.floor)
+
+
+def noise_of(camera: CameraNoise, iso: float, step: float) -> Noise:
+    """Return the noise at an ISO.
+
+    Parameters
+    ----------
+    camera : CameraNoise
+        With `electrons_per_unit` and `read_noise`.
+    iso : float
+        Electrons per unit fall as 1 / iso; the read noise in electrons is taken as the same.
+    step : float
+        Between two numbers of the file.
+
+    Returns
+    -------
+    Noise
+
+    Raises
+    ------
+    FlarewrightError
+        When the camera's noise is not known.
+    """
+    if camera.electrons_per_unit is None or camera.read_noise is None:
+        raise FlarewrightError("the camera's noise is unknown; give electrons_per_unit and read_noise in camera.json")
+    slope = iso / camera.iso / camera.electrons_per_unit
+    return Noise(slope, (camera.read_noise * slope) ** 2 + step**2 / 12.0)
+
+
+def smooth(band: NDArray[np.floating], side: int = _SIDE) -> NDArray[np.floating]:
+    """Return means over squares of pixels, the border repeated; shape (height, width, 3) as given."""
+    half = side // 2
+    padded = np.pad(band, ((half, half), (half, half), (0, 0)), mode="edge")
+    height, width = band.shape[:2]
+    rows = np.zeros((height, padded.shape[1], 3), band.dtype)
+    for k in range(side):
+        rows += padded[k : k + height]
+    total = np.zeros(band.shape, band.dtype)
+    for k in range(side):
+        total += rows[:, k : k + width]
+    return total / side**2
+
+
+@dataclass(frozen=True)
+class Transfer:
+    """One point of a photon transfer: the spread of differences of readings around one level.
+
+    Attributes
+    ----------
+    level_weight, floor_weight : float
+        The spread is `level_weight` * slope + `floor_weight` * floor.
+    spread : float
+        Measured variance of the differences, units squared.
+    count : int
+        Of differences.
+    """
+
+    level_weight: float
+    floor_weight: float
+    spread: float
+    count: int
+
+
+def transfers(first: Band, second: Band, ratio: float, free: NDArray[np.bool_], samples: float) -> list[Transfer]:
+    """Compare two readings of the same light, in bins of its level.
+
+    Parameters
+    ----------
+    first, second : ndarray of the same shape
+        Numbers above black; `first` has the shorter or an equal exposure.
+    ratio : float
+        What `first` has of the light of `second`, at most 1.
+    free : ndarray of bool
+        Where neither is clipped.
+    samples : float
+        Readings averaged in each number.
+
+    Returns
+    -------
+    list of Transfer
+
+    Notes
+    -----
+    d = first - ratio * second has mean 0 and the variance (1 + ratio) u slope + (1 + ratio^2) floor at the level u of
+    `first`. Textbooks take two flats of the same exposure, ratio 1.
+    """
+    level = (ratio * second[free]).astype(np.float64)
+    difference = first[free].astype(np.float64) - level
+    if level.size < _FEWEST:
+        return []
+    edges = np.unique(np.quantile(level, np.linspace(0.0, 1.0, _BINS + 1)))
+    found = []
+    for low, high in pairwise(edges):
+        inside = (level >= low) & (level < high)
+        count = int(inside.sum())
+        if count >= _FEWEST:
+            spread = float(difference[inside].var(ddof=1)) * samples
+            found.append(Transfer((1.0 + ratio) * float(level[inside].mean()), 1.0 + ratio**2, spread, count))
+    return found
+
+
+def fit_transfer(points: Sequence[Transfer], camera: CameraNoise, step: float) -> CameraNoise:
+    """Find electrons per unit and read noise.
+
+    Parameters
+    ----------
+    points : sequence of Transfer
+    camera : CameraNoise
+        Its `iso` is that of the readings; what it knows already stays.
+    step : float
+        Between two numbers of the file.
+
+    Returns
+    -------
+    CameraNoise
+        With both numbers and their standard errors.
+
+    Raises
+    ------
+    FlarewrightError
+        When the photographs cannot tell.
+
+    Notes
+    -----
+    Weighted least squares; the variance of a measured variance v of n samples is 2 v^2 / (n - 1), taken at the fitted
+    v so that low values do not draw the fit.
+    """
+    usable = [point for point in points if np.isfinite(point.spread) and point.spread > 0.0]
+    remedy = "give electrons_per_unit and read_noise in camera.json, or add dark frames"
+    if len(usable) < _FEWEST_BINS:
+        raise FlarewrightError(f"the photographs do not tell the camera's noise, too few pixels overlap; {remedy}")
+    A = np.array([[point.level_weight, point.floor_weight] for point in usable])
+    v = np.array([point.spread for point in usable])
+    n = np.array([point.count for point in usable], dtype=np.float64)
+    fitted, covariance = v, np.eye(2)
+    for _ in range(8):
+        weight = (n - 1.0) / (2.0 * fitted**2)
+        covariance = np.linalg.pinv((A.T * weight) @ A)
+        slope, floor = covariance @ (A.T * weight) @ v
+        fitted = np.maximum(A @ [slope, floor], 1e-3 * v)
+    # points that scatter more than their count explains widen the errors
+    covariance = covariance * max(1.0, float(np.mean((v - fitted) ** 2 * (n - 1.0) / (2.0 * fitted**2))))
+    if not slope > 0.0:
+        raise FlarewrightError(f"the photographs' noise does not grow with the light, so it cannot be told; {remedy}")
+    return _as_camera(float(slope), float(floor), covariance, camera, step)
+
+
+def _as_camera(slope: float, floor: float, covariance: Floats, camera: CameraNoise, step: float) -> CameraNoise:
+    gain = 1.0 / slope
+    reading = max(floor - step**2 / 12.0, 0.0)
+    read_noise = gain * sqrt(reading)
+    # s = sqrt(floor - q^2/12) / slope
+    by_slope = -read_noise / slope
+    by_floor = gain / (2.0 * sqrt(reading)) if reading > 0.0 else 0.0
+    gradient = np.array([by_slope, by_floor])
+    known: CameraNoise = camera.replace(
+        electrons_per_unit=camera.electrons_per_unit or gain,
+        electrons_per_unit_error=None if camera.electrons_per_unit else gain**2 * sqrt(covariance[0, 0]),
+        read_noise=read_noise if camera.read_noise is None else camera.read_noise,
+        read_noise_error=sqrt(gradient @ covariance @ gradient) if camera.read_noise is None else None,
+    )
+    return known
+
+
+def common_black(pairs: Iterable[tuple[Band, Band, NDArray[np.bool_]]]) -> float | None:
+    """Find the black level from pairs of exposures of the same light: where both straight lines start.
+
+    Parameters
+    ----------
+    pairs : iterable of (first, second, free)
+        Numbers as read, of a shorter and a longer exposure, and where neither is clipped.
+
+    Returns
+    -------
+    float or None
+        None when they do not tell.
+
+    Notes
+    -----
+    first = ratio * second + (1 - ratio) * black: slope and intercept of the means of bins of `second`.
+    """
+    found = []
+    for first, second, free in pairs:
+        x, y = second[free].astype(np.float64), first[free].astype(np.float64)
+        if x.size < _FEWEST * _FEWEST_BINS:
+            continue
+        order = np.argsort(x, kind="stable")
+        bins = np.array_split(order, _BINS)
+        bx, by = np.array([x[one].mean() for one in bins]), np.array([y[one].mean() for one in bins])
+        error = np.array([max(float(y[one].std()), 1e-12) / sqrt(one.size) for one in bins])
+        (ratio, start), covariance = np.polyfit(bx, by, 1, w=1.0 / error, cov="unscaled")
+        if ratio < 0.9 and np.ptp(bx) > 0.0:
+            found.append((start / (1.0 - ratio), covariance[1, 1] / (1.0 - ratio) ** 2))
+    if not found:
+        return None
+    values, variances = np.array(found).T
+    return float(np.average(values, weights=1.0 / np.maximum(variances, 1e-12)))
