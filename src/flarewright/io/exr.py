@@ -235,6 +235,31 @@ def read_exr_plane(path: str | PathLike[str], choices: Sequence[Sequence[str]]) 
     return plane
 
 
+def exr_size(path: str | PathLike[str]) -> tuple[int, int]:
+    """Return the width and height of the first part's pixels without reading them.
+
+    Parameters
+    ----------
+    path : path
+
+    Returns
+    -------
+    tuple of int
+
+    Raises
+    ------
+    OutputError
+        When it is no readable EXR file.
+    """
+    import OpenEXR
+
+    try:
+        low, high = OpenEXR.File(str(path), header_only=True).header()["dataWindow"]
+    except RuntimeError as error:
+        raise OutputError(f"{path} cannot be read as an EXR file: {error}") from error
+    return int(high[0] - low[0]) + 1, int(high[1] - low[1]) + 1
+
+
 def _prefixed(header: Mapping[str, Any], prefix: str) -> dict[str, Any]:
     return {name.removeprefix(prefix): value for name, value in header.items() if name.startswith(prefix)}
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-import numpy as np
 from pydantic import ValidationError
 
 from ..errors import FlarewrightError, OutputError
@@ -73,7 +72,7 @@ def read_frame(folder: Path, info: FrameInfo) -> MergedFrame:
         raise FlarewrightError(f"{path} cannot be read as a merged frame: {again}") from None
     if not {_RADIANCE, _VARIANCE} <= layers.keys() or layers[_RADIANCE].shape != layers[_VARIANCE].shape:
         raise FlarewrightError(f"{path} has no radiance with a variance, so it is no merged frame: {again}")
-    return MergedFrame(info, np.asarray(layers[_RADIANCE]), np.asarray(layers[_VARIANCE]))
+    return MergedFrame(info, layers[_RADIANCE], layers[_VARIANCE])
 
 
 def write_run(folder: Path, run: MergedRun) -> None:

@@ -6,8 +6,10 @@ that the noise of a pixel stays its own. Red and blue then lie a quarter of a pi
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -87,11 +89,11 @@ def open_photo(path: Path, white_level: float | None = None, block: int = 1) -> 
     if suffix in _RAW:
         photo = _open_raw(path, white_level)
     elif suffix in _TIFF:
-        photo = _from_array(path, _tiff_pixels(path), white_level)
+        photo = _from_array(path, _tiff_picture(path), white_level)
     elif suffix == ".npy":
-        photo = _from_array(path, _npy_pixels(path), white_level)
+        photo = _from_array(path, _npy_picture(path), white_level)
     elif suffix == ".exr":
-        photo = _from_array(path, _exr_pixels(path), white_level)
+        photo = _from_array(path, _exr_picture(path), white_level)
     else:
         raise FlarewrightError(
             f"{path} is no photograph in linear numbers; give camera RAW ({', '.join(_RAW[:5])} ...), linear TIFF, EXR "
@@ -141,98 +143,152 @@ def _number(value: Any) -> float:
         return 0.0
 
 
-def _from_array(path: Path, pixels: NDArray[Any], white_level: float | None) -> Photo:
-    if pixels.ndim == 2:
-        pixels = np.broadcast_to(pixels[..., None], (*pixels.shape, 3))
-    if pixels.ndim != 3 or pixels.shape[2] not in (3, 4) or 0 in pixels.shape or pixels.dtype.kind not in "uif":
-        raise FlarewrightError(
-            f"{path} holds {pixels.dtype} {pixels.shape}, no picture: rows, columns and RGB are needed"
-        )
-    if pixels.dtype == np.uint8:
+@dataclass(frozen=True)
+class _Picture:
+    """An array in a file that is not read before it is needed: a run has hundreds of them."""
+
+    shape: tuple[int, ...]
+    dtype: np.dtype[Any]
+    load: Callable[[], NDArray[Any]]
+
+
+def _from_array(path: Path, picture: _Picture, white_level: float | None) -> Photo:
+    shape, dtype = picture.shape, picture.dtype
+    if (
+        len(shape) not in (2, 3)
+        or (len(shape) == 3 and shape[2] not in (3, 4))
+        or 0 in shape
+        or dtype.kind not in "uif"
+    ):
+        raise FlarewrightError(f"{path} holds {dtype} {shape}, no picture: rows, columns and RGB are needed")
+    if dtype == np.uint8:
         raise FlarewrightError(f"{path} has 8 bits a channel, which are not linear: develop it as linear 16-bit TIFF")
-    if white_level is None and pixels.dtype.kind == "u":
-        white_level = float(np.iinfo(pixels.dtype).max)
+    if white_level is None and dtype.kind == "u":
+        white_level = float(np.iinfo(dtype).max)
+    load = lru_cache(maxsize=1)(picture.load)
 
     def rows(low: int, high: int) -> Band:
-        return np.ascontiguousarray(pixels[low:high, :, :3], dtype=np.float32)
+        part = load()[low:high]
+        if part.ndim == 2:
+            part = np.broadcast_to(part[..., None], (*part.shape, 3))
+        return np.ascontiguousarray(part[..., :3], dtype=np.float32)
 
-    step = 0.0 if pixels.dtype.kind == "f" else 1.0
-    return Photo(path, (pixels.shape[1], pixels.shape[0]), rows, white_level=white_level, step=step)
+    return Photo(path, (shape[1], shape[0]), rows, white_level=white_level, step=0.0 if dtype.kind == "f" else 1.0)
 
 
-def _npy_pixels(path: Path) -> NDArray[Any]:
+def _npy_picture(path: Path) -> _Picture:
+    def load() -> NDArray[Any]:
+        try:
+            pixels: NDArray[Any] = np.load(path, mmap_mode="r", allow_pickle=False)
+        except (OSError, ValueError, EOFError):
+            raise FlarewrightError(f"{path} cannot be read as an NPY file: photograph or convert it again") from None
+        return pixels
+
+    pixels = load()
+    return _Picture(pixels.shape, pixels.dtype, load)
+
+
+def _exr_picture(path: Path) -> _Picture:
+    from .exr import exr_size, read_exr
+
+    problem = f"{path} cannot be read as an EXR file with R, G and B: convert it again"
+
+    def load() -> NDArray[Any]:
+        try:
+            return read_exr(path).layers[0].pixels
+        except (OutputError, KeyError, ValueError):
+            raise FlarewrightError(problem) from None
+
     try:
-        pixels: NDArray[Any] = np.load(path, mmap_mode="r", allow_pickle=False)
-    except (OSError, ValueError, EOFError):
-        raise FlarewrightError(f"{path} cannot be read as an NPY file: photograph or convert it again") from None
-    return pixels
+        width, height = exr_size(path)
+    except OutputError:
+        raise FlarewrightError(problem) from None
+    return _Picture((height, width, 3), np.dtype(np.float32), load)
 
 
-def _exr_pixels(path: Path) -> NDArray[Any]:
-    from .exr import read_exr
-
-    try:
-        first = read_exr(path).layers[0]
-    except (OutputError, KeyError, ValueError):
-        raise FlarewrightError(f"{path} cannot be read as an EXR file with R, G and B: convert it again") from None
-    return first.pixels
-
-
-def _tiff_pixels(path: Path) -> NDArray[Any]:
+def _tiff_picture(path: Path) -> _Picture:
     tifffile = _extra("tifffile", path)
+    broken = (OSError, ValueError, KeyError, IndexError, TypeError, RuntimeError, tifffile.TiffFileError)
+
+    def told(error: BaseException) -> FlarewrightError:
+        return FlarewrightError(f"{path} cannot be read as a TIFF file ({_short(error)}): convert it again")
+
+    def load() -> NDArray[Any]:
+        try:
+            if mapped:
+                pixels: NDArray[Any] = tifffile.memmap(path, page=0, mode="r")
+            else:
+                pixels = tifffile.imread(path, key=0)
+        except broken as error:
+            raise told(error) from None
+        return pixels
+
     try:
         with tifffile.TiffFile(path) as file:
             page = file.pages[0]
-            if page.is_memmappable:
-                pixels: NDArray[Any] = tifffile.memmap(path, page=0, mode="r")
-            else:
-                pixels = page.asarray()
-    except (OSError, ValueError, KeyError, IndexError, TypeError, tifffile.TiffFileError) as error:
-        raise FlarewrightError(f"{path} cannot be read as a TIFF file ({_short(error)}): convert it again") from None
-    return pixels
+            mapped = bool(page.is_memmappable)
+            return _Picture(tuple(page.shape), np.dtype(page.dtype), load)
+    except broken as error:
+        raise told(error) from None
 
 
 def _open_raw(path: Path, white_level: float | None) -> Photo:
     rawpy = _extra("rawpy", path)
-    try:
-        with rawpy.imread(str(path)) as raw:
-            if raw.raw_pattern is None or raw.raw_pattern.shape != (2, 2) or raw.raw_image_visible.ndim != 2:
-                raise FlarewrightError(
-                    f"{path} has no mosaic of two by two colours: develop it as linear 16-bit TIFF and give that"
-                )
-            sites = raw.raw_image_visible.copy()
-            colors = [raw.color_desc.decode("ascii", "replace")[k] for k in raw.raw_colors_visible[:2, :2].flat]
-            black = [float(raw.black_level_per_channel[k]) for k in raw.raw_colors_visible[:2, :2].flat]
-            white = float(raw.white_level) if white_level is None else white_level
-            camera = [float(value) for value in raw.camera_whitebalance[:3]]
-    except (rawpy.LibRawError, OSError, ValueError) as error:
-        raise FlarewrightError(f"{path} cannot be read as a RAW file ({_short(error)}): copy it again") from None
+
+    def load() -> NDArray[Any]:
+        with _raw(rawpy, path) as raw:
+            sites: NDArray[Any] = raw.raw_image_visible.copy()
+        return sites
+
+    with _raw(rawpy, path) as raw:
+        pattern = raw.raw_pattern
+        if pattern is None or pattern.shape != (2, 2):
+            raise FlarewrightError(
+                f"{path} has no mosaic of two by two colours: develop it as linear 16-bit TIFF and give that"
+            )
+        sizes = raw.sizes
+        # the pattern is that of the whole sensor; the visible part may begin at an odd row or column
+        order = np.roll(pattern, (-(sizes.top_margin % 2), -(sizes.left_margin % 2)), axis=(0, 1)).ravel()
+        colors = [raw.color_desc.decode("ascii", "replace")[k] for k in order]
+        black = [float(raw.black_level_per_channel[k]) for k in order]
+        white = float(raw.white_level) if white_level is None else white_level
+        camera = [float(value) for value in raw.camera_whitebalance[:3]]
+        size = sizes.width // 2, sizes.height // 2
     if sorted(colors) != ["B", "G", "G", "R"]:
         raise FlarewrightError(f"{path} has photosites {''.join(colors)}, not red, green and blue: develop it as TIFF")
-    balance = tuple(value / camera[1] for value in camera) if min(camera) > 0.0 else (1.0, 1.0, 1.0)
-    return _mosaic(path, sites, colors, black, white, (balance[0], balance[1], balance[2]))
-
-
-def _mosaic(
-    path: Path, sites: NDArray[Any], colors: list[str], black: list[float], white: float,
-    balance: tuple[float, float, float],
-) -> Photo:  # fmt: skip
-    """Make one pixel of two by two photosites."""
-    height, width = sites.shape[0] // 2, sites.shape[1] // 2
-    at = {color: [divmod(k, 2) for k, name in enumerate(colors) if name == color] for color in "RGB"}
+    balance = [value / camera[1] for value in camera] if min(camera) > 0.0 else [1.0, 1.0, 1.0]
     levels = [float(np.mean([black[k] for k, name in enumerate(colors) if name == color])) for color in "RGB"]
+    return Photo(
+        path, size, _mosaic_rows(lru_cache(maxsize=1)(load), colors, size[0], white), (levels[0], levels[1], levels[2]),
+        white, (1, 2, 1), white_balance=(balance[0], balance[1], balance[2]),
+    )  # fmt: skip
+
+
+@contextmanager
+def _raw(rawpy: Any, path: Path) -> Iterator[Any]:
+    try:
+        with rawpy.imread(str(path)) as raw:
+            yield raw
+    except (rawpy.LibRawError, OSError, ValueError) as error:
+        raise FlarewrightError(f"{path} cannot be read as a RAW file ({_short(error)}): copy it again") from None
+
+
+def _mosaic_rows(
+    load: Callable[[], NDArray[Any]], colors: list[str], width: int, white: float
+) -> Callable[[int, int], Band]:
+    """Make one pixel of two by two photosites."""
+    at = {color: [divmod(k, 2) for k, name in enumerate(colors) if name == color] for color in "RGB"}
 
     def rows(low: int, high: int) -> Band:
         band = np.empty((high - low, width, 3), np.float32)
-        part = sites[2 * low : 2 * high, : 2 * width]
+        part = load()[2 * low : 2 * high, : 2 * width]
         for c, color in enumerate("RGB"):
             planes = [part[y::2, x::2].astype(np.float32) for y, x in at[color]]
             mean = np.mean(planes, axis=0)
             band[..., c] = np.where(np.max(planes, axis=0) >= white, np.maximum(mean, white), mean)
         return band
 
-    black_level = (levels[0], levels[1], levels[2])
-    return Photo(path, (width, height), rows, black_level, white, (1, 2, 1), white_balance=balance)
+    return rows
 
 
 def _blocks(photo: Photo, block: int) -> Photo:

@@ -46,8 +46,6 @@ class Sighting:
         Where another light seems to be.
     clipped_share : float
         Part of the pixels that every exposure clipped.
-    glow : float or None
-        Mean of the star around its middle, between 2 and 5 % of the width from it; None when the picture cuts that.
     """
 
     position_px: tuple[float, float]
@@ -57,7 +55,6 @@ class Sighting:
     at_border: bool
     rival_px: tuple[float, float] | None
     clipped_share: float
-    glow: float | None = None
 
 
 def find_light(radiance: Band, variance: Band) -> Sighting:
@@ -95,25 +92,7 @@ def find_light(radiance: Band, variance: Band) -> Sighting:
     row, column = (min(max(int(value) - 7, 0), side) for value, side in ((y, height), (x, width)))
     flux = float(light[row : row + 15, column : column + 15].sum())
     rival = rivals[0] if rivals else None
-    glow = _glow(light, clipped, (x, y))
-    return Sighting((x, y), error, flux, contrast, at_border, rival, float(clipped.mean()), glow)
-
-
-def _glow(light: Floats, clipped: NDArray[np.bool_], middle: tuple[float, float]) -> float | None:
-    height, width = light.shape
-    inner, outer = 0.02 * width, 0.05 * width
-    (x, y), reach = middle, int(outer) + 1
-    if not (reach < x < width - reach and reach < y < height - reach):
-        return None
-    rows, columns = slice(int(y) - reach, int(y) + reach + 1), slice(int(x) - reach, int(x) + reach + 1)
-    far = np.hypot(
-        np.arange(columns.start, columns.stop) + 0.5 - x, (np.arange(rows.start, rows.stop) + 0.5 - y)[:, None]
-    )
-    # both rims are soft, so that the light may stand anywhere within a pixel
-    weight = np.clip(far - inner, 0.0, 1.0) * np.clip(outer - far, 0.0, 1.0)
-    if clipped[rows, columns][weight > 0.0].any():
-        return None
-    return float((weight * light[rows, columns]).sum() / weight.sum())
+    return Sighting((x, y), error, flux, contrast, at_border, rival, float(clipped.mean()))
 
 
 @dataclass(frozen=True)

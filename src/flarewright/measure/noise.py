@@ -79,7 +79,7 @@ def smooth(band: NDArray[np.floating], side: int = _SIDE) -> NDArray[np.floating
     half = side // 2
     padded = np.pad(band, ((half, half), (half, half), (0, 0)), mode="edge")
     height, width = band.shape[:2]
-    rows = np.zeros((height, padded.shape[1], 3), band.dtype)
+    rows = np.zeros((height, *padded.shape[1:]), band.dtype)
     for k in range(side):
         rows += padded[k : k + height]
     total = np.zeros(band.shape, band.dtype)

@@ -22,6 +22,8 @@ _REACH, _STEP = 0.015, 0.5
 _WIDTH = 360
 # how well the star is known, and how alike the two halves of a ghost are
 _STAR, _ALIKE = 0.3, 0.05
+# what no number of frames takes away: ghosts of an iris with an odd number of blades are no mirror images
+_SYSTEMATIC = 0.05
 # the light's surroundings and the picture's far corners say little
 _NEAR_LIGHT = 0.04
 
@@ -124,17 +126,19 @@ def axis_beside_path(
     for frame in frames:
         one = _of_frame(frame, (star, middle), (foot[0] / block, foot[1] / block), normal, offsets)
         if one is not None:
-            found.append(one)
+            arm = hypot(frame.light_px[0] - foot[0] / block, frame.light_px[1] - foot[1] / block)
+            found.append((*one, arm))
     if len(found) < 3:
         return None
-    values, errors = np.array(found).T
+    values, errors, arms = np.array(found).T
     # one bad frame, a ghost cut by the border, must not count for much
     typical = float(np.median(values))
     scatter = max(1.4826 * float(np.median(np.abs(values - typical))), 0.02)
     kept = np.abs(values - typical) < 4.0 * np.maximum(scatter, errors)
-    weight = 1.0 / (errors[kept] ** 2 + scatter**2)
+    # what mirrors badly turns the line by some angle, so a frame is worth more the farther off its light is
+    weight = (arms[kept] / arms[kept].max()) ** 2 / (errors[kept] ** 2 + scatter**2)
     offset = float(np.average(values[kept], weights=weight))
-    return offset * block, sqrt(1.0 / float(weight.sum())) * block
+    return offset * block, hypot(sqrt(1.0 / float(weight.sum())), _SYSTEMATIC) * block
 
 
 def _of_frame(

@@ -116,8 +116,6 @@ class FrameInfo(Frozen):
         Whether it was seen in this frame.
     axis_px : tuple of float
         (x, y) of the optical axis.
-    brightness : float
-        The light's brightness over the run's mean; the pixels are divided by it already.
     exposures_s : tuple of float
         That were merged.
     iso, f_number, focal_mm : float or None
@@ -134,7 +132,6 @@ class FrameInfo(Frozen):
     light_error_px: float = Field(0.0, ge=0.0)
     light_found: bool = True
     axis_px: tuple[float, float]
-    brightness: Positive = 1.0
     exposures_s: tuple[Positive, ...] = ()
     iso: Positive = 100.0
     f_number: Positive | None = None

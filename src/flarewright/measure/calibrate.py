@@ -1,0 +1,265 @@
+"""Settle how the camera turns light into numbers: what is given, what the files tell, what the photographs show."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import FlarewrightError
+from ..io.photo import Photo, open_photo
+from ..model.capture import CameraNoise, Capture
+from .merge import Exposure
+from .noise import Band, Transfer, common_black, fit_transfer, noise_of, smooth, transfers
+
+# so many constellations and bands of rows are looked at
+_GROUPS, _BANDS, _ROWS = 5, 8, 64
+# a top value shared by so many numbers is where the sensor clips
+_PILE = 50
+# fewer dark frames than these give a level, more of them a picture of it
+_DARKS_FOR_PICTURE = 4
+# a flat tells how a pixel differs from the neighbourhood of so many pixels; lens and light are even over it
+_FLAT_SIDE = 31
+# pixels above this part of the brightest are well lit
+_LIT = 0.05
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """What merging needs besides the photographs.
+
+    Attributes
+    ----------
+    camera : CameraNoise
+        Complete.
+    black : ndarray, shape (3,) or (height, width, 3)
+    white : float
+        Infinite when nothing clips.
+    response : ndarray, shape (height, width, 3), or None
+    size_px : tuple of int
+    samples : tuple of int
+    step : float
+    white_balance : tuple of float
+        The camera's own.
+    block : int
+        Pixels averaged a side.
+    remarks : tuple of str
+    """
+
+    camera: CameraNoise
+    black: Band
+    white: float
+    response: Band | None
+    size_px: tuple[int, int]
+    samples: tuple[int, int, int]
+    step: float
+    white_balance: tuple[float, float, float]
+    block: int
+    remarks: tuple[str, ...]
+
+    def exposure(self, photo: Photo, capture: Capture, ratio: float = 1.0) -> Exposure:
+        """Return a photograph ready to be merged; `ratio` is its light over what time and ISO promise."""
+        noise = noise_of(self.camera, capture.iso, self.step)
+        red, green, blue = (type(noise)(noise.slope / n, noise.floor / n) for n in self.samples)
+        seconds = capture.exposure_s * capture.iso / self.camera.iso * ratio
+        return Exposure(photo, seconds, (red, green, blue), self.black, self.white, self.response)
+
+
+def calibrate(captures: Sequence[Capture], folder: Path, camera: CameraNoise, block: int = 1) -> Calibration:
+    """Settle levels and noise.
+
+    Parameters
+    ----------
+    captures : sequence of Capture
+    folder : Path
+        Where their files are.
+    camera : CameraNoise
+        What is known already; it wins.
+    block : int
+        As of `open_photo`.
+
+    Returns
+    -------
+    Calibration
+
+    Raises
+    ------
+    FlarewrightError
+        When files cannot be read or have several sizes, or the noise cannot be told.
+    """
+    lights = [one for one in captures if one.kind == "light"]
+    photos = {one.file: open_photo(folder / one.file, camera.white_level, block) for one in captures}
+    _same_size(photos)
+    first = photos[lights[0].file]
+    iso = Counter(one.iso for one in lights).most_common(1)[0][0]
+    if camera.electrons_per_unit is None:
+        camera = camera.replace(iso=iso)
+    remarks: list[str] = []
+    groups = _some_groups([one for one in lights if one.iso == iso])
+    white = _white(first, camera, [photos[group[-1].file] for group in groups])
+    pairs = [
+        (photos[a.file], photos[b.file], a.exposure_s / b.exposure_s) for group in groups for a, b in pairwise(group)
+    ]
+    darks = [photos[one.file] for one in captures if one.kind == "dark"]
+    black = _black(first, camera, darks, pairs, white, remarks)
+    points = _points(pairs, black, white, first.samples) + _dark_points(darks, first.samples)
+    known = camera
+    if camera.electrons_per_unit is None or camera.read_noise is None:
+        known = fit_transfer(points, camera, first.step)
+        remarks.append(_noise_words(camera, known))
+    level = float(black.reshape(-1, 3).mean())
+    known = known.replace(black_level=level, white_level=white if np.isfinite(white) else None)
+    response = _response([photos[one.file] for one in captures if one.kind == "flat"], black)
+    return Calibration(known, black, white, response, first.size_px, first.samples, first.step, first.white_balance,
+                       block, tuple(remarks))  # fmt: skip
+
+
+def _same_size(photos: dict[str, Photo]) -> None:
+    sizes = Counter(photo.size_px for photo in photos.values())
+    if len(sizes) > 1:
+        usual = sizes.most_common(1)[0][0]
+        odd = next(photo for photo in photos.values() if photo.size_px != usual)
+        raise FlarewrightError(
+            f"{odd.path} has {odd.size_px[0]}x{odd.size_px[1]} pixels, most others have {usual[0]}x{usual[1]}: all "
+            "photographs of a run are of one size"
+        )
+
+
+def _some_groups(lights: Sequence[Capture]) -> list[list[Capture]]:
+    """Return the exposures, shortest first, of a few constellations spread over the run."""
+    groups: dict[tuple[float, float], list[Capture]] = {}
+    for one in lights:
+        groups.setdefault((one.roll_deg, one.constellation_deg or 0.0), []).append(one)
+    every = [sorted(group, key=lambda one: one.exposure_s) for group in groups.values()]
+    chosen = np.unique(np.linspace(0, len(every) - 1, min(_GROUPS, len(every))).round().astype(int))
+    return [every[k] for k in chosen]
+
+
+def _bands(photo: Photo) -> Iterator[tuple[int, int]]:
+    """Return some bands of rows, spread over the picture."""
+    height = photo.size_px[1]
+    rows = min(_ROWS, height)
+    for low in np.unique(np.linspace(0, height - rows, min(_BANDS, -(-height // rows))).astype(int)):
+        yield int(low), int(low) + rows
+
+
+def _white(first: Photo, camera: CameraNoise, longest: Sequence[Photo]) -> float:
+    """Return where the sensor clips: as given, or where many numbers pile up at the top."""
+    if camera.white_level is not None:
+        return camera.white_level
+    top, pile = -np.inf, 0
+    for photo in longest:
+        for low, high in _bands(photo):
+            numbers = photo.rows(low, high)
+            largest = float(numbers.max())
+            if largest > top:
+                top, pile = largest, 0
+            pile += int((numbers == top).sum())
+    if pile >= _PILE:
+        return min(top, first.white_level or np.inf)
+    return first.white_level if first.white_level is not None else float("inf")
+
+
+def _black(
+    first: Photo, camera: CameraNoise, darks: Sequence[Photo], pairs: Sequence[tuple[Photo, Photo, float]],
+    white: float, remarks: list[str],
+) -> Band:  # fmt: skip
+    if darks:
+        width, height = first.size_px
+        picture = np.zeros((height, width, 3))
+        for photo in darks:
+            picture += photo.rows(0, height)
+        picture /= len(darks)
+        if len(darks) >= _DARKS_FOR_PICTURE:
+            return picture.astype(np.float32)
+        return np.asarray(picture.mean(axis=(0, 1)), np.float32)
+    if camera.black_level is not None:
+        return np.full(3, camera.black_level, np.float32)
+    if any(first.black_level) or first.step == 0.0 or first.samples[1] > first.samples[0]:
+        return np.asarray(first.black_level, np.float32)
+    found = common_black(_channels(pairs, white))
+    if found is None:
+        remarks.append("the files do not tell their black level; 0 was taken, give it in camera.json if it is another")
+        return np.zeros(3, np.float32)
+    remarks.append(f"black level {found:.2f}, found where exposures of the same light meet")
+    return np.full(3, found, np.float32)
+
+
+def _channels(
+    pairs: Sequence[tuple[Photo, Photo, float]], white: float
+) -> Iterator[tuple[Band, Band, NDArray[np.bool_]]]:
+    for short, long, _ in pairs:
+        for low, high in _bands(short):
+            a, b = short.rows(low, high), long.rows(low, high)
+            for c in range(3):
+                yield a[..., c], b[..., c], (a[..., c] < 0.9 * white) & (b[..., c] < 0.9 * white)
+
+
+def _points(
+    pairs: Sequence[tuple[Photo, Photo, float]], black: Band, white: float, samples: tuple[int, int, int]
+) -> list[Transfer]:
+    found: list[Transfer] = []
+    for short, long, ratio in pairs:
+        for c in range(3):
+            first, second, free = [], [], []
+            for low, high in _bands(short):
+                level = black[low:high, :, c] if black.ndim == 3 else black[c]
+                a, b = short.rows(low, high)[..., c], long.rows(low, high)[..., c]
+                first.append(a - level)
+                second.append(b - level)
+                free.append((a < 0.9 * white) & (b < 0.9 * white))
+            a, b, chosen = np.concatenate(first), np.concatenate(second), np.concatenate(free)
+            # shutters differ from what they say; where both are well lit shows by how much
+            lit = chosen & (smooth(b[..., None])[..., 0] > _LIT * float(b.max(initial=0.0)))
+            told = float(a[lit].sum()) / float(b[lit].sum()) if lit.sum() > 1000 and b[lit].sum() > 0.0 else ratio
+            honest = told if 0.8 < told / ratio < 1.25 else ratio
+            found += transfers(a, b, min(honest, 1.0), chosen, samples[c])
+    return found
+
+
+def _dark_points(darks: Sequence[Photo], samples: tuple[int, int, int]) -> list[Transfer]:
+    """Compare dark frames of each other: they tell the read noise alone."""
+    found = []
+    for one, other in pairwise(darks):
+        for c in range(3):
+            differences = np.concatenate(
+                [(one.rows(*band) - other.rows(*band))[..., c].ravel() for band in _bands(one)]
+            )
+            spread = float(differences.var(ddof=1)) * samples[c]
+            found.append(Transfer(0.0, 2.0, spread, differences.size))
+    return found
+
+
+def _response(flats: Sequence[Photo], black: Band) -> Band | None:
+    """Return each pixel's answer over that of its neighbourhood.
+
+    What is wider than that is left in: it is the lens' own shading of the direct image, which ghosts do not share.
+    """
+    if not flats:
+        return None
+    width, height = flats[0].size_px
+    total = np.zeros((height, width, 3))
+    for photo in flats:
+        total += photo.rows(0, height) - black
+    around = smooth(total, _FLAT_SIDE)
+    if not (around > 0.0).all():
+        raise FlarewrightError(
+            f"{flats[0].path} is not brighter than black everywhere, so it is no flat: photograph an evenly lit surface"
+        )
+    return np.clip(total / around, 0.25, 4.0).astype(np.float32)
+
+
+def _noise_words(before: CameraNoise, found: CameraNoise) -> str:
+    words = []
+    if before.electrons_per_unit is None:
+        words.append(
+            f"{found.electrons_per_unit:.3g} +- {found.electrons_per_unit_error or 0.0:.2g} electrons per unit"
+        )
+    if before.read_noise is None:
+        words.append(f"read noise {found.read_noise:.3g} +- {found.read_noise_error or 0.0:.2g} electrons")
+    return f"{' and '.join(words)} at ISO {found.iso:g}, found from the photographs"

@@ -1,0 +1,308 @@
+"""The merge stage: from a list of photographs to a folder of merged frames with their geometry.
+
+Each frame is written as soon as it is merged, with a note of what it was made from beside it; a stopped run takes those
+up again whose photographs and settings are the same.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import shutil
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from dataclasses import asdict, dataclass, replace
+from math import hypot
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from ..errors import FlarewrightError, OutputError
+from ..io.atomic import write_atomically
+from ..io.merged import read_frame, write_frame, write_run
+from ..io.photo import open_photo
+from ..model.capture import CameraNoise, Capture, FrameInfo, MergedFrame, MergedRun
+from .calibrate import Calibration, calibrate
+from .geometry import Geometry, Seen, believable, solve_geometry
+from .light import Sighting, find_light
+from .merge import exposure_ratios, merge
+from .symmetry import axis_beside_path, reduced
+
+FRAMES = "frames"
+# raise when the same photographs give other pixels
+_VERSION = 1
+Progress = Callable[[float, str], None]
+
+# a light that a person points at is taken to be right within this, pixels
+_POINTED = 0.5
+# frames compared for the mirror line, and the part of the width by which the light is off the axis in them
+_MIRRORED, _OFF_AXIS = 12, (0.15, 0.08)
+
+
+@dataclass(frozen=True)
+class MergeSettings:
+    """Choices of merging.
+
+    Attributes
+    ----------
+    block : int
+        Average so many by so many pixels into one.
+    white_balance : {"none", "camera"} or tuple of float
+        What red, green and blue are multiplied by: nothing, what the camera says, or these.
+    """
+
+    block: int = 1
+    white_balance: Literal["none", "camera"] | tuple[float, float, float] = "none"
+
+
+@dataclass(frozen=True)
+class _Merged:
+    """A frame on disk, before its geometry is known."""
+
+    file: str
+    group: tuple[Capture, ...]
+    sighting: Sighting
+    clipped_share: float
+
+
+def merge_captures(
+    captures: Sequence[Capture],
+    folder: Path,
+    output: Path,
+    *,
+    camera: CameraNoise | None = None,
+    settings: MergeSettings | None = None,
+    threads: int | None = None,
+    progress: Progress | None = None,
+) -> MergedRun:
+    """Merge all constellations, find the light and the axis, and write everything.
+
+    Parameters
+    ----------
+    captures : sequence of Capture
+    folder : Path
+        Where their files are.
+    output : Path
+        The run's folder; made when it is not there. Frames already in it that fit are kept.
+    camera : CameraNoise, optional
+        What is known of the camera.
+    settings : MergeSettings, optional
+    threads : int, optional
+        All cores when None; the pixels do not depend on it.
+    progress : callable, optional
+        Called with the finished part (0 to 1) and what was finished.
+
+    Returns
+    -------
+    MergedRun
+
+    Raises
+    ------
+    FlarewrightError
+        When photographs cannot be read, are of several sizes or saturated everywhere, or show no light or two.
+    OutputError
+        When the folder cannot be written or is too small.
+    """
+    chosen = settings or MergeSettings()
+    tell = progress or (lambda _part, _words: None)
+    tell(0.0, "looking at the photographs")
+    known = calibrate(captures, folder, camera or CameraNoise(), chosen.block)
+    balance = known.white_balance if chosen.white_balance == "camera" else (1.0, 1.0, 1.0)
+    balance = chosen.white_balance if isinstance(chosen.white_balance, tuple) else balance
+    groups = _groups(captures)
+    output = _folder(output, len(groups), known.size_px)
+    merged = _merge_all(groups, folder, output, known, balance, threads, tell)
+    found = believable([one.sighting for one in merged])
+    tell(0.95, "axis")
+    geometry = _geometry(merged, found, output, known)
+    run = _run(merged, geometry, known, balance)
+    write_run(output, run)
+    tell(1.0, "merged")
+    return run
+
+
+def _groups(captures: Sequence[Capture]) -> list[tuple[Capture, ...]]:
+    """Return the exposures of each constellation, by roll and angle."""
+    groups: dict[tuple[float, float], list[Capture]] = {}
+    for one in captures:
+        if one.kind == "light":
+            groups.setdefault((one.roll_deg, one.constellation_deg or 0.0), []).append(one)
+    return [tuple(groups[key]) for key in sorted(groups)]
+
+
+def _folder(output: Path, frames: int, size_px: tuple[int, int]) -> Path:
+    """Make the run's folder and see that the frames fit on the disk."""
+    if output.exists() and not output.is_dir():
+        raise OutputError(f"{output} is a file; give a folder for the run")
+    try:
+        (output / FRAMES).mkdir(parents=True, exist_ok=True)
+        free = shutil.disk_usage(output).free
+    except OSError as error:
+        raise OutputError(f"cannot make the folder {output}: {(error.strerror or str(error)).lower()}") from None
+    missing = frames - len(list((output / FRAMES).glob("frame-*.exr")))
+    needed = max(missing, 0) * size_px[0] * size_px[1] * 6 * 4
+    if needed > free:
+        raise OutputError(
+            f"{output} has {free / 1e9:.1f} GB left, and {missing} frames may need {needed / 1e9:.1f} GB: free some "
+            "space, choose another folder, or average pixels with --block 2"
+        )
+    return output
+
+
+def _merge_all(
+    groups: Sequence[tuple[Capture, ...]], folder: Path, output: Path, known: Calibration,
+    balance: tuple[float, float, float], threads: int | None, tell: Progress,
+) -> list[_Merged]:  # fmt: skip
+    common = _digest([
+        _VERSION, known.camera.model_dump(), known.white, known.step, balance, known.size_px, known.block,
+        _array_digest(known.black), _array_digest(known.response),
+    ])  # fmt: skip
+    merged: dict[int, _Merged] = {}
+    with ThreadPoolExecutor(max_workers=threads or os.cpu_count() or 1) as pool:
+        jobs = {
+            pool.submit(_frame, k, group, folder, output, known, balance, common): k for k, group in enumerate(groups)
+        }
+        try:
+            for job in as_completed(jobs):
+                merged[jobs[job]] = job.result()
+                tell(0.02 + 0.93 * len(merged) / len(groups), f"frame {len(merged)} of {len(groups)}")
+        except BaseException:
+            # an interrupt or a broken file: what has not begun need not
+            pool.shutdown(wait=True, cancel_futures=True)
+            raise
+    return [merged[k] for k in range(len(groups))]
+
+
+def _frame(
+    number: int, group: tuple[Capture, ...], folder: Path, output: Path, known: Calibration,
+    balance: tuple[float, float, float], common: str,
+) -> _Merged:  # fmt: skip
+    """Merge one constellation, or take it up from an earlier run."""
+    file = f"{FRAMES}/frame-{number:03d}.exr"
+    note = output / f"{FRAMES}/frame-{number:03d}.json"
+    stamps = [(folder / one.file).stat() for one in group]
+    digest = _digest([common, [one.model_dump() for one in group], [(s.st_size, s.st_mtime_ns) for s in stamps]])
+    kept = _kept(note, digest) if (output / file).is_file() else None
+    if kept is not None:
+        return _Merged(file, group, kept, kept.clipped_share)
+    shots = [known.exposure(open_photo(folder / one.file, _white_of(known), known.block), one) for one in group]
+    ratios = exposure_ratios(shots)
+    shots = [replace(one, seconds=one.seconds * ratio.value) for one, ratio in zip(shots, ratios, strict=True)]
+    mean, variance = merge(shots)
+    # 1 fills the sensor in a second
+    full = float(np.mean(shots[0].full)) if np.isfinite(known.white) else 1.0
+    scale = np.asarray(balance, np.float32) / np.float32(full)
+    mean, variance = mean * scale, variance * scale**2
+    sighting = find_light(mean, variance)
+    pointed = next((one for one in group if one.light_x_px is not None), None)
+    if pointed is not None and pointed.light_x_px is not None and pointed.light_y_px is not None:
+        place = (pointed.light_x_px, pointed.light_y_px)
+        sighting = replace(sighting, position_px=place, error_px=_POINTED, at_border=False, rival_px=None)
+    info = FrameInfo(file=file, constellation_deg=group[0].constellation_deg or 0.0, nominal_deg=0.0,
+                     light_px=sighting.position_px, axis_px=(0.0, 0.0))  # fmt: skip
+    write_frame(output, MergedFrame(info, mean, variance))
+    facts = {"digest": digest, "sighting": asdict(sighting), "ratios": [asdict(one) for one in ratios]}
+    write_atomically(note, lambda temporary: _write(temporary, json.dumps(facts) + "\n"))
+    return _Merged(file, group, sighting, sighting.clipped_share)
+
+
+def _white_of(known: Calibration) -> float | None:
+    return known.white if np.isfinite(known.white) else None
+
+
+def _write(path: Path, text: str) -> None:
+    path.write_text(text, "utf-8")
+
+
+def _digest(facts: Any) -> str:
+    return hashlib.sha256(json.dumps(facts, sort_keys=True, default=str).encode()).hexdigest()
+
+
+def _array_digest(array: np.ndarray[Any, Any] | None) -> str:
+    return "" if array is None else hashlib.sha256(np.ascontiguousarray(array).tobytes()).hexdigest()
+
+
+def _kept(note: Path, digest: str) -> Sighting | None:
+    """Return what an earlier run noted of a frame made from the same photographs in the same way."""
+    try:
+        data = json.loads(note.read_text("utf-8"))
+        if data["digest"] != digest:
+            return None
+        facts = data["sighting"]
+        pair = facts["rival_px"]
+        return Sighting(
+            **{
+                **facts,
+                "position_px": (float(facts["position_px"][0]), float(facts["position_px"][1])),
+                "rival_px": None if pair is None else (float(pair[0]), float(pair[1])),
+            }
+        )
+    except (OSError, ValueError, KeyError, TypeError, IndexError):
+        return None
+
+
+def _geometry(merged: Sequence[_Merged], found: Sequence[bool], output: Path, known: Calibration) -> Geometry:
+    seen = [
+        Seen(one.group[0].constellation_deg or 0.0, one.group[0].roll_deg,
+             one.sighting.position_px if visible else None, one.sighting.error_px)
+        for one, visible in zip(merged, found, strict=True)
+    ]  # fmt: skip
+    visible = [one for one, there in zip(merged, found, strict=True) if there]
+
+    def across(foot: tuple[float, float], normal: tuple[float, float]) -> tuple[float, float] | None:
+        arms = [hypot(one.sighting.position_px[0] - foot[0], one.sighting.position_px[1] - foot[1]) for one in visible]
+        far: list[_Merged] = []
+        for least in _OFF_AXIS:
+            if len(far) < 4:
+                far = [one for one, arm in zip(visible, arms, strict=True) if arm > least * known.size_px[0]]
+        frames = []
+        for k in np.unique(np.linspace(0, len(far) - 1, min(_MIRRORED, len(far))).round().astype(int)):
+            one = far[int(k)]
+            info = FrameInfo(file=one.file, constellation_deg=0.0, nominal_deg=0.0, light_px=one.sighting.position_px,
+                             axis_px=foot)  # fmt: skip
+            frame = read_frame(output, info)
+            frames.append(reduced(frame.radiance, frame.variance, one.sighting.position_px))
+        return axis_beside_path(frames, foot, normal)
+
+    first = merged[0].group[0]
+    pitch = known.camera.pitch_um
+    focal_px = first.focal_mm * 1000.0 / pitch if first.focal_mm is not None and pitch is not None else None
+    return solve_geometry(seen, known.size_px, across, focal_px)
+
+
+def _run(
+    merged: Sequence[_Merged], geometry: Geometry, known: Calibration, balance: tuple[float, float, float]
+) -> MergedRun:
+    frames = []
+    for one, placed in zip(merged, geometry.placed, strict=True):
+        first = one.group[0]
+        frames.append(
+            FrameInfo(
+                file=one.file, constellation_deg=placed.constellation_deg,
+                nominal_deg=first.constellation_deg or 0.0, roll_deg=placed.roll_deg, nominal_roll_deg=first.roll_deg,
+                light_px=placed.light_px, light_error_px=placed.light_error_px, light_found=placed.light_found,
+                axis_px=geometry.axis_px, iso=first.iso, f_number=first.f_number,
+                exposures_s=tuple(capture.exposure_s for capture in one.group), focal_mm=first.focal_mm,
+                clipped_share=one.clipped_share,
+            )
+        )  # fmt: skip
+    return MergedRun(
+        size_px=known.size_px, frames=tuple(frames), axis_px=geometry.axis_px, axis_error_px=geometry.axis_error_px,
+        px_per_rad=geometry.px_per_rad, camera=known.camera, reference_iso=known.camera.iso,
+        reference_f_number=merged[0].group[0].f_number, white_balance=balance,
+        remarks=(*known.remarks, *geometry.remarks),
+    )  # fmt: skip
+
+
+def check_same_run(output: Path) -> None:
+    """Refuse a folder that holds something else than a run.
+
+    Raises
+    ------
+    FlarewrightError
+        When it is not empty and no run.
+    """
+    if output.is_dir() and any(output.iterdir()) and not (output / FRAMES).is_dir():
+        raise FlarewrightError(f"{output} is not empty and holds no run; choose another folder")
