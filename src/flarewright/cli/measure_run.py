@@ -1,0 +1,185 @@
+"""`flarewright measure merge` and `run`: from photographs to merged frames, and on through the later stages."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from ..errors import FlarewrightError
+from .common import print_json, progress_bar, tell
+
+if TYPE_CHECKING:
+    from ..measure.merge_run import MergeSettings
+    from ..model.capture import CameraNoise, MergedRun
+
+MERGE_EPILOG = (
+    "Examples:\n\nflarewright measure merge captures.csv -o run\n\n"
+    "flarewright measure merge photos/ --angles 0+0.2 --block 4 -o run"
+)
+RUN_EPILOG = "Example:\n\nflarewright measure run captures.csv -o run"
+
+# in their order; later stages need the earlier ones
+STAGES = ("merge",)
+
+Captures = Annotated[
+    Path, typer.Argument(metavar="CAPTURES", help="captures.csv, or a folder of photographs with --angles.")
+]
+Output = Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="Folder for everything that is made.")]
+Camera = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="FILE", help="Black and white level, noise (JSON); camera.json beside the list if it is there."
+    ),
+]
+Angles = Annotated[
+    str | None, typer.Option(metavar="START+STEP", help="Degrees, for a list without constellation_deg.")
+]
+Block = Annotated[int, typer.Option(min=1, max=64, help="Average so many by so many pixels into one.")]
+WhiteBalance = Annotated[
+    str, typer.Option(metavar="none|camera|R,G,B", help="What red, green and blue are multiplied by.")
+]
+Threads = Annotated[int | None, typer.Option(min=1, help="All cores when left out; the pixels do not depend on it.")]
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
+
+
+def merge(
+    captures: Captures,
+    output: Output,
+    camera: Camera = None,
+    angles: Angles = None,
+    block: Block = 1,
+    white_balance: WhiteBalance = "none",
+    threads: Threads = None,
+    as_json: Json = False,
+) -> None:
+    """Merge exposures in linear light, and find the light, the optical axis and the camera's noise.
+
+    Goes on where an earlier run into the same folder was stopped.
+    """
+    run = _merge(captures, output, camera, angles, _settings(block, white_balance), threads)
+    tell(run.remarks)
+    if as_json:
+        print_json({"folder": str(output), "stages": ["merge"], "merge": summary(run)})
+    else:
+        print(words(run, output))
+
+
+def run(
+    captures: Captures,
+    output: Output,
+    stages: Annotated[str, typer.Option(help=f"Which, by commas, of {','.join(STAGES)}.")] = ",".join(STAGES),
+    camera: Camera = None,
+    angles: Angles = None,
+    block: Block = 1,
+    white_balance: WhiteBalance = "none",
+    threads: Threads = None,
+    as_json: Json = False,
+) -> None:
+    """Run the stages of a measurement one after the other; what is finished already is kept."""
+    chosen = chosen_stages(stages)
+    settings = _settings(block, white_balance)
+    facts: dict[str, Any] = {"folder": str(output), "stages": chosen}
+    if "merge" in chosen:
+        merged = _merge(captures, output, camera, angles, settings, threads)
+        tell(merged.remarks)
+        facts["merge"] = summary(merged)
+        if not as_json:
+            print(words(merged, output))
+    if as_json:
+        print_json(facts)
+
+
+def chosen_stages(text: str) -> list[str]:
+    """Return the stages of a text like "merge,find", in their own order.
+
+    Raises
+    ------
+    FlarewrightError
+        When one is unknown.
+    """
+    wanted = [word.strip() for word in text.split(",") if word.strip()]
+    unknown = [word for word in wanted if word not in STAGES]
+    if unknown or not wanted:
+        raise FlarewrightError(f"--stages {text!r}: {unknown[0] if unknown else 'nothing'} is no stage; choose from "
+                               f"{', '.join(STAGES)}")  # fmt: skip
+    return [stage for stage in STAGES if stage in wanted]
+
+
+def _settings(block: int, white_balance: str) -> MergeSettings:
+    from ..measure.merge_run import MergeSettings
+
+    if white_balance in ("none", "camera"):
+        return MergeSettings(block, "camera" if white_balance == "camera" else "none")
+    try:
+        red, green, blue = (float(part) for part in white_balance.split(","))
+    except ValueError:
+        red = green = blue = 0.0
+    if not all(0.0 < value < 1e3 for value in (red, green, blue)):
+        raise FlarewrightError(
+            f"--white-balance {white_balance!r} is neither none nor camera nor three numbers above 0"
+        )
+    return MergeSettings(block, (red, green, blue))
+
+
+def _merge(
+    captures: Path, output: Path, camera: Path | None, angles: str | None, settings: MergeSettings, threads: int | None
+) -> MergedRun:
+    from ..io.captures import captures_folder, parse_rule, read_captures
+    from ..measure.merge_run import check_same_run, merge_captures
+    from ..measure.overview import write_overview
+
+    if not captures.exists():
+        raise FlarewrightError(f"{captures} does not exist: check the path and the spelling")
+    rule = None if angles is None else parse_rule(angles)
+    known = _camera(captures, camera)
+    check_same_run(output)
+    with progress_bar() as begin:
+        begun = begin("merge")
+        begun(0.0, "reading the list")
+        listed = read_captures(captures, rule)
+        merged = merge_captures(
+            listed, captures_folder(captures), output, camera=known, settings=settings, threads=threads, progress=begun
+        )
+        write_overview(output, merged)
+    return merged
+
+
+def _camera(captures: Path, camera: Path | None) -> CameraNoise | None:
+    from ..io.captures import captures_folder, read_camera
+
+    if camera is None:
+        beside = captures_folder(captures) / "camera.json"
+        return read_camera(beside) if beside.is_file() else None
+    return read_camera(camera)
+
+
+def summary(run: MergedRun) -> dict[str, Any]:
+    """Return the facts of a merged run for JSON."""
+    seen = [frame for frame in run.frames if frame.light_found]
+    off_axis = [frame for frame in seen if abs(frame.constellation_deg) > 1.0]
+    return {
+        "frames": len(run.frames),
+        "light_found": len(seen),
+        "size_px": list(run.size_px),
+        "axis_px": list(run.axis_px),
+        "axis_error_px": list(run.axis_error_px),
+        "px_per_rad": run.px_per_rad,
+        "horizon_deg": [frame.horizon_deg for frame in off_axis],
+        "largest_angle_correction_deg": max(abs(f.constellation_deg - f.nominal_deg) for f in run.frames),
+        "clipped_share": max(frame.clipped_share for frame in run.frames),
+        "camera": run.camera.model_dump(exclude={"schema_version"}),
+        "remarks": list(run.remarks),
+    }
+
+
+def words(run: MergedRun, folder: Path) -> str:
+    """Say in a few lines what merging found."""
+    seen = sum(frame.light_found for frame in run.frames)
+    (x, y), (dx, dy) = run.axis_px, run.axis_error_px
+    return (
+        f"{folder}: {len(run.frames)} frames of {run.size_px[0]}x{run.size_px[1]} pixels, the light seen in {seen}; "
+        f"axis at ({x:.2f} +- {dx:.2f}, {y:.2f} +- {dy:.2f}), {run.px_per_rad:.1f} pixels per radian; "
+        f"see {folder / 'merged.png'}"
+    )

@@ -1,0 +1,84 @@
+"""One picture of a merged run: all frames laid over each other, with what was found drawn on top."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..io.merged import read_frame
+from ..io.png import write_png
+from ..model.capture import MergedRun
+
+Floats = NDArray[np.float64]
+
+OVERVIEW = "merged.png"
+# at most so wide, and so many frames
+_WIDTH, _FRAMES = 960, 24
+# decades of light from black to white
+_DECADES = 4.0
+_AXIS, _LIGHT, _GUESSED, _PATH = (90, 220, 255), (255, 90, 60), (160, 120, 255), (90, 220, 120)
+
+
+def write_overview(folder: Path, run: MergedRun) -> None:
+    """Draw `merged.png`: the brightest of all frames on a logarithmic scale, the axis, the light's places and path.
+
+    Parameters
+    ----------
+    folder : Path
+        Of the run.
+    run : MergedRun
+
+    Raises
+    ------
+    FlarewrightError
+        When a frame cannot be read or the picture not be written.
+
+    Notes
+    -----
+    Red rings: the light where it was seen; violet rings: where it must be; blue cross: the optical axis, its arms three
+    standard errors or at least 6 pixels; green: the mirror lines of the first and the last frame that shows the light.
+    """
+    picture, block = _laid_over(folder, run)
+    shown = _toned(picture)
+    seen = [frame for frame in run.frames if frame.light_found]
+    axis = run.axis_px[0] / block, run.axis_px[1] / block
+    for frame in (seen[0], seen[-1]) if seen else ():
+        reach = np.linspace(-2.0, 2.0, 4 * max(shown.shape)) * max(shown.shape)
+        _dots(shown, axis[0] + reach * frame.direction[0], axis[1] + reach * frame.direction[1], _PATH, part=0.5)
+    for frame in run.frames:
+        angle = np.linspace(0.0, 2.0 * np.pi, 60)
+        x, y = frame.light_px[0] / block, frame.light_px[1] / block
+        _dots(shown, x + 4.0 * np.cos(angle), y + 4.0 * np.sin(angle), _LIGHT if frame.light_found else _GUESSED)
+    for k, unit in enumerate(((1.0, 0.0), (0.0, 1.0))):
+        arm = np.linspace(-1.0, 1.0, 200) * max(6.0, 3.0 * run.axis_error_px[k] / block)
+        _dots(shown, axis[0] + arm * unit[0], axis[1] + arm * unit[1], _AXIS)
+    write_png(folder / OVERVIEW, shown, {"Description": "logarithmic, four decades; red: light, blue: optical axis"})
+
+
+def _laid_over(folder: Path, run: MergedRun) -> tuple[Floats, int]:
+    """Return the brightest of some frames at each pixel, reduced, and how many pixels became one."""
+    width, height = run.size_px
+    block = -(-width // _WIDTH)
+    brightest = np.zeros((height // block, width // block, 3))
+    for k in np.unique(np.linspace(0, len(run.frames) - 1, min(_FRAMES, len(run.frames))).round().astype(int)):
+        light = read_frame(folder, run.frames[int(k)]).radiance
+        part = light[: brightest.shape[0] * block, : brightest.shape[1] * block].astype(np.float64)
+        parts = part.reshape(brightest.shape[0], block, brightest.shape[1], block, 3)
+        brightest = np.maximum(brightest, parts.mean(axis=(1, 3)))
+    return brightest, block
+
+
+def _toned(light: Floats) -> NDArray[np.uint8]:
+    dark = max(float(np.percentile(light, 5)), 1e-12)
+    level = np.log10(np.maximum(light, dark) / dark) / _DECADES
+    return np.asarray(np.clip(level * 235.0 + 10.0, 0.0, 255.0).astype(np.uint8))
+
+
+def _dots(picture: NDArray[np.uint8], x: Floats, y: Floats, color: tuple[int, int, int], part: float = 1.0) -> None:
+    """Colour the pixels at (x, y) that lie in the picture."""
+    i, j = np.floor(x).astype(np.int64), np.floor(y).astype(np.int64)
+    inside = (i >= 0) & (j >= 0) & (i < picture.shape[1]) & (j < picture.shape[0])
+    i, j = i[inside], j[inside]
+    picture[j, i] = ((1.0 - part) * picture[j, i] + part * np.array(color)).astype(np.uint8)
