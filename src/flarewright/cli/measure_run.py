@@ -102,7 +102,7 @@ def chosen_stages(text: str) -> list[str]:
     wanted = [word.strip() for word in text.split(",") if word.strip()]
     unknown = [word for word in wanted if word not in STAGES]
     if unknown or not wanted:
-        raise FlarewrightError(f"--stages {text!r}: {unknown[0] if unknown else 'nothing'} is no stage; choose from "
+        raise FlarewrightError(f"--stages {text!r}: {(unknown[0] if unknown else text)!r} is no stage; choose from "
                                f"{', '.join(STAGES)}")  # fmt: skip
     return [stage for stage in STAGES if stage in wanted]
 

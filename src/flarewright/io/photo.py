@@ -6,10 +6,12 @@ that the noise of a pixel stays its own. Red and blue then lie a quarter of a pi
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -124,15 +126,22 @@ def photo_facts(path: Path) -> dict[str, float]:
         return {}
     from PIL import Image
 
-    # most RAW formats are TIFF inside, and Pillow reads their EXIF without the picture
+    # most RAW formats are TIFF inside; Pillow reads their tags even where it cannot read the picture
+    tags: dict[int, Any] = {}
+    exif = Image.Exif()
     try:
-        with Image.open(path) as image:
-            tags = image.getexif()
-            table = {**tags, **tags.get_ifd(_EXIF_IFD)}
-    except (OSError, ValueError, SyntaxError):
-        table = {}
-    facts = {name: _number(table[tag]) for tag, name in _EXIF.items() if tag in table}
-    return {name: value for name, value in facts.items() if value > 0.0}
+        with path.open("rb") as file:
+            exif.load_from_fp(file)
+            tags = {**exif, **exif.get_ifd(_EXIF_IFD)}
+    except (OSError, ValueError, SyntaxError, KeyError, TypeError, EOFError, struct.error):
+        pass  # another container, which the RAW decoder may know
+    facts = {name: _number(tags[tag]) for tag, name in _EXIF.items() if tag in tags}
+    if "exposure_s" not in facts and suffix in _RAW:
+        with _raw(_extra("rawpy", path), path) as raw:
+            other = getattr(raw, "other", None)
+            names = {"exposure_s": "shutter", "iso": "iso_speed", "f_number": "aperture", "focal_mm": "focal_len"}
+            facts = {name: _number(getattr(other, field, 0.0)) for name, field in names.items()}
+    return {name: value for name, value in facts.items() if 0.0 < value < inf}
 
 
 def _number(value: Any) -> float:

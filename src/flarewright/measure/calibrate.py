@@ -15,7 +15,7 @@ from ..errors import FlarewrightError
 from ..io.photo import Photo, open_photo
 from ..model.capture import CameraNoise, Capture
 from .merge import Exposure
-from .noise import Band, Transfer, common_black, fit_transfer, noise_of, smooth, transfers
+from .noise import LEVEL_SIDE, Band, Noise, Transfer, common_black, fit_transfer, noise_of, smooth, transfers
 
 # so many constellations and bands of rows are looked at
 _GROUPS, _BANDS, _ROWS = 5, 8, 64
@@ -38,6 +38,8 @@ class Calibration:
     camera : CameraNoise
         Complete.
     black : ndarray, shape (3,) or (height, width, 3)
+    black_noise : float
+        Variance of the picture of black over that of a reading in the dark.
     white : float
         Infinite when nothing clips.
     response : ndarray, shape (height, width, 3), or None
@@ -53,6 +55,7 @@ class Calibration:
 
     camera: CameraNoise
     black: Band
+    black_noise: float
     white: float
     response: Band | None
     size_px: tuple[int, int]
@@ -65,7 +68,8 @@ class Calibration:
     def exposure(self, photo: Photo, capture: Capture, ratio: float = 1.0) -> Exposure:
         """Return a photograph ready to be merged; `ratio` is its light over what time and ISO promise."""
         noise = noise_of(self.camera, capture.iso, self.step)
-        red, green, blue = (type(noise)(noise.slope / n, noise.floor / n) for n in self.samples)
+        floor = noise.floor * (1.0 + self.black_noise)
+        red, green, blue = (Noise(noise.slope / n, floor / n) for n in self.samples)
         seconds = capture.exposure_s * capture.iso / self.camera.iso * ratio
         return Exposure(photo, seconds, (red, green, blue), self.black, self.white, self.response)
 
@@ -102,12 +106,14 @@ def calibrate(captures: Sequence[Capture], folder: Path, camera: CameraNoise, bl
     remarks: list[str] = []
     groups = _some_groups([one for one in lights if one.iso == iso])
     white = _white(first, camera, [photos[group[-1].file] for group in groups])
+    _see_something([photos[group[0].file] for group in groups], white)
     pairs = [
         (photos[a.file], photos[b.file], a.exposure_s / b.exposure_s) for group in groups for a, b in pairwise(group)
     ]
     darks = [photos[one.file] for one in captures if one.kind == "dark"]
     black = _black(first, camera, darks, pairs, white, remarks)
-    points = _points(pairs, black, white, first.samples) + _dark_points(darks, first.samples)
+    black_noise = 1.0 / len(darks) if black.ndim == 3 else 0.0
+    points = _points(pairs, black, white, first.samples, black_noise) + _dark_points(darks, first.samples)
     known = camera
     if camera.electrons_per_unit is None or camera.read_noise is None:
         known = fit_transfer(points, camera, first.step)
@@ -115,8 +121,10 @@ def calibrate(captures: Sequence[Capture], folder: Path, camera: CameraNoise, bl
     level = float(black.reshape(-1, 3).mean())
     known = known.replace(black_level=level, white_level=white if np.isfinite(white) else None)
     response = _response([photos[one.file] for one in captures if one.kind == "flat"], black)
-    return Calibration(known, black, white, response, first.size_px, first.samples, first.step, first.white_balance,
-                       block, tuple(remarks))  # fmt: skip
+    return Calibration(
+        known, black, black_noise, white, response, first.size_px, first.samples, first.step, first.white_balance,
+        block, tuple(remarks),
+    )  # fmt: skip
 
 
 def _same_size(photos: dict[str, Photo]) -> None:
@@ -165,6 +173,19 @@ def _white(first: Photo, camera: CameraNoise, longest: Sequence[Photo]) -> float
     return first.white_level if first.white_level is not None else float("inf")
 
 
+def _see_something(shortest: Sequence[Photo], white: float) -> None:
+    """Refuse photographs of which even the shortest exposures are clipped nearly everywhere."""
+    shares = [
+        np.mean([(photo.rows(*band) >= white).any(axis=2).mean() for band in _bands(photo)]) for photo in shortest
+    ]
+    hopeless = sum(share > 0.5 for share in shares)
+    if hopeless > 0.5 * len(shares):
+        raise FlarewrightError(
+            "the photographs are saturated over more than half of the picture even in the shortest exposure: add "
+            "shorter exposures"
+        )
+
+
 def _black(
     first: Photo, camera: CameraNoise, darks: Sequence[Photo], pairs: Sequence[tuple[Photo, Photo, float]],
     white: float, remarks: list[str],
@@ -182,7 +203,10 @@ def _black(
         return np.full(3, camera.black_level, np.float32)
     if any(first.black_level) or first.step == 0.0 or first.samples[1] > first.samples[0]:
         return np.asarray(first.black_level, np.float32)
-    found = common_black(_channels(pairs, white))
+    found = common_black(
+        (one.first, one.second, one.around, one.free)
+        for short, long, _ in pairs for one in _compared(short, long, white)
+    )  # fmt: skip
     if found is None:
         remarks.append("the files do not tell their black level; 0 was taken, give it in camera.json if it is another")
         return np.zeros(3, np.float32)
@@ -190,35 +214,48 @@ def _black(
     return np.full(3, found, np.float32)
 
 
-def _channels(
-    pairs: Sequence[tuple[Photo, Photo, float]], white: float
-) -> Iterator[tuple[Band, Band, NDArray[np.bool_]]]:
-    for short, long, _ in pairs:
-        for low, high in _bands(short):
-            a, b = short.rows(low, high), long.rows(low, high)
-            for c in range(3):
-                yield a[..., c], b[..., c], (a[..., c] < 0.9 * white) & (b[..., c] < 0.9 * white)
+@dataclass(frozen=True)
+class _Compared:
+    """Some rows of one channel of two exposures of the same light, as read."""
+
+    first: Band
+    second: Band
+    around: Band
+    free: NDArray[np.bool_]
+    rows: tuple[int, int]
+    channel: int
+
+
+def _compared(short: Photo, long: Photo, white: float) -> Iterator[_Compared]:
+    for low, high in _bands(short):
+        a, b = short.rows(low, high), long.rows(low, high)
+        around = smooth(b, LEVEL_SIDE)
+        # near white, noise that would be clipped is missing; a clipped neighbour spoils the mean
+        free = (a < 0.9 * white) & (b < 0.9 * white) & (smooth((b >= white).astype(np.float32), LEVEL_SIDE) == 0.0)
+        for c in range(3):
+            yield _Compared(a[..., c], b[..., c], around[..., c], free[..., c], (low, high), c)
 
 
 def _points(
-    pairs: Sequence[tuple[Photo, Photo, float]], black: Band, white: float, samples: tuple[int, int, int]
-) -> list[Transfer]:
+    pairs: Sequence[tuple[Photo, Photo, float]], black: Band, white: float, samples: tuple[int, int, int],
+    black_noise: float,
+) -> list[Transfer]:  # fmt: skip
     found: list[Transfer] = []
     for short, long, ratio in pairs:
+        bands = list(_compared(short, long, white))
         for c in range(3):
-            first, second, free = [], [], []
-            for low, high in _bands(short):
-                level = black[low:high, :, c] if black.ndim == 3 else black[c]
-                a, b = short.rows(low, high)[..., c], long.rows(low, high)[..., c]
-                first.append(a - level)
-                second.append(b - level)
-                free.append((a < 0.9 * white) & (b < 0.9 * white))
-            a, b, chosen = np.concatenate(first), np.concatenate(second), np.concatenate(free)
+            parts = [one for one in bands if one.channel == c]
+            level = [black[one.rows[0] : one.rows[1], :, c] if black.ndim == 3 else black[c] for one in parts]
+            first, second, around = (
+                np.concatenate([(getattr(one, name) - dark).ravel() for one, dark in zip(parts, level, strict=True)])
+                for name in ("first", "second", "around")
+            )
+            free = np.concatenate([one.free.ravel() for one in parts])
             # shutters differ from what they say; where both are well lit shows by how much
-            lit = chosen & (smooth(b[..., None])[..., 0] > _LIT * float(b.max(initial=0.0)))
-            told = float(a[lit].sum()) / float(b[lit].sum()) if lit.sum() > 1000 and b[lit].sum() > 0.0 else ratio
+            lit = free & (around > _LIT * float(around[free].max(initial=0.0)))
+            told = float(first[lit].sum()) / float(second[lit].sum()) if lit.sum() > 1000 else ratio
             honest = told if 0.8 < told / ratio < 1.25 else ratio
-            found += transfers(a, b, min(honest, 1.0), chosen, samples[c])
+            found += transfers(first, second, around, min(honest, 1.0), free, samples[c], black_noise)
     return found
 
 

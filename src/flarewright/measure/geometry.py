@@ -27,6 +27,8 @@ _LEAST_CONTRAST = 20.0
 _WORST_PATH = 0.02
 # fewer distinct angles do not fix the distortion
 _FOR_DISTORTION = 8
+# and a distortion is believed when it is so many standard errors
+_SURE = 4.0
 # nearer the axis than this the direction to the light says nothing
 _NEAR_PX = 8.0
 # how far the foot may lie beside the axis by nodding, and the axis beside the picture's middle, when nothing else
@@ -96,14 +98,8 @@ def believable(sightings: Sequence[Sighting]) -> list[bool]:
     Raises
     ------
     FlarewrightError
-        No light, two lights, or nothing but clipped pixels.
+        No light, or two lights.
     """
-    hopeless = sum(one.clipped_share > 0.5 for one in sightings)
-    if hopeless > 0.5 * len(sightings):
-        raise FlarewrightError(
-            f"{hopeless} of {len(sightings)} frames are saturated over more than half of the picture, even in the "
-            "shortest exposure: add shorter exposures"
-        )
     best = max(one.flux for one in sightings)
     found = [one.flux > _FAINTEST * best and not one.at_border and one.clipped_share < 0.5 for one in sightings]
     contrast = max((one.contrast for one, seen in zip(sightings, found, strict=True) if seen), default=0.0)
@@ -178,13 +174,24 @@ class _Path:
     """The light's path of one roll: foot, direction, and the law of its distance."""
 
     foot: tuple[float, float]
-    foot_error: float
     direction: tuple[float, float]
     focal_px: float
     cubic_px: float
     jitter_deg: float
     residual_px: float
     count: int
+    covariance: tuple[tuple[float, ...], ...]
+
+    @property
+    def foot_error(self) -> float:
+        """Return the standard error of the foot along the path."""
+        return max(sqrt(max(self.covariance[0][0], 0.0)), 0.01)
+
+    def error(self, t: float) -> float:
+        """Return the standard error of the light's place along the path at t = tan(theta), jitter included."""
+        powers = np.array([1.0, t, t**3][: len(self.covariance)])
+        jitter = radians(self.jitter_deg) * self.focal_px
+        return sqrt(max(float(powers @ np.array(self.covariance) @ powers), 0.0) + jitter**2)
 
     @property
     def normal(self) -> tuple[float, float]:
@@ -213,15 +220,19 @@ def _fit_path(seen: Sequence[Seen]) -> _Path | None:
     roll = radians(seen[0].nominal_roll_deg)
     u = np.array([cos(roll), -sin(roll)])
     along, beside = lights @ u, lights @ np.array([-u[1], u[0]])
-    bends = distinct.size >= _FOR_DISTORTION and np.ptp(distinct) > 5.0
-    A = np.stack([np.ones_like(t), t, t**3], axis=1) if bends else np.stack([np.ones_like(t), t], axis=1)
-    fit, errors, rest = _robust(A, along)
-    side, _, rest_beside = _robust(np.stack([np.ones_like(t), t], axis=1), beside)
+    straight = np.stack([np.ones_like(t), t], axis=1)
+    fit, covariance, rest = _robust(straight, along)
+    cubic = 0.0
+    if distinct.size >= _FOR_DISTORTION:
+        bent = _robust(np.stack([np.ones_like(t), t, t**3], axis=1), along)
+        # a distortion that the jitter explains would only spoil what is foretold beyond the picture
+        if abs(bent[0][2]) > _SURE * sqrt(bent[1][2, 2]):
+            (fit, covariance, rest), cubic = bent, float(bent[0][2])
+    side, _, rest_beside = _robust(straight, beside)
     # the turntable's direction in the picture, and the law along it: the tilt is small
     slope = hypot(fit[1], side[1])
     direction = (fit[1] * u + side[1] * np.array([-u[1], u[0]])) / slope
     foot = fit[0] * u + side[0] * np.array([-u[1], u[0]])
-    cubic = float(fit[2]) if bends else 0.0
     spread = float(np.sqrt(np.mean(np.square([rest, rest_beside]).sum(axis=0))))
     sign = 1.0 if fit[1] >= 0.0 else -1.0
     if sign < 0.0:
@@ -231,13 +242,13 @@ def _fit_path(seen: Sequence[Seen]) -> _Path | None:
         )
     jitter = sqrt(max(float(np.var(rest)) - float(np.mean([one.error_px**2 for one in seen])), 0.0))
     return _Path(
-        (float(foot[0]), float(foot[1])), max(float(errors[0]), 0.01), (float(direction[0]), float(direction[1])),
-        float(slope), cubic, degrees(jitter / slope), spread, len(seen),
+        (float(foot[0]), float(foot[1])), (float(direction[0]), float(direction[1])), float(slope), cubic,
+        degrees(jitter / slope), spread, len(seen), tuple(map(tuple, covariance.tolist())),
     )  # fmt: skip
 
 
 def _robust(A: Floats, y: Floats) -> tuple[Floats, Floats, Floats]:
-    """Fit y = A x with Huber's weights; return x, its standard errors, and the residuals."""
+    """Fit y = A x with Huber's weights; return x, its covariance, and the residuals."""
     weight = np.ones(y.size)
     x = np.zeros(A.shape[1])
     for _ in range(20):
@@ -248,7 +259,7 @@ def _robust(A: Floats, y: Floats) -> tuple[Floats, Floats, Floats]:
     rest = y - A @ x
     freedom = max(y.size - A.shape[1], 1)
     covariance = np.linalg.pinv((A.T * weight) @ A) * float((weight * rest**2).sum()) / freedom
-    return x, np.sqrt(np.maximum(np.diag(covariance), 0.0)), rest
+    return x, covariance, rest
 
 
 def _axis(
@@ -298,7 +309,7 @@ def _place(one: Seen, path: _Path | None, axis: tuple[float, float], other: _Pat
     expected = foot[0] + step * u[0], foot[1] + step * u[1]
     # the light's own error is weighed against the turntable's
     table = max(radians(law.jitter_deg) * law.focal_px, 0.02)
-    error = sqrt(law.foot_error**2 + table**2) if one.light_px is None else one.error_px
+    error = law.error(t) if one.light_px is None else one.error_px
     far = hypot(expected[0] - axis[0], expected[1] - axis[1])
     if one.light_px is None:
         light, distance = expected, far
@@ -328,11 +339,11 @@ def _without_path(
             "the light was seen at one angle only, so its path is unknown: add captures at other angles, or give "
             "focal_mm in captures.csv and pitch_um in camera.json"
         )
-    path = _Path(centre, _OFF_CENTRE * size_px[0], (1.0, 0.0), px_per_rad, 0.0, 0.0, 0.0, 0)
+    error = _OFF_CENTRE * size_px[0]
     placed = []
     for one in frames:
         roll = radians(one.nominal_roll_deg)
-        turned = _Path(centre, path.foot_error, (cos(roll), -sin(roll)), px_per_rad, 0.0, 0.0, 0.0, 0)
-        placed.append(_place(one, turned, centre, turned))
+        path = _Path(centre, (cos(roll), -sin(roll)), px_per_rad, 0.0, 0.0, 0.0, 0, ((error**2,),))
+        placed.append(_place(one, path, centre, path))
     told = "the light was seen at one angle only; the axis is taken to be the middle of the picture"
-    return Geometry(centre, (path.foot_error, path.foot_error), px_per_rad, 0.0, 0.0, tuple(placed), (told,))
+    return Geometry(centre, (error, error), px_per_rad, 0.0, 0.0, tuple(placed), (told,))

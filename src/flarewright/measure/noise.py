@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from math import sqrt
 
 import numpy as np
@@ -25,6 +24,8 @@ Band = NDArray[np.float32]
 _BINS, _FEWEST, _FEWEST_BINS = 40, 200, 4
 # smoothing side: what a pixel's own noise contributes to the level that its variance is read from is one ninth
 _SIDE = 3
+# and where levels are told apart: the larger, the less a pixel's noise sorts it into a bin
+LEVEL_SIDE = 7
 
 
 @dataclass(frozen=True)
@@ -108,19 +109,27 @@ class Transfer:
     count: int
 
 
-def transfers(first: Band, second: Band, ratio: float, free: NDArray[np.bool_], samples: float) -> list[Transfer]:
+def transfers(
+    first: Band, second: Band, around: Band, ratio: float, free: NDArray[np.bool_], samples: float,
+    black_noise: float = 0.0,
+) -> list[Transfer]:  # fmt: skip
     """Compare two readings of the same light, in bins of its level.
 
     Parameters
     ----------
     first, second : ndarray of the same shape
         Numbers above black; `first` has the shorter or an equal exposure.
+    around : ndarray of the same shape
+        Means of `second` over neighbours (`LEVEL_SIDE`): levels are told by these, for bins of a reading itself would
+        sort its noise.
     ratio : float
         What `first` has of the light of `second`, at most 1.
     free : ndarray of bool
         Where neither is clipped.
     samples : float
         Readings averaged in each number.
+    black_noise : float
+        Variance of the picture of black that was taken off both, over that of a reading in the dark.
 
     Returns
     -------
@@ -135,14 +144,12 @@ def transfers(first: Band, second: Band, ratio: float, free: NDArray[np.bool_], 
     difference = first[free].astype(np.float64) - level
     if level.size < _FEWEST:
         return []
-    edges = np.unique(np.quantile(level, np.linspace(0.0, 1.0, _BINS + 1)))
+    bins = np.array_split(np.argsort(around[free], kind="stable"), min(_BINS, level.size // _FEWEST))
     found = []
-    for low, high in pairwise(edges):
-        inside = (level >= low) & (level < high)
-        count = int(inside.sum())
-        if count >= _FEWEST:
-            spread = float(difference[inside].var(ddof=1)) * samples
-            found.append(Transfer((1.0 + ratio) * float(level[inside].mean()), 1.0 + ratio**2, spread, count))
+    for inside in bins:
+        spread = float(difference[inside].var(ddof=1)) * samples
+        floors = 1.0 + ratio**2 + (1.0 - ratio) ** 2 * black_noise
+        found.append(Transfer((1.0 + ratio) * float(level[inside].mean()), floors, spread, inside.size))
     return found
 
 
@@ -209,13 +216,14 @@ def _as_camera(slope: float, floor: float, covariance: Floats, camera: CameraNoi
     return known
 
 
-def common_black(pairs: Iterable[tuple[Band, Band, NDArray[np.bool_]]]) -> float | None:
+def common_black(pairs: Iterable[tuple[Band, Band, Band, NDArray[np.bool_]]]) -> float | None:
     """Find the black level from pairs of exposures of the same light: where both straight lines start.
 
     Parameters
     ----------
-    pairs : iterable of (first, second, free)
-        Numbers as read, of a shorter and a longer exposure, and where neither is clipped.
+    pairs : iterable of (first, second, around, free)
+        Numbers as read, of a shorter and a longer exposure, means of the latter over neighbours, and where neither is
+        clipped.
 
     Returns
     -------
@@ -224,14 +232,14 @@ def common_black(pairs: Iterable[tuple[Band, Band, NDArray[np.bool_]]]) -> float
 
     Notes
     -----
-    first = ratio * second + (1 - ratio) * black: slope and intercept of the means of bins of `second`.
+    first = ratio * second + (1 - ratio) * black: slope and intercept of the means of bins of `around`.
     """
     found = []
-    for first, second, free in pairs:
+    for first, second, around, free in pairs:
         x, y = second[free].astype(np.float64), first[free].astype(np.float64)
         if x.size < _FEWEST * _FEWEST_BINS:
             continue
-        order = np.argsort(x, kind="stable")
+        order = np.argsort(around[free], kind="stable")
         bins = np.array_split(order, _BINS)
         bx, by = np.array([x[one].mean() for one in bins]), np.array([y[one].mean() for one in bins])
         error = np.array([max(float(y[one].std()), 1e-12) / sqrt(one.size) for one in bins])

@@ -1,0 +1,128 @@
+"""`flarewright measure merge` and `run`: JSON, a picture, and every mistake in one sentence."""
+
+import errno
+import json
+import os
+import shutil
+
+import numpy as np
+import pytest
+from star_run import ANGLES, CAMERA, light_px, shoot, star
+
+from flarewright.cli.app import run
+from flarewright.io.merged import read_run
+
+
+@pytest.fixture
+def listed(tmp_path):
+    return shoot(tmp_path, {angle: star(light_px(angle)) for angle in ANGLES})
+
+
+def refused(capsys, *arguments):
+    """Run a command that must fail with one sentence; return it."""
+    assert run([str(word) for word in arguments]) == 2
+    out, told = capsys.readouterr()
+    assert out == ""
+    lines = [line for line in told.splitlines() if "error:" in line]
+    assert len(lines) == 1
+    assert "Traceback" not in told
+    return lines[0]
+
+
+def test_merge_tells_what_it_found_and_run_takes_it_up(listed, tmp_path, capsys):
+    folder = tmp_path / "run"
+    assert run(["measure", "merge", str(listed), "-o", str(folder), "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["stages"] == ["merge"]
+    assert told["merge"]["frames"] == told["merge"]["light_found"] == len(ANGLES)
+    assert told["merge"]["px_per_rad"] == pytest.approx(400.0, rel=0.01)
+    assert (folder / "merged.png").stat().st_size > 1000
+    before = (folder / "frames" / "frame-003.exr").stat().st_mtime_ns
+    assert run(["measure", "run", str(listed), "-o", str(folder), "--stages", "merge"]) == 0
+    assert "6 frames of 96x64 pixels, the light seen in 6" in capsys.readouterr().out
+    assert (folder / "frames" / "frame-003.exr").stat().st_mtime_ns == before
+    assert len(read_run(folder).frames) == len(ANGLES)
+
+
+def test_a_folder_with_a_rule_and_blocks(tmp_path, capsys):
+    shots = tmp_path / "shots"
+    shots.mkdir()
+    shoot(shots, {angle: star(light_px(angle)) for angle in ANGLES})
+    text = (shots / "captures.csv").read_text().splitlines()
+    lines = ["file,exposure_s", *(",".join((row.split(",")[0], row.split(",")[2])) for row in text[1:])]
+    (shots / "captures.csv").write_text("\n".join(lines))
+    arguments = ["measure", "merge", str(shots / "captures.csv"), "--angles", "0+1", "--block", "2"]
+    assert run([*arguments, "--white-balance", "2,1,1.5", "-o", str(tmp_path / "run"), "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)["merge"]
+    assert told["size_px"] == [48, 32]
+    assert told["px_per_rad"] == pytest.approx(200.0, rel=0.01)
+    assert read_run(tmp_path / "run").white_balance == (2.0, 1.0, 1.5)
+
+
+def test_scenes_that_cannot_be_measured_are_told(tmp_path, capsys):
+    veil = star(level=0.2)
+    cases = {
+        "no light was found": dict.fromkeys(ANGLES, veil),
+        "saturated over more than half": {angle: star(light_px(angle), level=300.0) for angle in ANGLES},
+        "two lights were found": {angle: star(light_px(angle), (80.0, 10.0)) for angle in ANGLES},
+        "does not move as the angles say": {angle: star((20.0 + 43.0 * (angle % 2), 31.0)) for angle in ANGLES},
+    }
+    for k, (words, scenes) in enumerate(cases.items()):
+        folder = tmp_path / str(k)
+        folder.mkdir()
+        assert words in refused(capsys, "measure", "merge", shoot(folder, scenes), "-o", folder / "run")
+
+
+def test_photographs_that_cannot_be_used_are_told(listed, tmp_path, capsys):
+    command = ("measure", "merge", listed, "-o", tmp_path / "run")
+    whole = (tmp_path / "2-1.npy").read_bytes()
+    np.save(tmp_path / "2-1.npy", np.zeros((64, 95, 3), np.uint16))
+    assert "2-1.npy has 95x64 pixels, most others have 96x64" in refused(capsys, *command)
+    (tmp_path / "2-1.npy").write_bytes(b"junk")
+    assert "2-1.npy cannot be read" in refused(capsys, *command)
+    (tmp_path / "2-1.npy").unlink()
+    assert "2-1.npy does not exist" in refused(capsys, *command)
+    (tmp_path / "2-1.dng").write_bytes(b"II*\0 and no more")
+    listed.write_text(listed.read_text().replace("2-1.npy", "2-1.dng"))
+    assert "2-1.dng cannot be read as a RAW file" in refused(capsys, *command)
+    listed.write_text(listed.read_text().replace("2-1.dng", "2-1.npy"))
+    (tmp_path / "2-1.npy").write_bytes(whole)
+    text = listed.read_text()
+    listed.write_text(text.replace(f"2-1.npy,2,{CAMERA.exposures_s[1]!r},100,8,light\n", ""))
+    assert "2 deg lacks the exposure of 0.125 s" in refused(capsys, *command)
+
+
+def test_folders_and_options_that_cannot_be_used_are_told(listed, tmp_path, capsys):
+    (tmp_path / "other").mkdir()
+    (tmp_path / "other" / "a.txt").write_text("mine")
+    (tmp_path / "file").write_text("")
+    for words, *arguments in (
+        ("holds no run", "merge", listed, "-o", tmp_path / "other"),
+        ("is a file; give a folder", "merge", listed, "-o", tmp_path / "file"),
+        ("captures.txt does not exist", "merge", tmp_path / "captures.txt", "-o", tmp_path / "run"),
+        ("'sing' is no stage; choose from merge", "run", listed, "--stages", "merge,sing", "-o", tmp_path / "run"),
+        ("--white-balance 'warm'", "merge", listed, "--white-balance", "warm", "-o", tmp_path / "run"),
+        ("the rule 'x'", "merge", listed, "--angles", "x", "-o", tmp_path / "run"),
+        ("nothing.json does not exist", "merge", listed, "--camera", tmp_path / "nothing.json", "-o", tmp_path / "run"),
+    ):
+        assert words in refused(capsys, "measure", *arguments)
+
+
+def test_a_full_disk_is_told_before_and_while_writing(listed, tmp_path, capsys, monkeypatch):
+    command = ("measure", "merge", listed, "-o", tmp_path / "run")
+    usage = shutil.disk_usage(tmp_path)
+    with monkeypatch.context() as patch:
+        patch.setattr(shutil, "disk_usage", lambda _: usage._replace(free=1000))
+        assert "free some space" in refused(capsys, *command)
+    rename = os.replace
+
+    def full(source, target):
+        if str(target).endswith("frame-004.exr"):
+            raise OSError(errno.ENOSPC, "No space left on device")
+        rename(source, target)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "replace", full)
+        assert "frame-004.exr: no space left on device" in refused(capsys, *command)
+    assert not list((tmp_path / "run" / "frames").glob(".*"))
+    assert run([str(word) for word in command]) == 0

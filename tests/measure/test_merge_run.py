@@ -1,0 +1,194 @@
+"""A merged run: light, axis and angles as planted, resumed without a difference, RAW like any other file."""
+
+from dataclasses import replace as changed
+
+import numpy as np
+import pytest
+from star_run import ANGLES, CAMERA, light_px, shoot, shoot_raw, star
+
+from conftest import SETUP, Measured
+from flarewright.errors import FlarewrightError
+from flarewright.io.captures import read_captures
+from flarewright.io.merged import read_frame, read_run
+from flarewright.measure.geometry import Seen, solve_geometry
+from flarewright.measure.light import find_light
+from flarewright.measure.merge_run import MergeSettings, merge_captures
+from flarewright.model.capture import CameraNoise
+
+
+def test_the_light_is_found_within_a_third_of_a_pixel_though_it_is_clipped(measured: Measured):
+    for frame, pose in zip(measured.run.frames, measured.truth["poses"], strict=True):
+        assert frame.light_found
+        assert frame.light_px == pytest.approx(pose["light_px"], abs=0.3)
+        assert frame.clipped_share > 0.0
+
+
+def test_the_axis_is_found_within_a_third_of_a_pixel_though_the_camera_nods(measured: Measured):
+    nod = np.tan(np.radians(SETUP.pitch_deg)) * measured.run.px_per_rad
+    assert nod > 1.0
+    for found, error, planted in zip(measured.run.axis_px, measured.run.axis_error_px, SETUP.axis_px, strict=True):
+        assert found == pytest.approx(planted, abs=0.3)
+        assert abs(found - planted) < 4.0 * error
+
+
+def test_the_turntables_jitter_is_taken_out(measured: Measured):
+    true = np.array([pose["constellation_deg"] for pose in measured.truth["poses"]])
+    nominal = np.array([frame.nominal_deg for frame in measured.run.frames])
+    found = np.array([frame.constellation_deg for frame in measured.run.frames])
+    assert np.std(found - true) < 0.5 * np.std(nominal - true)
+    assert np.abs(found - true).max() < 0.05
+
+
+def test_each_mirror_line_runs_from_the_axis_to_the_light(measured: Measured):
+    for frame in measured.run.frames:
+        away = np.subtract(frame.light_px, frame.axis_px)
+        if np.hypot(*away) > 10.0:
+            sign = 1.0 if frame.constellation_deg > 0.0 else -1.0
+            assert sign * away / np.hypot(*away) == pytest.approx(frame.direction, abs=1e-9)
+            assert frame.horizon_deg == pytest.approx(frame.roll_deg - frame.nominal_roll_deg, abs=1e-9)
+
+
+def test_frames_are_the_truth_within_their_variance_and_the_camera_is_found(measured: Measured):
+    chi2 = []
+    for k, info in enumerate(measured.run.frames):
+        frame = read_frame(measured.folder, info)
+        truth = np.load(measured.photographs / f"truth-{k:03d}.npy")
+        chi2.append(((frame.radiance - truth) ** 2 / frame.variance)[frame.valid].mean())
+    assert np.mean(chi2) == pytest.approx(1.0, abs=0.03)
+    camera = measured.run.camera
+    assert abs(camera.electrons_per_unit - SETUP.electrons_per_unit) < 4.0 * camera.electrons_per_unit_error
+    assert abs(camera.read_noise - SETUP.read_noise) < 4.0 * camera.read_noise_error
+    assert read_run(measured.folder) == measured.run
+
+
+def stamps(folder):
+    return {path.name: path.stat().st_mtime_ns for path in (folder / "frames").glob("*.exr")}
+
+
+def test_a_stopped_run_goes_on_and_gives_the_same(tmp_path):
+    captures = read_captures(shoot(tmp_path, {angle: star(light_px(angle)) for angle in ANGLES}))
+    whole = merge_captures(captures, tmp_path, tmp_path / "whole")
+
+    def stop(part, _words):
+        if part > 0.5:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        merge_captures(captures, tmp_path, tmp_path / "run", progress=stop, threads=1)
+    begun = stamps(tmp_path / "run")
+    assert 0 < len(begun) < len(ANGLES)
+    again = merge_captures(captures, tmp_path, tmp_path / "run", threads=2)
+    assert again == whole
+    ended = stamps(tmp_path / "run")
+    assert begun.items() <= ended.items()
+    for a, b in zip(whole.frames, again.frames, strict=True):
+        one, other = read_frame(tmp_path / "whole", a), read_frame(tmp_path / "run", b)
+        assert np.array_equal(one.radiance, other.radiance)
+        assert np.array_equal(one.variance, other.variance)
+    # another photograph, or another choice, is merged anew; the rest is kept
+    np.save(tmp_path / "2-1.npy", np.load(tmp_path / "2-1.npy"))
+    merge_captures(captures, tmp_path, tmp_path / "run")
+    third = stamps(tmp_path / "run")
+    assert {name for name, stamp in third.items() if stamp != ended[name]} == {"frame-002.exr"}
+    merge_captures(captures, tmp_path, tmp_path / "run", settings=MergeSettings(white_balance=(2.0, 1.0, 1.5)))
+    assert not stamps(tmp_path / "run").items() & third.items()
+
+
+def test_a_person_may_point_at_the_light(tmp_path):
+    captures = read_captures(shoot(tmp_path, {angle: star(light_px(angle), (80.0, 10.0)) for angle in ANGLES}))
+    with pytest.raises(FlarewrightError, match="two lights were found"):
+        merge_captures(captures, tmp_path, tmp_path / "run")
+    pointed = []
+    for one in captures:
+        x, y = light_px(one.constellation_deg)
+        pointed.append(one.replace(light_x_px=x, light_y_px=y))
+    run = merge_captures(pointed, tmp_path, tmp_path / "run")
+    assert run.frames[2].light_px == pytest.approx(light_px(2.0))
+    assert run.px_per_rad == pytest.approx(400.0, rel=0.01)
+
+
+def test_raw_files_with_dark_frames_and_flats_merge_to_the_scene(tmp_path):
+    scene = {angle: star(light_px(angle)) for angle in ANGLES}
+    lines = ["file,constellation_deg,kind\n"]
+    for k, (angle, light) in enumerate(scene.items()):
+        for j, time in enumerate(CAMERA.exposures_s):
+            shoot_raw(tmp_path, light, f"{k}-{j}.dng", time, 10 * k + j)
+            lines.append(f"{k}-{j}.dng,{angle:g},\n")
+    for k in range(4):
+        shoot_raw(tmp_path, np.zeros_like(light), f"dark-{k}.dng", 1 / 8, 100 + k)
+        shoot_raw(tmp_path, np.full_like(light, 5.0), f"flat-{k}.dng", 1 / 8, 200 + k)
+        lines += [f"dark-{k}.dng,,dark\n", f"flat-{k}.dng,,flat\n"]
+    (tmp_path / "captures.csv").write_text("".join(lines))
+    run = merge_captures(read_captures(tmp_path / "captures.csv"), tmp_path, tmp_path / "run")
+    assert run.size_px == (96, 64)
+    assert run.camera.black_level == pytest.approx(CAMERA.black, abs=0.05)
+    assert abs(run.camera.read_noise - CAMERA.read_noise) < 4.0 * run.camera.read_noise_error
+    assert abs(run.camera.electrons_per_unit - CAMERA.electrons_per_unit) < 4.0 * run.camera.electrons_per_unit_error
+    frame = read_frame(tmp_path / "run", run.frames[3])
+    truth = scene[3.0]
+    assert frame.light_px == pytest.approx(light_px(3.0), abs=0.3)
+    # four flats and dark frames have noise of their own, which all frames share: a few per cent of the variance
+    print(
+        [((frame.radiance - truth) ** 2 / frame.variance)[..., c][frame.valid[..., c]].mean() for c in range(3)],
+        run.camera,
+    )
+    chi2 = ((frame.radiance - truth) ** 2 / frame.variance)[frame.valid].mean()
+    assert 0.95 < chi2 < 1.6
+    green, red = (frame.variance[..., c][frame.valid[..., c]].mean() / truth[..., c][frame.valid[..., c]].mean()
+                  for c in (1, 0))  # fmt: skip
+    assert green < 0.75 * red
+
+
+def test_levels_and_noise_are_found_when_nothing_is_told(tmp_path):
+    listed = shoot(tmp_path, {angle: star(light_px(angle), level=1.0) for angle in ANGLES})
+    (tmp_path / "camera.json").unlink()
+    run = merge_captures(read_captures(listed), tmp_path, tmp_path / "run")
+    assert run.camera.black_level == pytest.approx(CAMERA.black, abs=0.5)
+    assert run.camera.white_level == CAMERA.white
+    assert any("black level" in remark for remark in run.remarks)
+
+
+def test_one_angle_alone_needs_the_focal_length(tmp_path):
+    captures = read_captures(shoot(tmp_path, {3.0: star(light_px(3.0))}))
+    run = merge_captures(captures, tmp_path, tmp_path / "run")
+    assert run.axis_px == (48.0, 32.0)
+    assert any("one angle only" in remark for remark in run.remarks)
+    straight = [one.replace(constellation_deg=0.0, focal_mm=50.0) for one in captures]
+    with pytest.raises(FlarewrightError, match="pitch_um"):
+        merge_captures(straight, tmp_path, tmp_path / "other")
+    run = merge_captures(straight, tmp_path, tmp_path / "third", camera=CameraNoise(pitch_um=100.0, black_level=512))
+    assert run.px_per_rad == pytest.approx(500.0)
+
+
+def test_a_path_that_does_not_fit_the_angles_is_refused():
+    places = [(50.0 + 7.0 * k, 30.0) for k in range(6)]
+    straight = [Seen(float(k), 0.0, place, 0.05) for k, place in enumerate(places)]
+    assert solve_geometry(straight, (96, 64)).px_per_rad == pytest.approx(7.0 * 180 / np.pi, rel=0.01)
+    crossed = [changed(one, light_px=(places[k][0], 30.0 + 20.0 * (k % 2))) for k, one in enumerate(straight)]
+    with pytest.raises(FlarewrightError, match="does not move as the angles say"):
+        solve_geometry(crossed, (96, 64))
+    backwards = [changed(one, nominal_deg=-one.nominal_deg) for one in straight]
+    with pytest.raises(FlarewrightError, match="against the angles"):
+        solve_geometry(backwards, (96, 64))
+
+
+def test_two_rolls_fix_the_axis_without_a_mirror():
+    axis, frames = (50.3, 30.8), []
+    for roll in (0.0, 90.0):
+        for angle in range(1, 7):
+            step = 400.0 * np.tan(np.radians(angle))
+            u = np.cos(np.radians(roll)), -np.sin(np.radians(roll))
+            frames.append(Seen(float(angle), roll, (axis[0] + step * u[0], axis[1] + step * u[1]), 0.02))
+    found = solve_geometry(frames, (96, 64))
+    assert found.axis_px == pytest.approx(axis, abs=0.02)
+    assert all(one.constellation_deg == pytest.approx(seen.nominal_deg, abs=0.01)
+               for one, seen in zip(found.placed, frames, strict=True))  # fmt: skip
+
+
+def test_an_unclipped_light_is_found_too_and_a_hot_pixel_is_none():
+    scene = star((50.37, 30.81))
+    scene[10, 12] = 200.0
+    noise = np.random.default_rng(0).normal(size=scene.shape) * 0.01
+    found = find_light((scene + noise).astype(np.float32), np.full(scene.shape, 1e-4, np.float32))
+    assert found.position_px == pytest.approx((50.37, 30.81), abs=0.05)
+    assert found.rival_px is None

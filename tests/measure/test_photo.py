@@ -1,0 +1,103 @@
+"""Photographs come in with the numbers that the sensor gave: RAW through the real decoder, TIFF, EXR, NPY."""
+
+import numpy as np
+import pytest
+import tifffile
+from camera_raw import BLACK, WHITE, write_dng
+
+from flarewright.errors import FlarewrightError
+from flarewright.io.exr import write_exr
+from flarewright.io.photo import open_photo, photo_facts
+from flarewright.model import Layer
+
+
+@pytest.fixture
+def mosaic():
+    rng = np.random.default_rng(7)
+    return rng.integers(BLACK, WHITE, (40, 60), dtype=np.uint16)
+
+
+def test_a_raw_file_keeps_its_photosites(tmp_path, mosaic):
+    mosaic[10, 13] = WHITE  # one of the two greens of a block
+    write_dng(tmp_path / "a.dng", mosaic)
+    photo = open_photo(tmp_path / "a.dng")
+    assert photo.size_px == (30, 20)
+    assert photo.black_level == (BLACK,) * 3
+    assert photo.white_level == WHITE
+    assert photo.samples == (1, 2, 1)
+    assert photo.white_balance == pytest.approx((2.0, 1.0, 1.5))
+    pixels = photo.rows(0, 20)
+    assert np.array_equal(pixels[..., 0], mosaic[::2, ::2])
+    assert np.array_equal(pixels[..., 2], mosaic[1::2, 1::2])
+    greens = (mosaic[::2, 1::2].astype(np.float32) + mosaic[1::2, ::2]) / 2
+    greens[5, 6] = WHITE  # a block is clipped when a part of it is
+    assert np.array_equal(pixels[..., 1], greens)
+    assert np.array_equal(photo.rows(3, 9), pixels[3:9])
+    assert photo_facts(tmp_path / "a.dng") == pytest.approx(
+        {"exposure_s": 0.125, "iso": 200.0, "f_number": 2.8, "focal_mm": 50.0}
+    )
+
+
+@pytest.mark.parametrize("damage", ["cut", "noise", "empty"])
+def test_a_damaged_raw_file_is_told_in_a_sentence(tmp_path, mosaic, damage):
+    path = tmp_path / "a.dng"
+    write_dng(path, mosaic)
+    data = path.read_bytes()
+    path.write_bytes({"cut": data[: len(data) // 2], "noise": bytes(range(256)) * 20, "empty": b""}[damage])
+    with pytest.raises(FlarewrightError, match=r"a\.dng cannot be read as a RAW file"):
+        open_photo(path).rows(0, 20)
+
+
+def test_tiff_exr_and_npy_hold_the_same_numbers(tmp_path):
+    rng = np.random.default_rng(3)
+    numbers = rng.integers(0, 60000, (30, 40, 3), dtype=np.uint16)
+    np.save(tmp_path / "a.npy", numbers)
+    tifffile.imwrite(tmp_path / "a.tif", numbers, photometric="rgb")
+    tifffile.imwrite(tmp_path / "packed.tif", numbers, photometric="rgb", compression="zlib")
+    layer = Layer("beauty", numbers.astype(np.float32), (0, 0, 40, 30))
+    write_exr(tmp_path / "a.exr", [layer], (40, 30), pixel_type="float", metadata={})
+    for name in ("a.npy", "a.tif", "packed.tif", "a.exr"):
+        photo = open_photo(tmp_path / name)
+        assert photo.size_px == (40, 30)
+        assert np.array_equal(photo.rows(4, 21), numbers[4:21]), name
+        assert photo.white_level == (None if name == "a.exr" else 65535.0)
+        assert photo.step == (0.0 if name == "a.exr" else 1.0)
+
+
+def test_blocks_are_means_and_clip_when_a_part_does(tmp_path):
+    rng = np.random.default_rng(3)
+    numbers = rng.integers(0, 900, (13, 17, 3), dtype=np.uint16)
+    numbers[4, 5, 1] = 1000
+    np.save(tmp_path / "a.npy", numbers)
+    photo = open_photo(tmp_path / "a.npy", white_level=1000.0, block=3)
+    assert photo.size_px == (5, 4)
+    assert photo.samples == (9, 9, 9)
+    means = numbers[:12, :15].reshape(4, 3, 5, 3, 3).mean(axis=(1, 3))
+    found = photo.rows(0, 4)
+    assert found[1, 1, 1] == 1000.0
+    means[1, 1, 1] = 1000.0
+    assert found == pytest.approx(means, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "word"),
+    [
+        ("a.npy", np.zeros((4, 5, 3), np.uint8), "8 bits"),
+        ("a.npy", np.zeros((4, 5, 2), np.uint16), "no picture"),
+        ("a.npy", np.zeros(7), "no picture"),
+        ("a.npy", b"junk", "cannot be read as an NPY"),
+        ("a.tif", b"junk", "cannot be read as a TIFF"),
+        ("a.exr", b"junk", "cannot be read as an EXR"),
+        ("a.jpg", b"junk", "no photograph in linear numbers"),
+    ],
+)
+def test_what_is_no_linear_photograph_is_refused(tmp_path, name, content, word):
+    path = tmp_path / name
+    if isinstance(content, bytes):
+        path.write_bytes(content)
+    else:
+        np.save(path, content)
+    with pytest.raises(FlarewrightError, match=word):
+        open_photo(path)
+    with pytest.raises(FlarewrightError, match="does not exist"):
+        open_photo(tmp_path / "other.npy")
