@@ -7,6 +7,8 @@ import numpy as np
 from ..errors import FlarewrightError
 from ..model.ghost_model import Reference
 from ..model.replay_camera import ReplayCamera, Vector
+from ..optics.constellation import POWERS, brightness_scale, view_axes
+from ..optics.constellation import constellation_and_roll as optics_constellation
 
 
 def constellation_and_roll(position: Vector, forward: Vector, up: Vector, light: Vector) -> tuple[float, float]:
@@ -30,20 +32,16 @@ def constellation_and_roll(position: Vector, forward: Vector, up: Vector, light:
 
     Notes
     -----
-    Equations 8.1 and 8.2; the angle by the arc tangent, which keeps its digits near the axis, where the arc cosine of
-    8.1 loses half of them.
+    Equations 8.1 and 8.2 (`optics.constellation`).
     """
-    ahead, above = np.array(forward, float), np.array(up, float)
     away = np.array(light, float) - np.array(position, float)
-    if not (np.linalg.norm(away) > 0.0 and np.linalg.norm(ahead) > 0.0):
+    if not (np.linalg.norm(away) > 0.0 and np.linalg.norm(forward) > 0.0):
         raise FlarewrightError("a light at the camera's own place has no direction; move one of them")
-    ahead /= np.linalg.norm(ahead)
-    right = np.cross(ahead, above)
-    if not np.linalg.norm(right) > 1e-9 * np.linalg.norm(above):
+    axes = view_axes(forward, up)
+    if np.isnan(axes).any():
         raise FlarewrightError("the camera's up is along its forward; give another up")
-    right /= np.linalg.norm(right)
-    x, y, z = float(away @ right), float(away @ np.cross(right, ahead)), float(away @ ahead)
-    return float(np.degrees(np.arctan2(np.hypot(x, y), z))), float(np.degrees(np.arctan2(y, x)))
+    constellation_deg, roll_deg = optics_constellation(axes, away)
+    return float(constellation_deg), float(roll_deg)
 
 
 def brightness(reference: Reference, camera: ReplayCamera) -> float:
@@ -65,10 +63,8 @@ def brightness(reference: Reference, camera: ReplayCamera) -> float:
     FlarewrightError
         When a new setting is given whose old value the model does not know.
     """
-    factor = 1.0
-    for name, power in (
-        ("f_number", -2), ("iso", 1), ("exposure_s", 1), ("luminance_cd_m2", 1), ("solid_angle_sr", 1)
-    ):  # fmt: skip
+    ratios: dict[str, float] = {}
+    for name in POWERS:
         new, old = getattr(camera, name), getattr(reference, name)
         if new is None:
             continue
@@ -77,5 +73,5 @@ def brightness(reference: Reference, camera: ReplayCamera) -> float:
                 f"the model does not tell the {name} of its captures, so {name} {new:g} has no meaning; "
                 f"leave it out or write it into the model's reference"
             )
-        factor *= (new / old) ** power
-    return float(factor)
+        ratios[name] = new / old
+    return brightness_scale(ratios)

@@ -7,14 +7,18 @@ one turns it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from math import prod
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 Floats = NDArray[np.float64]
 
-__all__ = ["Exposure", "brightness_scale", "constellation_and_roll", "field_angles", "view_axes"]
+POWERS = {"f_number": -2, "iso": 1, "exposure_s": 1, "luminance_cd_m2": 1, "solid_angle_sr": 1}
+"""With which power of each setting brightness goes."""
+
+__all__ = ["POWERS", "brightness_scale", "constellation_and_roll", "field_angles", "view_axes"]
 
 
 def view_axes(forward: ArrayLike, up: ArrayLike) -> Floats:
@@ -85,36 +89,13 @@ def field_angles(constellation_deg: float, roll_deg: float) -> tuple[float, floa
     return float(x), float(y)
 
 
-@dataclass(frozen=True)
-class Exposure:
-    """How a camera exposes, and what light it faces.
-
-    Attributes
-    ----------
-    f_number : float
-    iso : float
-        Film speed.
-    exposure_s : float
-    luminance_cd_m2, solid_angle_sr : float
-        Of the light; only their product counts, the illuminance on a plane that faces it.
-    """
-
-    f_number: float
-    iso: float
-    exposure_s: float
-    luminance_cd_m2: float
-    solid_angle_sr: float
-
-
-def brightness_scale(rendered: Exposure, flare: Exposure) -> float:
+def brightness_scale(ratios: Mapping[str, float]) -> float:
     """Return by what a flare known at one exposure is multiplied to be that of another.
 
     Parameters
     ----------
-    rendered : Exposure
-        Of the picture that the flare is put into (R).
-    flare : Exposure
-        At which the flare is known (F).
+    ratios : mapping of str to float
+        The new setting over that at which the flare is known, by name in `POWERS`; one left out is the same.
 
     Returns
     -------
@@ -126,7 +107,4 @@ def brightness_scale(rendered: Exposure, flare: Exposure) -> float:
     f-number scales the flare of another opening only roughly: a wider opening makes larger ghosts too, and a flare that
     is rendered at its own opening needs no such factor. Tests: tests/optics/test_constellation.py.
     """
-    opening = (flare.f_number / rendered.f_number) ** 2
-    speed = rendered.iso / flare.iso * rendered.exposure_s / flare.exposure_s
-    light = rendered.luminance_cd_m2 * rendered.solid_angle_sr / (flare.luminance_cd_m2 * flare.solid_angle_sr)
-    return opening * speed * light
+    return prod(ratio ** POWERS[name] for name, ratio in ratios.items())
