@@ -35,6 +35,9 @@ from . import (
     project_init,
     project_schema,
     render,
+    scene_check,
+    scene_init,
+    scene_schema,
 )
 
 app = typer.Typer(
@@ -49,6 +52,7 @@ app = typer.Typer(
 lens_app = typer.Typer(help="Look at, check and convert lens files.")
 coating_app = typer.Typer(help="Look at coatings: the standard ones, and what any coating reflects.")
 project_app = typer.Typer(help="Project files: everything a render needs, in one TOML file.")
+scene_app = typer.Typer(help="Scene files: cameras and lights in space, for `flarewright predict`.")
 design_app = typer.Typer(help="Search a lens for the flare you want.")
 measure_app = typer.Typer(help="Measure a real camera's flare and replay it.")
 
@@ -60,6 +64,7 @@ app.command("edit", epilog=edit.EPILOG)(edit.edit)
 app.add_typer(lens_app, name="lens")
 app.add_typer(coating_app, name="coating")
 app.add_typer(project_app, name="project")
+app.add_typer(scene_app, name="scene")
 app.add_typer(design_app, name="design")
 app.add_typer(measure_app, name="measure")
 lens_app.command("show", epilog=lens_show.EPILOG)(lens_show.show)
@@ -71,6 +76,9 @@ coating_app.command("plot", epilog=coating_plot.EPILOG)(coating_plot.plot)
 project_app.command("init", epilog=project_init.EPILOG)(project_init.init)
 project_app.command("check")(project_check.check)
 project_app.command("schema")(project_schema.schema)
+scene_app.command("init", epilog=scene_init.EPILOG)(scene_init.init)
+scene_app.command("check")(scene_check.check)
+scene_app.command("schema")(scene_schema.schema)
 
 design_app.command("solve", epilog=design_solve.EPILOG)(design_solve.solve)
 design_app.command("resume")(design_solve.resume)
@@ -125,7 +133,7 @@ def run(arguments: Sequence[str]) -> int:
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="replace")
     words = list(arguments)
-    if words in ([], ["lens"], ["coating"], ["project"], ["design"], ["measure"]):
+    if words in ([], ["lens"], ["coating"], ["project"], ["scene"], ["design"], ["measure"]):
         words.append("--help")
     try:
         code = _call(words)

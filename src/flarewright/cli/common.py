@@ -131,6 +131,33 @@ def chosen_fstop(f_number: float | None) -> float | None:
     return f_number
 
 
+def write_text(output: Path, text: str) -> None:
+    """Write a text file in UTF-8, whole or not at all."""
+    from ..io.atomic import write_atomically
+
+    def write(temporary: Path) -> None:
+        temporary.write_text(text, "utf-8")
+
+    write_atomically(output, write)
+
+
+@contextmanager
+def remembered(cache: Path | None) -> Iterator[dict[str, Any]]:
+    """Read pictures drawn before from a file, and keep them and new ones there, after an interruption too."""
+    if cache is None:
+        yield {}
+        return
+    from ..io.flare_cache import read_cache, write_cache
+
+    memory = read_cache(cache) if cache.exists() else {}
+    before = sum(map(len, memory.values()))
+    try:
+        yield memory
+    finally:
+        if sum(map(len, memory.values())) > before:
+            write_cache(cache, memory)
+
+
 @contextmanager
 def progress_bar() -> Iterator[Callable[[str], Callable[[float, str], None]]]:
     """Show work as bars with an estimate of the time left, where someone looks at it.

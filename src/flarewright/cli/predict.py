@@ -10,104 +10,251 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..errors import ProjectError
-from .common import check_place, console, pair, print_json, progress_bar, tell
+from .common import check_place, console, pair, print_json, progress_bar, remembered, tell, write_text
+from .predict_flares import SHOWN_PX, is_model, lens_flares, model_flares
+from .predict_scene import SceneWishes, is_scene, predict_scene
 
 if TYPE_CHECKING:
     from ..model import Project
-    from ..predict.occurrence import Flares, Occurrence, Setting
+    from ..predict.occurrence import Flares, Occurrence, Setting, Wanted
     from ..render.glare import VeilingGlare
 
 EPILOG = (
     "Examples:\n\nflarewright predict heliar-tronnier -o heliar.html\n\n"
     "flarewright predict canon-28-80 --fstop 8 --coating preset:staggered --sensor 36x24 --luminance 50,5000 "
-    "-o canon.html --json"
+    "-o canon.html --json\n\n"
+    "flarewright predict match.toml --near 'main stand' --radius 10 -o match.html"
 )
+
+_LENS, _CURVES, _SCENE = "Camera", "Curves of a lens or a measured flare", "Scene"
 
 
 def predict(
-    lens: Annotated[str, typer.Argument(metavar="LENS", help="A shipped lens (flarewright lenses) or a lens file.")],
+    subject: Annotated[
+        str,
+        typer.Argument(metavar="LENS|MODEL|SCENE", help="A lens, a measured flare (.json), or a scene file (.toml)."),
+    ],
     output: Annotated[
         Path | None, typer.Option("-o", "--output", metavar="REPORT.html", help="Write a report to look at.")
     ] = None,
-    fstop: Annotated[float | None, typer.Option(help="f-number; wide open when left out.")] = None,
-    coating: Annotated[
-        str, typer.Option(help="lens, none, preset:NAME, quarter-wave:NM or what `render` takes besides.")
-    ] = "lens",
-    zoom: Annotated[
-        str | None, typer.Option(metavar="MM|NAME", help="Focal length, or a position of the lens file.")
+    fstop: Annotated[
+        float | None, typer.Option(help="f-number; wide open when left out.", rich_help_panel=_LENS)
     ] = None,
-    focus: Annotated[float | None, typer.Option(help="Plane in focus, mm; infinity when left out.")] = None,
-    sensor: Annotated[str, typer.Option(metavar="WxH", help="Sensor in mm.")] = "36x24",
-    spectrum: Annotated[str, typer.Option(help="Of the light: d65, black-body:K or what `render` takes.")] = "d65",
-    light_diameter: Annotated[float, typer.Option(help="Degrees across the light's disc, 0.53 for the sun.")] = 0.0,
-    roll: Annotated[float, typer.Option(help="Direction of the light around the axis, degrees from the right.")] = 0.0,
-    to: Annotated[float | None, typer.Option(help="Largest constellation, degrees; 85 when left out.")] = None,
-    bins: Annotated[int, typer.Option(min=2, max=20, help="Bins between the extremes of a curve.")] = 5,
-    illuminance: Annotated[float, typer.Option(help="Of the light on a plane facing it, lx; the sun gives 1e5.")] = 1e5,
+    coating: Annotated[
+        str | None,
+        typer.Option(
+            help="lens, none, preset:NAME, quarter-wave:NM or what `render` takes besides.", rich_help_panel=_LENS
+        ),
+    ] = None,
+    zoom: Annotated[
+        str | None,
+        typer.Option(metavar="MM|NAME", help="Focal length, or a position of the lens file.", rich_help_panel=_LENS),
+    ] = None,
+    focus: Annotated[
+        float | None, typer.Option(help="Plane in focus, mm; infinity when left out.", rich_help_panel=_LENS)
+    ] = None,
+    sensor: Annotated[
+        str | None, typer.Option(metavar="WxH", help="Sensor in mm (36x24).", rich_help_panel=_LENS)
+    ] = None,
+    unit_per_cd_m2: Annotated[
+        float | None,
+        typer.Option(help="What a scene of 1 cd/m² has in a measured flare's captures.", rich_help_panel=_LENS),
+    ] = None,
+    spectrum: Annotated[
+        str | None,
+        typer.Option(help="Of the light: d65, black-body:K or what `render` takes.", rich_help_panel=_CURVES),
+    ] = None,
+    light_diameter: Annotated[
+        float | None,
+        typer.Option(help="Degrees across the light's disc, 0.53 for the sun.", rich_help_panel=_CURVES),
+    ] = None,
+    roll: Annotated[
+        float | None,
+        typer.Option(help="Direction of the light around the axis, degrees from the right.", rich_help_panel=_CURVES),
+    ] = None,
+    to: Annotated[
+        float | None, typer.Option(help="Largest constellation, degrees; 85 when left out.", rich_help_panel=_CURVES)
+    ] = None,
+    bins: Annotated[
+        int | None, typer.Option(min=2, max=20, help="Between a curve's extremes (5).", rich_help_panel=_CURVES)
+    ] = None,
+    illuminance: Annotated[
+        float | None,
+        typer.Option(help="Of the light on a plane facing it, lx (1e5, the sun).", rich_help_panel=_CURVES),
+    ] = None,
     luminance: Annotated[
-        str | None, typer.Option(metavar="MIN,MAX", help="Darkest and brightest of the scene, cd/m²: tells contrast.")
+        str | None,
+        typer.Option(
+            metavar="MIN,MAX",
+            help="Darkest and brightest of the scene, cd/m²: tells contrast.",
+            rich_help_panel=_CURVES,
+        ),
+    ] = None,
+    tolerance: Annotated[
+        float | None, typer.Option(help="Error of the curves between samples (0.03).", rich_help_panel=_CURVES)
+    ] = None,
+    samples: Annotated[
+        int | None,
+        typer.Option(min=5, max=2000, help="Constellations to draw at most (48).", rich_help_panel=_CURVES),
+    ] = None,
+    check: Annotated[
+        int | None,
+        typer.Option(min=0, max=100, help="Final renders to compare the curves with (4).", rich_help_panel=_CURVES),
+    ] = None,
+    near: Annotated[
+        str | None,
+        typer.Option(metavar="CAMERA", help="Look for a better position near this camera.", rich_help_panel=_SCENE),
+    ] = None,
+    radius: Annotated[
+        float | None, typer.Option(help="For --near: how far around, m (5).", rich_help_panel=_SCENE)
+    ] = None,
+    height: Annotated[
+        float | None, typer.Option(help="For --near: how far up and down, m (0).", rich_help_panel=_SCENE)
+    ] = None,
+    shortest_shot: Annotated[
+        float | None, typer.Option(help="Least seconds between two switches of camera (0).", rich_help_panel=_SCENE)
     ] = None,
     quality: Annotated[
         str, typer.Option(help="final: traced rays; draft: matrices, quick but dark beyond the field of view.")
     ] = "final",
-    tolerance: Annotated[float, typer.Option(help="Error of the curves between samples.")] = 0.03,
-    samples: Annotated[int, typer.Option(min=5, max=2000, help="Constellations to draw at most.")] = 48,
-    check: Annotated[int, typer.Option(min=0, max=100, help="Final renders to compare the curves with.")] = 4,
     glare: Annotated[bool, typer.Option("--glare", help="Also tell the veiling glare index.")] = False,
+    cache: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE.npz", help="Keep what was drawn, to go on after Ctrl-C or with a changed scene."),
+    ] = None,
     threads: Annotated[int | None, typer.Option(min=1, help="All cores when left out.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
-    """Tell how much flare a light makes wherever it stands: curves over the angle between camera and light.
+    """Tell how much flare there will be.
 
-    The curves hold sum, mean, maximum and log-average of the flare in the picture, without the light's own image.
+    For a lens or a measured flare: curves over the angle between camera and light, of sum, mean, maximum and
+    log-average, without the light's own image. For a scene: every light in every camera over time, ranked.
     """
     if output is not None:
         check_place(output, ".html")
-    project = _project(lens, fstop, coating, zoom, focus, sensor, spectrum, light_diameter)
+    if cache is not None:
+        check_place(cache, ".npz")
     if quality not in ("draft", "final"):
         raise ProjectError(f"--quality {quality!r} is unknown here; choose draft or final")
-    if to is not None and not 0.0 < to <= 85.0:
-        raise ProjectError(f"--to {to:g} is no constellation of a lens; choose degrees above 0 and up to 85")
-    if not (math.isfinite(roll) and abs(roll) <= 360.0):
-        raise ProjectError(f"--roll {roll:g} is no direction; choose degrees between -360 and 360")
-    if not 1e-4 <= tolerance <= 1.0:
-        raise ProjectError(f"--tolerance {tolerance:g} is no error to end at; choose between 0.0001 and 1")
-    from ..predict.occurrence import Wanted, predict_occurrence
+    lens_flags = {
+        "--fstop": fstop, "--coating": coating, "--zoom": zoom, "--focus": focus, "--spectrum": spectrum,
+        "--light-diameter": light_diameter,
+    }  # fmt: skip
+    curve_flags = {
+        "--sensor": sensor, "--unit-per-cd-m2": unit_per_cd_m2, "--roll": roll, "--to": to, "--bins": bins,
+        "--illuminance": illuminance, "--luminance": luminance, "--tolerance": tolerance, "--samples": samples,
+        "--check": check,
+    }  # fmt: skip
+    scene_flags = {"--near": near, "--radius": radius, "--height": height, "--shortest-shot": shortest_shot}
+    if is_scene(subject):
+        _refuse({**lens_flags, **curve_flags}, "a scene", "the scene file tells it")
+        predict_scene(
+            Path(subject),
+            _scene_wishes(SceneWishes(
+                output, quality, near, 5.0 if radius is None else radius, height or 0.0, shortest_shot or 0.0, glare,
+                threads, as_json, cache,
+            ), radius or height),
+        )  # fmt: skip
+        return
+    _refuse(scene_flags, "a lens or a measured flare", "give a scene file")
+    wanted = _wanted(to, roll, tolerance, samples, check, bins, _setting(illuminance, luminance), output)
+    width, high = _sensor(sensor)
+    if is_model(subject):
+        _refuse({**lens_flags, "--glare": glare or None}, "a measured flare", "it was measured")
+        if unit_per_cd_m2 is not None and not 0.0 < unit_per_cd_m2 < math.inf:
+            raise ProjectError(f"--unit-per-cd-m2 {unit_per_cd_m2:g} is no unit; give a number above 0")
+        project, flares = None, model_flares(subject, width, unit_per_cd_m2)
+    else:
+        _refuse({"--unit-per-cd-m2": unit_per_cd_m2}, "a lens", "it follows from the glass")
+        project = _project(subject, fstop, coating, zoom, focus, (width, high), spectrum, light_diameter)
+        flares = lens_flares(project, quality, threads)
+    _curves(flares, wanted, project if glare else None, threads, output, as_json, cache)
 
-    wanted = Wanted(to, roll, tolerance, samples, check, bins, _setting(illuminance, luminance), output is not None)
-    flares = _lens_flares(project, quality, threads)
-    with progress_bar() as told:
-        found = predict_occurrence(flares, wanted, told)
-    if glare:
-        found = replace(found, glare=_glare(project, threads))
+
+def _curves(
+    flares: Flares,
+    wanted: Wanted,
+    glare_of: Project | None,
+    threads: int | None,
+    output: Path | None,
+    as_json: bool,
+    cache: Path | None,
+) -> None:
+    """Predict the curves of one camera and tell them."""
+    from ..predict.occurrence import occurrence_data, predict_occurrence
+    from ..predict.occurrence_page import occurrence_page
+
+    reach = flares.sampled.reach_deg
+    if wanted.to_deg is not None and not flares.sampled.least_deg < wanted.to_deg <= reach:
+        raise ProjectError(
+            f"--to {wanted.to_deg:g} is beyond what this flare knows; choose degrees above "
+            f"{flares.sampled.least_deg:g} and up to {reach:g}"
+        )
+    with progress_bar() as told, remembered(cache) as memory:
+        found = predict_occurrence(flares, wanted, told, memory)
+    if glare_of is not None:
+        found = replace(found, glare=_glare(glare_of, threads))
     tell(dict.fromkeys(found.flare.remarks))
-    files = {} if output is None else {"report": str(output)}
     if output is not None:
-        from ..predict.occurrence_page import occurrence_page
-
-        write_page(output, occurrence_page(found))
+        write_text(output, occurrence_page(found))
     if as_json:
-        from ..predict.occurrence import occurrence_data
-
-        print_json({**occurrence_data(found), **files})
+        print_json({**occurrence_data(found), **({} if output is None else {"report": str(output)})})
         return
     _print(found)
-    tell(f"wrote {name}" for name in files.values())
+    if output is not None:
+        tell([f"wrote {output}"])
 
 
-def write_page(output: Path, text: str) -> None:
-    """Write a report, whole or not at all."""
-    from ..io.atomic import write_atomically
-
-    def write(temporary: Path) -> None:
-        temporary.write_text(text, "utf-8")
-
-    write_atomically(output, write)
+def _refuse(flags: dict[str, Any], what: str, why: str) -> None:
+    """Refuse flags that mean nothing here, instead of passing over them."""
+    for flag, value in flags.items():
+        if value is not None:
+            raise ProjectError(f"{flag} has no meaning for {what}: {why}; leave {flag} out")
 
 
-def _setting(illuminance: float, luminance: str | None) -> Setting:
+def _scene_wishes(wishes: SceneWishes, searched: float | None) -> SceneWishes:
+    for flag, value, least in (
+        ("--radius", wishes.radius_m, 1e-6), ("--height", wishes.height_m, 0.0),
+        ("--shortest-shot", wishes.shortest_shot_s, 0.0),
+    ):  # fmt: skip
+        if not least <= value < 1e6:
+            raise ProjectError(f"{flag} {value:g} is out of range; give a number of {'s' if 'shot' in flag else 'm'} "
+                               f"{'of at least' if least == 0.0 else 'above'} 0")  # fmt: skip
+    if wishes.near is None and searched:
+        raise ProjectError("--radius and --height say how far to look for a position; add --near CAMERA")
+    return wishes
+
+
+def _wanted(
+    to: float | None, roll: float | None, tolerance: float | None, samples: int | None, check: int | None,
+    bins: int | None, setting: Setting, output: Path | None,
+) -> Wanted:  # fmt: skip
+    from ..predict.occurrence import Wanted
+
+    if roll is not None and not (math.isfinite(roll) and abs(roll) <= 360.0):
+        raise ProjectError(f"--roll {roll:g} is no direction; choose degrees between -360 and 360")
+    if tolerance is not None and not 1e-4 <= tolerance <= 1.0:
+        raise ProjectError(f"--tolerance {tolerance:g} is no error to end at; choose between 0.0001 and 1")
+    if to is not None and not (math.isfinite(to) and to > 0.0):
+        raise ProjectError(f"--to {to:g} is no constellation; choose degrees above 0")
+    given = {"to_deg": to, "roll_deg": roll, "tolerance": tolerance, "samples": samples, "checks": check, "bins": bins}
+    known: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
+    return Wanted(setting=setting, pictures=output is not None, **known)
+
+
+def _sensor(text: str | None) -> tuple[float, float]:
+    if text is None:
+        return 36.0, 24.0
+    width, height = pair(text, "--sensor", "36x24 (mm)", "x")
+    if min(width, height) <= 0.0:
+        raise ProjectError(f"--sensor {text!r}: a sensor has a width and a height above 0 mm")
+    return width, height
+
+
+def _setting(illuminance: float | None, luminance: str | None) -> Setting:
     from ..predict.occurrence import Setting
 
+    illuminance = 1e5 if illuminance is None else illuminance
     if not 0.0 < illuminance <= 1e9:
         raise ProjectError(f"--illuminance {illuminance:g} is no illuminance; give lux above 0, 1e5 for the sun")
     if luminance is None:
@@ -119,8 +266,8 @@ def _setting(illuminance: float, luminance: str | None) -> Setting:
 
 
 def _project(
-    lens: str, fstop: float | None, coating: str, zoom: str | None, focus: float | None, sensor: str, spectrum: str,
-    light_diameter: float,
+    lens: str, fstop: float | None, coating: str | None, zoom: str | None, focus: float | None,
+    sensor: tuple[float, float], spectrum: str | None, light_diameter: float | None,
 ) -> Project:  # fmt: skip
     """Return a project of what the flags say, its light on the axis."""
     from pydantic import ValidationError
@@ -130,32 +277,20 @@ def _project(
     from ..model import Project
     from .render_flags import in_flags
 
-    width, height = pair(sensor, "--sensor", "36x24 (mm)", "x")
-    if min(width, height) <= 0.0:
-        raise ProjectError(f"--sensor {sensor!r}: a sensor has a width and a height above 0 mm")
-    size_px = (240, max(1, min(round(240.0 * height / width), 2400)))
-    light = {"field_deg": (0.0, 0.0), "spectrum": parse_spectrum(spectrum), "diameter_deg": light_diameter}
+    width, height = sensor
+    size_px = (SHOWN_PX, max(1, min(round(SHOWN_PX * height / width), 10 * SHOWN_PX)))
+    light = {
+        "field_deg": (0.0, 0.0), "spectrum": parse_spectrum(spectrum or "d65"), "diameter_deg": light_diameter or 0.0
+    }  # fmt: skip
     fields: dict[str, Any] = {
-        "lens": lens, "f_number": fstop, "coating": parse_coating_choice(coating), "zoom": zoom, "lights": (light,),
+        "lens": lens, "f_number": fstop, "coating": parse_coating_choice(coating or "lens"), "zoom": zoom,
+        "lights": (light,),
         "camera": {"size_px": size_px, "sensor_mm": (width, height), "focus_distance": focus},
     }  # fmt: skip
     try:
         return Project.model_validate(fields)
     except ValidationError as error:
         raise ProjectError(in_flags(explain(error, fields)[0])) from None
-
-
-def _lens_flares(project: Project, quality: str, threads: int | None) -> Flares:
-    """Return the flare of a lens as it is sampled, judged and shown."""
-    from ..predict.lens_flare import lens_flare, square_flare, statistics_quality
-    from ..predict.occurrence import Flares
-    from ..render.first_run import compile_for_render
-
-    final = project.replace(quality={"mode": "final"})
-    compile_for_render(final, threads)
-    sampled, frame = square_flare(project, statistics_quality(quality), threads=threads)
-    judge, _ = square_flare(project, final.quality, threads=threads)
-    return Flares(sampled, frame, quality, judge, lens_flare(final, threads=threads))
 
 
 def _glare(project: Project, threads: int | None) -> VeilingGlare:

@@ -46,6 +46,10 @@ from .text_file import read_toml
 
 __all__ = [
     "ProjectFileError",
+    "Sections",
+    "accept_text",
+    "expand_coating",
+    "expand_spectrum",
     "explain",
     "lens_location",
     "parse_coating_choice",
@@ -54,6 +58,8 @@ __all__ = [
     "project_text",
     "read_project",
 ]
+
+Sections = dict[str, tuple[type[BaseModel], ...]]
 
 _NEWEST = 1
 
@@ -157,14 +163,16 @@ def _expanded(data: dict[str, Any], folder: Path, problems: list[str]) -> dict[s
         _expand_paths(out, section, keys, folder)
     if "coating" in out:
         try:
-            out["coating"] = _coating(out["coating"], folder)
+            out["coating"] = expand_coating(out["coating"], folder)
         except FlarewrightError as error:
             problems.append(f"coating: {error}")
             del out["coating"]
     for section, key in (("", "filter"), ("camera", "cover_glass")):
         _expand_plate(out, section, key, problems)
     if isinstance(out.get("lights"), list):
-        out["lights"] = [_light(light, f"lights[{k}]", folder, problems) for k, light in enumerate(out["lights"])]
+        out["lights"] = [
+            expand_spectrum(light, f"lights[{k}]", folder, problems) for k, light in enumerate(out["lights"])
+        ]
     return out
 
 
@@ -216,8 +224,8 @@ def _embedded_lens(table: dict[str, Any], folder: Path, problems: list[str]) -> 
         return "?"
 
 
-def _coating(value: Any, folder: Path) -> Any:
-    """Expand the short texts of a coating: the choice itself, or those inside its table."""
+def expand_coating(value: Any, folder: Path) -> Any:
+    """Return a coating with its short texts expanded: the choice itself, or those inside its table."""
     if isinstance(value, str):
         return parse_coating_choice(value, folder=folder)
     if isinstance(value, dict) and isinstance(value.get("coatings"), list):
@@ -227,7 +235,8 @@ def _coating(value: Any, folder: Path) -> Any:
     return value
 
 
-def _light(light: Any, where: str, folder: Path, problems: list[str]) -> Any:
+def expand_spectrum(light: Any, where: str, folder: Path, problems: list[str]) -> Any:
+    """Return a light's table with the short text of its spectrum expanded; what cannot be is noted and left out."""
     if isinstance(light, dict):
         light = dict(light)
         _expand_paths(light, "holdout", list(HOLDOUT_FILES), folder)
@@ -275,7 +284,7 @@ def parse_coating_choice(text: str, *, folder: Path | None = None) -> CoatingCho
 # Findings
 
 
-def explain(error: ValidationError, data: Any) -> list[str]:
+def explain(error: ValidationError, data: Any, sections: Sections | None = None) -> list[str]:
     """Return one sentence for each finding of a failed validation.
 
     Parameters
@@ -283,6 +292,8 @@ def explain(error: ValidationError, data: Any) -> list[str]:
     error : pydantic.ValidationError
     data : object
         What was validated; names the places as a person wrote them.
+    sections : dict of str to tuple of type, optional
+        Which records a section of the file holds, for what an unknown key may have meant; None: those of a project.
 
     Returns
     -------
@@ -298,7 +309,7 @@ def explain(error: ValidationError, data: Any) -> list[str]:
             case "missing":
                 sentence = f"{place} is missing"
             case "extra_forbidden":
-                sentence = f"{place} is not a known key{_suggestion(keys)}"
+                sentence = f"{place} is not a known key{_suggestion(keys, sections)}"
             case "value_error":
                 reason = finding["msg"].removeprefix("Value error, ")
                 sentence = f"{place}: {reason}" if place else reason
@@ -338,7 +349,7 @@ def _given(value: Any) -> str:
     return f", not {shorten(value)}" if isinstance(value, str | int | float | bool) else ""
 
 
-_SECTIONS: dict[str, tuple[type[BaseModel], ...]] = {
+_SECTIONS: Sections = {
     "": (Project,),
     "iris": (Iris,),
     "camera": (Camera,),
@@ -365,17 +376,17 @@ _SECTIONS: dict[str, tuple[type[BaseModel], ...]] = {
 
 
 # names of these are common words, which are not looked for elsewhere
-_DESIGN: dict[str, tuple[type[BaseModel], ...]] = {
+_DESIGN: Sections = {
     "design": (designs.Design,), "wishes": (designs.GhostWish,), "bounds": (designs.Bounds,),
 }  # fmt: skip
 
 
-def _suggestion(keys: list[int | str]) -> str:
+def _suggestion(keys: list[int | str], sections: Sections | None) -> str:
     wrong = str(keys[-1]) if keys else ""
     section = next((key for key in reversed(keys[:-1]) if isinstance(key, str)), "")
-    known = [name for model in (_SECTIONS | _DESIGN).get(section, ()) for name in model.model_fields]
+    known = [name for model in (sections or _SECTIONS | _DESIGN).get(section, ()) for name in model.model_fields]
     unfinished = any(name.startswith(f"{wrong}_") for name in known)
-    for other, models in _SECTIONS.items():
+    for other, models in (_SECTIONS if sections is None else {}).items():
         if other and not unfinished and any(wrong in model.model_fields for model in models):
             heading = {"lights": "[[lights]]", "rules": "[[art.rules]]"}.get(other, f"[{other}]")
             return f" here; it belongs into {heading}"
@@ -392,12 +403,12 @@ def project_json_schema() -> dict[str, Any]:
     spectra = schema["$defs"]["Light"]["properties"]["spectrum"]
     choice = schema["properties"]["coating"]
     for owner, words in ((choice, ABOUT["coating"]), (spectra, ABOUT["lights.spectrum"])):
-        _accept_text(owner, words)
+        accept_text(owner, words)
     _accept_coating_texts(schema["$defs"])
     return schema
 
 
-def _accept_text(node: dict[str, Any], words: str) -> None:
+def accept_text(node: dict[str, Any], words: str) -> None:
     """Let a schema node be a short text too."""
     table = {key: node.pop(key) for key in list(node) if key in ("oneOf", "discriminator")}
     node.pop("default", None)
@@ -408,7 +419,7 @@ def _accept_coating_texts(node: Any) -> None:
     """Let every coating below a schema node be a short text too."""
     if isinstance(node, dict):
         if "quarter-wave" in node.get("discriminator", {}).get("mapping", {}):
-            _accept_text(node, "a table, or a short text like quarter-wave:550")
+            accept_text(node, "a table, or a short text like quarter-wave:550")
         else:
             for value in node.values():
                 _accept_coating_texts(value)

@@ -118,7 +118,7 @@ def sample_curves(
                 progress(min(len(known) / most, 1.0), f"{angle:.2f} degrees")
         return known[angle]
 
-    first = [float(angle) for angle in np.linspace(0.0, end, min(FIRST, most))]
+    first = [float(angle) for angle in np.linspace(table.flare.least_deg, end, min(FIRST, most))]
     for angle in first:
         draw(angle)
     # (error found when the interval was made, from, to)
@@ -166,7 +166,7 @@ def check_curves(curves: Curves, judge: FlareTable, count: int, progress: Progre
     """
     at = curves.constellation_deg
     middles = 0.5 * (at[1:] + at[:-1])
-    wanted = np.linspace(0.0, at[-1], count + 2)[1:-1]
+    wanted = np.linspace(at[0], at[-1], count + 2)[1:-1]
     chosen = sorted({float(middles[int(np.argmin(np.abs(middles - angle)))]) for angle in wanted})
     rendered = []
     for k, angle in enumerate(chosen):

@@ -61,8 +61,10 @@ class Flare:
         Irradiance on the sensor per radiance of an extended scene.
     turns : bool
         Whether the roll only turns the picture.
-    reach_deg : float
-        The largest constellation that it knows.
+    least_deg, reach_deg : float
+        The smallest and the largest constellation that it knows.
+    dark_beyond : bool
+        Whether a light beyond makes no flare; else nobody knows.
     fingerprint : str
         The same for flares that draw the same.
     remarks : tuple of str
@@ -77,7 +79,9 @@ class Flare:
     scene_scale: float
     efl: float | None = None
     turns: bool = True
+    least_deg: float = 0.0
     reach_deg: float = 85.0
+    dark_beyond: bool = True
     fingerprint: str = ""
     remarks: tuple[str, ...] = ()
 

@@ -14,7 +14,7 @@ from .contrast import contrast
 from .curves import Check, Curves, Progress, bins_of, check_curves, sample_curves
 from .flare import Flare, Frame
 from .statistics import NAMES
-from .table import FlareTable
+from .table import FlareTable, Memory
 
 Floats = NDArray[np.float64]
 
@@ -130,7 +130,9 @@ class Occurrence:
         return self.curves.column("mean") * self.setting.illuminance_lx / self.flare.scene_scale
 
 
-def predict_occurrence(flares: Flares, wanted: Wanted, told: Callable[[str], Progress]) -> Occurrence:
+def predict_occurrence(
+    flares: Flares, wanted: Wanted, told: Callable[[str], Progress], memory: Memory | None = None
+) -> Occurrence:
     """Sample, check and picture the flare of a camera over the constellation.
 
     Parameters
@@ -139,20 +141,24 @@ def predict_occurrence(flares: Flares, wanted: Wanted, told: Callable[[str], Pro
     wanted : Wanted
     told : callable
         Returns where progress of a named part of the work is told.
+    memory : dict, optional
+        Pictures drawn before; new ones are added to it.
 
     Returns
     -------
     Occurrence
         Without the veiling glare, which takes a lens.
     """
-    table = FlareTable(flares.sampled, flares.frame)
+    known: Memory = {} if memory is None else memory
+    table = FlareTable(flares.sampled, flares.frame, drawn=known.setdefault(flares.sampled.fingerprint, {}))
     curves = sample_curves(
         table, to_deg=wanted.to_deg, roll_deg=wanted.roll_deg, tolerance=wanted.tolerance, most=wanted.samples,
         progress=told("curves"),
     )  # fmt: skip
     check = None
     if flares.judge is not None and wanted.checks > 0:
-        check = check_curves(curves, FlareTable(flares.judge, flares.frame), wanted.checks, told("checks"))
+        judge = FlareTable(flares.judge, flares.frame, drawn=known.setdefault(flares.judge.fingerprint, {}))
+        check = check_curves(curves, judge, wanted.checks, told("checks"))
     pictures = []
     if wanted.pictures:
         progress = told("pictures")

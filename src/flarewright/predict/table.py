@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from math import floor
+from math import floor, inf
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,11 @@ Floats = NDArray[np.float64]
 # angles are told apart to this many decimals of a degree
 DECIMALS = 4
 
-__all__ = ["FlareTable"]
+Drawn = dict[tuple[float, float], NDArray[np.float32]]
+Memory = dict[str, Drawn]
+"""Luminance of what was drawn, by the flare's fingerprint, then by (constellation, roll) in degrees."""
+
+__all__ = ["Drawn", "FlareTable", "Memory"]
 
 
 @dataclass(frozen=True)
@@ -44,7 +48,7 @@ class FlareTable:
     frame: Frame
     step_deg: float = 1.0
     roll_step_deg: float = 15.0
-    drawn: dict[tuple[float, float], NDArray[np.float32]] = field(default_factory=dict, compare=False, repr=False)
+    drawn: Drawn = field(default_factory=dict, compare=False, repr=False)
     on_draw: Callable[[], None] | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -83,10 +87,6 @@ class FlareTable:
         """Measure the flare at exactly this constellation and roll."""
         return measure(*self.light(constellation_deg, roll_deg), self.frame.area)
 
-    def reaches(self, constellation_deg: float) -> bool:
-        """Whether the flare is known there."""
-        return constellation_deg <= self.flare.reach_deg + 1e-9
-
     def nodes(self, constellation_deg: float, roll_deg: float) -> list[tuple[float, float, float]]:
         """Return the drawn constellations and rolls around a light with their weights, for straight lines between.
 
@@ -99,11 +99,11 @@ class FlareTable:
         list of (constellation_deg, roll_deg, weight)
             The weights add up to 1; those of weight 0 are left out.
         """
-        across = _around(constellation_deg, self.step_deg, self.flare.reach_deg)
+        across = _around(constellation_deg, self.step_deg, self.flare.least_deg, self.flare.reach_deg)
         if self.flare.turns:
             around = [(roll_deg, 1.0)]
         else:
-            around = [(_wrapped(roll), weight) for roll, weight in _around(roll_deg, self.roll_step_deg, 1e9)]
+            around = [(_wrapped(roll), weight) for roll, weight in _around(roll_deg, self.roll_step_deg)]
         return [(c, roll, a * b) for c, a in across for roll, b in around if a * b > 1e-6]
 
     def between(self, constellation_deg: float, roll_deg: float) -> Statistics:
@@ -120,11 +120,21 @@ class FlareTable:
             total += weight * self.at(c, roll).values
         return Statistics(*(float(value) for value in total))
 
+    def mean_between(self, constellation_deg: float, roll_deg: float) -> float:
+        """Return the mean of `between` alone, which takes a tenth of the time."""
+        total = 0.0
+        for c, roll, weight in self.nodes(constellation_deg, roll_deg):
+            light, share = self.light(c, roll)
+            total += weight * float(np.vdot(light, share)) / float(share.sum())
+        return total
 
-def _around(value: float, step: float, most: float) -> list[tuple[float, float]]:
-    below = floor(value / step + 1e-9) * step
-    part = min(max((value - below) / step, 0.0), 1.0)
-    return [(min(below, most), 1.0 - part), (min(below + step, most), part)]
+
+def _around(value: float, step: float, least: float = -inf, most: float = inf) -> list[tuple[float, float]]:
+    """Return the two grid points about a value, those at the ends of the range moved onto them, with weights."""
+    start = floor(value / step + 1e-9) * step
+    below, above = max(start, least), min(start + step, most)
+    part = min(max((value - below) / (above - below), 0.0), 1.0) if above > below else 0.0
+    return [(below, 1.0 - part), (above, part)]
 
 
 def _wrapped(roll_deg: float) -> float:

@@ -1,0 +1,29 @@
+"""`flarewright scene check`: whether a scene file can be planned."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .common import print_json
+
+
+def check(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="A scene file.")],
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+) -> None:
+    """Check a scene, and tell every mistake at once; exit code 2 when it cannot be planned."""
+    from ..io.scene_file import read_scene
+    from ..predict.tracks import camera_track, moments, sightings
+
+    scene = read_scene(file)
+    times, dates = moments(scene)
+    tracks = [camera_track(one, times, f"cameras[{c}] ({one.name})") for c, one in enumerate(scene.cameras)]
+    sightings(scene, tracks, times, dates)
+    if as_json:
+        facts = {"cameras": len(scene.cameras), "lights": len(scene.lights), "times": len(times)}
+        print_json({"file": str(file), "usable": True, "scene": scene.name, **facts})
+        return
+    print(f"{file}: usable, {len(scene.cameras)} cameras, {len(scene.lights)} lights, {len(times)} times")

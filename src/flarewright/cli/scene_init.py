@@ -1,0 +1,32 @@
+"""`flarewright scene init`: a scene file to begin with."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ..errors import OutputError
+from .common import check_place, tell, write_text
+
+EPILOG = "Example:\n\nflarewright scene init -o match.toml\n\nflarewright predict match.toml -o match.html"
+
+
+def init(
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="The scene file, *.toml; left out: stdout.")
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace a file that is there already.")] = False,
+) -> None:
+    """Write a scene with two cameras, the sun and a lamp, and a few words about every key."""
+    from ..io.scene_file import EXAMPLE
+
+    if output is None:
+        print(EXAMPLE, end="")
+        return
+    check_place(output, ".toml")
+    if output.exists() and not force:
+        raise OutputError(f"{output} exists already; choose another name, or replace it with --force")
+    write_text(output, EXAMPLE)
+    tell([f"wrote {output}"])

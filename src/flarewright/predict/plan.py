@@ -1,0 +1,300 @@
+"""A scene's flare: every light in every camera at every time, ranked."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from math import log2
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..model.scene import Scene, SceneCamera, SceneLight
+from .contrast import WASHED, contrast
+from .curves import Progress
+from .flare import Flare, Frame
+from .photometry import exposure_level
+from .statistics import NAMES
+from .table import FlareTable, Memory
+from .tracks import CameraTrack, Sighting, camera_track, moments, sightings
+
+Floats = NDArray[np.float64]
+FlareMaker = Callable[[SceneCamera, SceneLight, float], tuple[Flare, Frame]]
+
+# between drawn constellations, degrees; lights smaller than this are drawn as points
+STEP_DEG, POINT_DEG = 2.0, 1.0
+# nearer than so many focal lengths a light's ghosts are no longer those of a distant one
+NEAR = 50.0
+
+__all__ = ["FlareMaker", "Pair", "Plan", "Ranked", "plan_scene", "ranking", "rounded_diameter", "tables_of"]
+
+
+@dataclass(frozen=True)
+class Pair:
+    """One light in one camera over time.
+
+    Attributes
+    ----------
+    sighting : Sighting
+    values : ndarray, shape (T, 5)
+        `statistics.NAMES`, in lx on the sensor (the sum in lx mm^2).
+    known : ndarray of bool, shape (T,)
+        Whether the camera's flare is known there; where it is not the values are 0.
+    """
+
+    sighting: Sighting
+    values: Floats
+    known: NDArray[np.bool_]
+
+    def column(self, name: str) -> Floats:
+        """Return one statistic over time, shape (T,)."""
+        return self.values[:, NAMES.index(name)]
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A scene with all its flare.
+
+    Attributes
+    ----------
+    scene : Scene
+    times_s : ndarray, shape (T,)
+    dates : tuple of datetime or None
+    tracks : tuple of CameraTrack
+    tables : tuple of tuple of FlareTable
+        By camera and light.
+    pairs : tuple of tuple of Pair
+        By camera and light.
+    remarks : tuple of str
+    """
+
+    scene: Scene
+    times_s: Floats
+    dates: tuple[datetime, ...] | None
+    tracks: tuple[CameraTrack, ...]
+    tables: tuple[tuple[FlareTable, ...], ...]
+    pairs: tuple[tuple[Pair, ...], ...]
+    remarks: tuple[str, ...]
+
+    def scene_scale(self, camera: int) -> float:
+        """Return the illuminance on a camera's sensor per luminance of the scene, lx per cd/m^2."""
+        return self.tables[camera][0].flare.scene_scale
+
+    def veil(self, camera: int, light: int | None = None) -> Floats:
+        """Return the mean flare of one light, or of all together, as luminance of the scene, cd/m^2, shape (T,)."""
+        chosen = self.pairs[camera] if light is None else [self.pairs[camera][light]]
+        total = np.zeros(len(self.times_s))
+        for pair in chosen:
+            total = total + pair.column("mean")
+        return total / self.scene_scale(camera)
+
+    def contrast_left(self, veil_cd_m2: Floats) -> Floats | None:
+        """Return K_real / K_ideal under a veil (equation 9.3), or None when the scene's luminance is not told."""
+        if self.scene.luminance_cd_m2 is None:
+            return None
+        low, high = self.scene.luminance_cd_m2
+        return np.array([contrast(high, low, float(one)).ratio for one in veil_cd_m2])
+
+    def glare_indicator(self, camera: int, light: int) -> Floats | None:
+        """Return the log-average of a flare over that of the scene (Walch 2017, section 9.2), shape (T,)."""
+        if self.scene.luminance_cd_m2 is None:
+            return None
+        low, high = self.scene.luminance_cd_m2
+        key = self.scene.key_cd_m2 if self.scene.key_cd_m2 is not None else float(np.sqrt(low * high))
+        if key <= 0.0:
+            return None
+        return self.pairs[camera][light].column("log_average") / self.scene_scale(camera) / key
+
+
+@dataclass(frozen=True)
+class Ranked:
+    """A light in a camera, as the ranking tells it.
+
+    Attributes
+    ----------
+    camera, light : int
+    mean_veil_cd_m2 : float
+        Over time.
+    worst : int
+        Which time has the brightest veil.
+    worst_veil_cd_m2 : float
+    worst_constellation_deg : float
+    contrast_left : float or None
+        At that time.
+    seen_share : float or None
+        Part of the time in which less than nine tenths of the contrast are left.
+    brightest_stops : float or None
+        Of the brightest spot, at any time, from where the sensor clips; above 0 it clips. None for a measured flare.
+    """
+
+    camera: int
+    light: int
+    mean_veil_cd_m2: float
+    worst: int
+    worst_veil_cd_m2: float
+    worst_constellation_deg: float
+    contrast_left: float | None
+    seen_share: float | None
+    brightest_stops: float | None
+
+
+def tables_of(
+    scene: Scene, seen: Sequence[Sequence[Sighting]], maker: FlareMaker, memory: Memory | None = None
+) -> tuple[tuple[FlareTable, ...], ...]:
+    """Make the tables of all cameras and lights; what draws the same is drawn once.
+
+    Parameters
+    ----------
+    scene : Scene
+    seen : sequence of sequence of Sighting
+    maker : callable
+        (camera, light, diameter_deg) to a flare for tables and the camera's frame.
+    memory : dict, optional
+        Pictures drawn before, by the flares' fingerprints; new ones are added to it.
+
+    Returns
+    -------
+    tuple of tuple of FlareTable
+        By camera and light.
+    """
+    known: dict[tuple[str, Frame], FlareTable] = {}
+    out = []
+    for camera, row in zip(scene.cameras, seen, strict=True):
+        tables = []
+        for light, sighting in zip(scene.lights, row, strict=True):
+            flare, frame = maker(camera, light, rounded_diameter(sighting))
+            key = flare.fingerprint, frame
+            if key not in known:
+                drawn = {} if memory is None else memory.setdefault(flare.fingerprint, {})
+                known[key] = FlareTable(flare, frame, STEP_DEG, drawn=drawn)
+            tables.append(known[key])
+        out.append(tuple(tables))
+    return tuple(out)
+
+
+def rounded_diameter(sighting: Sighting) -> float:
+    """Return the size a light is drawn with, its largest over time, rounded so that few are drawn.
+
+    Below a degree it is a point, three times as fast: the mean stays within a thousandth, the brightest spots come out
+    up to a tenth brighter. Above, it is a power of two degrees.
+    """
+    lit = sighting.illuminance_lx > 0.0
+    largest = float(sighting.diameter_deg[lit].max()) if lit.any() else 0.0
+    return 0.0 if largest < POINT_DEG else min(2.0 ** round(log2(largest)), 32.0)
+
+
+def plan_scene(scene: Scene, maker: FlareMaker, told: Callable[[str], Progress], memory: Memory | None = None) -> Plan:
+    """Follow cameras and lights, and measure the flare of all of them.
+
+    Parameters
+    ----------
+    scene : Scene
+    maker : callable
+        As in `tables_of`.
+    told : callable
+        Returns where progress of a named part of the work is told.
+    memory : dict, optional
+        As in `tables_of`.
+
+    Returns
+    -------
+    Plan
+
+    Raises
+    ------
+    FlarewrightError
+        When a lens cannot be used, or camera and light do not fit together.
+    """
+    times, dates = moments(scene)
+    tracks = tuple(camera_track(one, times, f"cameras[{c}] ({one.name})") for c, one in enumerate(scene.cameras))
+    seen = sightings(scene, tracks, times, dates)
+    tables = tables_of(scene, seen, maker, memory)
+    draw_ahead(tables, seen, told("flares"))
+    pairs, remarks = [], []
+    for c, (camera, row) in enumerate(zip(scene.cameras, seen, strict=True)):
+        remarks += [f"{camera.name}: {remark}" for remark in tables[c][0].flare.remarks]
+        line = []
+        for k, (light, sighting) in enumerate(zip(scene.lights, row, strict=True)):
+            pair = _measured(tables[c][k], sighting)
+            line.append(pair)
+            remarks += _doubts(camera, light, tables[c][k].flare, pair)
+        pairs.append(tuple(line))
+    return Plan(scene, times, dates, tracks, tables, tuple(pairs), tuple(dict.fromkeys(remarks)))
+
+
+def draw_ahead(tables: Sequence[Sequence[FlareTable]], seen: Sequence[Sequence[Sighting]], progress: Progress) -> None:
+    """Draw every picture that the sightings need, so that progress and what is left are known."""
+    wanted: dict[tuple[int, float, float], FlareTable] = {}
+    for row, line in zip(tables, seen, strict=True):
+        for table, sighting in zip(row, line, strict=True):
+            for c, roll, lux in zip(
+                sighting.constellation_deg, sighting.roll_deg, sighting.illuminance_lx, strict=True
+            ):
+                if lux > 0.0 and table.flare.least_deg <= c <= table.flare.reach_deg:
+                    for node, at_roll, _ in table.nodes(float(c), float(roll)):
+                        wanted[id(table), node, 0.0 if table.flare.turns else at_roll] = table
+    for k, ((_, node, roll), table) in enumerate(wanted.items()):
+        table.light(node, roll)
+        progress((k + 1) / len(wanted), f"{table.flare.name}, {node:.4g} degrees")
+
+
+def _measured(table: FlareTable, sighting: Sighting) -> Pair:
+    angles, lux = sighting.constellation_deg, sighting.illuminance_lx
+    inside = (angles >= table.flare.least_deg) & (angles <= table.flare.reach_deg)
+    values = np.zeros((len(angles), len(NAMES)))
+    for t in np.flatnonzero(inside & (lux > 0.0)):
+        values[t] = table.between(float(angles[t]), float(sighting.roll_deg[t])).values * lux[t]
+    return Pair(sighting, values, inside | table.flare.dark_beyond | (lux == 0.0))
+
+
+def _doubts(camera: SceneCamera, light: SceneLight, flare: Flare, pair: Pair) -> list[str]:
+    told = []
+    unknown = float(np.mean(~pair.known))
+    if unknown > 0.0:
+        told.append(
+            f"{camera.name} was measured from {flare.least_deg:g} to {flare.reach_deg:g} degrees; {light.name} stands "
+            f"elsewhere in {unknown:.0%} of the times, which count as without flare"
+        )
+    nearest = float(pair.sighting.distance_m.min())
+    if flare.efl is not None and nearest < 1e-3 * NEAR * flare.efl:
+        told.append(
+            f"{light.name} comes within {nearest:.3g} m of {camera.name}, nearer than {NEAR:g} focal lengths: its "
+            "ghosts are drawn as those of a distant light"
+        )
+    return told
+
+
+def ranking(plan: Plan) -> list[Ranked]:
+    """Rank every light in every camera by its mean veil over time, worst first.
+
+    Parameters
+    ----------
+    plan : Plan
+
+    Returns
+    -------
+    list of Ranked
+    """
+    out = []
+    for c, camera in enumerate(plan.scene.cameras):
+        for k, pair in enumerate(plan.pairs[c]):
+            veil = plan.veil(c, k)
+            worst = int(np.argmax(veil))
+            left = plan.contrast_left(veil)
+            peak = float(pair.column("maximum").max())
+            level = exposure_level(peak, camera.iso, camera.exposure_s) if camera.model is None else 0.0
+            out.append(
+                Ranked(
+                    camera=c,
+                    light=k,
+                    mean_veil_cd_m2=float(veil.mean()),
+                    worst=worst,
+                    worst_veil_cd_m2=float(veil[worst]),
+                    worst_constellation_deg=float(pair.sighting.constellation_deg[worst]),
+                    contrast_left=None if left is None else float(left[worst]),
+                    seen_share=None if left is None else float(np.mean(left < WASHED)),
+                    brightest_stops=log2(level) if level > 0.0 else None,
+                )
+            )
+    return sorted(out, key=lambda one: (-one.mean_veil_cd_m2, one.camera, one.light))

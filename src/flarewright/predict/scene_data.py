@@ -1,0 +1,148 @@
+"""A planned scene as data: what `--json` prints."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from ..render.glare import VeilingGlare
+from .plan import Plan, Ranked
+from .search import WORTH, Found
+from .statistics import NAMES
+from .switching import Shot
+
+__all__ = ["found_words", "scene_data", "time_words"]
+
+
+def time_words(plan: Plan, index: int) -> str:
+    """Name a time of a plan as a person does: the clock's where the scene tells it, else seconds."""
+    if plan.dates is None:
+        return f"{plan.times_s[index]:.6g} s"
+    date = plan.dates[index]
+    days = plan.dates[0].date() != plan.dates[-1].date()
+    return f"{date:%Y-%m-%d %H:%M:%S}" if days else f"{date:%H:%M:%S}"
+
+
+def found_words(plan: Plan, found: Found) -> str:
+    """Say in a sentence what a search for a better position came to."""
+    name = plan.scene.cameras[found.camera].name
+    tried, old = len(found.veils_cd_m2) - 1, float(found.veils_cd_m2[0])
+    about = f"of {tried} positions within {found.radius_m:g} m of {name}"
+    if old == 0.0:
+        return f"{name} has no flare where it stands; none {about} can be better"
+    if not found.better:
+        gain = 1.0 - float(found.veils_cd_m2[found.best]) / old
+        return f"none {about} takes away as much as {WORTH:.0%} of the flare (the best {gain:.1%}): it stands well"
+    new = float(found.veils_cd_m2[found.best])
+    x, y, z = (float(part) for part in found.offsets_m[found.best])
+    level = f", {abs(z):.3g} m {'higher' if z > 0 else 'lower'}" if abs(z) > 0.005 else ""
+    return (
+        f"the best {about} lies {x:+.3g} m along x and {y:+.3g} m along y{level}: mean veil {new:.3g} instead of "
+        f"{old:.3g} cd/m², {1.0 - new / old:.0%} less"
+    )
+
+
+def scene_data(
+    plan: Plan,
+    ranked: Sequence[Ranked],
+    shots: Sequence[Shot],
+    found: Found | None,
+    checks: Sequence[tuple[Ranked, float]] = (),
+    glare: Sequence[VeilingGlare | None] = (),
+) -> dict[str, Any]:
+    """Return a planned scene as JSON holds it.
+
+    Parameters
+    ----------
+    plan : Plan
+    ranked : sequence of Ranked
+    shots : sequence of Shot
+        Which camera when; empty for one camera.
+    found : Found or None
+    checks : sequence of (Ranked, float)
+        Veils of final renders of their own, cd/m^2, at the worst times.
+    glare : sequence of VeilingGlare or None
+        By camera.
+    """
+    cameras, lights = plan.scene.cameras, plan.scene.lights
+    rendered = {(one.camera, one.light): veil for one, veil in checks}
+    data: dict[str, Any] = {
+        "scene": plan.scene.name,
+        "times_s": plan.times_s.tolist(),
+        "dates": None if plan.dates is None else [date.isoformat() for date in plan.dates],
+        "ranking": [
+            {
+                "camera": cameras[one.camera].name,
+                "light": lights[one.light].name,
+                "mean_veil_cd_m2": one.mean_veil_cd_m2,
+                "worst_at_s": float(plan.times_s[one.worst]),
+                "worst_veil_cd_m2": one.worst_veil_cd_m2,
+                "worst_constellation_deg": one.worst_constellation_deg,
+                "contrast_left": one.contrast_left,
+                "seen_share": one.seen_share,
+                "brightest_stops_from_clipping": one.brightest_stops,
+                "rendered_veil_cd_m2": rendered.get((one.camera, one.light)),
+            }
+            for one in ranked
+        ],
+        "cameras": [_camera(plan, c, glare[c] if c < len(glare) else None) for c in range(len(cameras))],
+        "which_camera_when": [
+            {
+                "camera": cameras[shot.camera].name,
+                "from_s": float(plan.times_s[shot.first]),
+                "to_s": float(plan.times_s[shot.last]),
+                "from": time_words(plan, shot.first),
+                "to": time_words(plan, shot.last),
+            }
+            for shot in shots
+        ],
+        "remarks": list(plan.remarks),
+    }
+    if found is not None:
+        data["better_position"] = {
+            "camera": cameras[found.camera].name,
+            "radius_m": found.radius_m,
+            "height_m": found.height_m,
+            "better": found.better,
+            "offset_m": found.offsets_m[found.best].tolist() if found.better else [0.0, 0.0, 0.0],
+            "mean_veil_cd_m2": float(found.veils_cd_m2[0]),
+            "best_mean_veil_cd_m2": float(found.veils_cd_m2[found.best]),
+            "positions": found.offsets_m.tolist(),
+            "veils_cd_m2": [float(veil) if np.isfinite(veil) else None for veil in found.veils_cd_m2],
+            "words": found_words(plan, found),
+        }
+    return data
+
+
+def _camera(plan: Plan, c: int, glare: VeilingGlare | None) -> dict[str, Any]:
+    camera, table = plan.scene.cameras[c], plan.tables[c][0]
+    veil = plan.veil(c)
+    left = plan.contrast_left(veil)
+    out: dict[str, Any] = {
+        "name": camera.name,
+        "flare": table.flare.name,
+        "f_number": table.flare.f_number,
+        "lux_per_cd_m2": table.flare.scene_scale,
+        "veil_cd_m2": veil.tolist(),
+        "contrast_left": None if left is None else left.tolist(),
+        "lights": [],
+    }
+    if glare is not None:
+        out["veiling_glare_index"] = glare.index
+    for k, (light, pair) in enumerate(zip(plan.scene.lights, plan.pairs[c], strict=True)):
+        indicator = plan.glare_indicator(c, k)
+        seen = pair.sighting
+        out["lights"].append(
+            {
+                "name": light.name,
+                "constellation_deg": seen.constellation_deg.tolist(),
+                "roll_deg": seen.roll_deg.tolist(),
+                "illuminance_lx": seen.illuminance_lx.tolist(),
+                "statistics_lx": {name: pair.values[:, n].tolist() for n, name in enumerate(NAMES)},
+                "glare_indicator": None if indicator is None else indicator.tolist(),
+                "known": pair.known.tolist(),
+            }
+        )
+    return out

@@ -1,0 +1,278 @@
+"""The HTML report of a scene: ranking, flare over time, which camera when, a plan, and what the worst looks like."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..model.scene import Lamp
+from ..render.display import view
+from ..render.figure import FAINT, INK, Box, Figure, Line, Mark, Text
+from .chart import COLOURS, Series, chart, number
+from .occurrence_page import shown_together
+from .page import figures, image, page, paragraph, remark_list, section, table
+from .plan import Plan, Ranked
+from .scene_data import found_words, time_words
+from .search import Found
+from .switching import Shot
+
+Floats = NDArray[np.float64]
+
+# lines in a chart, rows in the ranking
+LINES, ROWS = 8, 40
+
+__all__ = ["Worst", "scene_page"]
+
+Worst = tuple[Ranked, NDArray[np.float32], float]
+"""A row of the ranking, its picture at the worst time in cd/m^2, and that picture's mean."""
+
+
+def scene_page(
+    plan: Plan, ranked: Sequence[Ranked], shots: Sequence[Shot], found: Found | None, worst: Sequence[Worst]
+) -> str:
+    """Return the report.
+
+    Parameters
+    ----------
+    plan : Plan
+    ranked : sequence of Ranked
+    shots : sequence of Shot
+    found : Found or None
+    worst : sequence of Worst
+
+    Returns
+    -------
+    str
+        HTML.
+    """
+    scene = plan.scene
+    span = time_words(plan, 0)
+    if len(plan.times_s) > 1:
+        span = f"{span} to {time_words(plan, len(plan.times_s) - 1)}, {len(plan.times_s)} times"
+        if plan.dates is not None:
+            span = f"{plan.dates[0]:%Y-%m-%d} {span}"
+    lead = (
+        f"{len(scene.cameras)} cameras, {len(scene.lights)} lights, {span}. The veil is the mean flare in the picture, "
+        "told as the luminance that a scene would need to light the sensor as much; the light's own image is left out, "
+        "and nothing hides a light but the horizon the sun."
+    )
+    parts = [section("Ranking", _ranking(plan, ranked))]
+    if len(plan.times_s) > 1:
+        parts.append(section("Over time", _over_time(plan)))
+    if shots:
+        parts.append(section("Which camera when", _shots(plan, shots)))
+    parts.append(section("Plan", figures(_map(plan, found))))
+    if found is not None:
+        parts.append(section("A better position", paragraph(_sentence(found_words(plan, found)))))
+    if worst:
+        parts.append(section("The worst moments", _worst(plan, worst)))
+    parts.append(remark_list(plan.remarks))
+    return page(f"Flare plan: {scene.name}", lead, parts)
+
+
+def _sentence(words: str) -> str:
+    return words[:1].upper() + words[1:] + "."
+
+
+def _ranking(plan: Plan, ranked: Sequence[Ranked]) -> str:
+    scene = plan.scene
+    told = scene.luminance_cd_m2 is not None
+    moving = len(plan.times_s) > 1
+    head = ["camera", "light", "mean veil, cd/m²" if moving else "veil, cd/m²"]
+    head += ["worst, cd/m²", "at"] if moving else []
+    head += ["degrees off axis"]
+    head += ["contrast left"] if told else []
+    head += ["time under 90 %"] if told and moving else []
+    head += ["brightest spot, stops from clipping"]
+    rows = []
+    for one in ranked[:ROWS]:
+        row = [scene.cameras[one.camera].name, scene.lights[one.light].name, number(one.mean_veil_cd_m2)]
+        row += [number(one.worst_veil_cd_m2), time_words(plan, one.worst)] if moving else []
+        row += [f"{one.worst_constellation_deg:.1f}"]
+        row += [f"{one.contrast_left:.1%}"] if one.contrast_left is not None else []
+        row += [f"{one.seen_share:.0%}"] if one.seen_share is not None and moving else []
+        row += ["-" if one.brightest_stops is None else f"{one.brightest_stops:+.1f}"]
+        rows.append(row)
+    left = len(ranked) - ROWS
+    return table(head, rows) + (paragraph(f"{left} fainter pairs are left out here.") if left > 0 else "")
+
+
+def _over_time(plan: Plan) -> str:
+    hours, ticks, label = _time_axis(plan)
+    cameras = plan.scene.cameras
+    veils = [
+        Series(camera.name, hours, plan.veil(c), COLOURS[c % len(COLOURS)]) for c, camera in enumerate(cameras[:LINES])
+    ]
+    drawn = [
+        chart(
+            "veil of all lights", veils, x_label=label, y_label="cd/m²", logarithmic=True, size=(700, 300),
+            x_ticks=ticks,
+        )
+    ]  # fmt: skip
+    if plan.scene.luminance_cd_m2 is not None:
+        left = [Series(one.label, hours, plan.contrast_left(np.asarray(one.y)), one.colour) for one in veils]  # type: ignore[arg-type]
+        drawn.append(
+            chart("contrast left, K_real / K_ideal", left, x_label=label, size=(700, 300), x_ticks=ticks)
+        )  # fmt: skip
+    angles: list[Series] = []
+    for c, camera in enumerate(cameras[:LINES]):
+        for k, light in enumerate(plan.scene.lights):
+            if len(angles) < LINES:
+                seen = plan.pairs[c][k].sighting
+                lit = np.where(seen.illuminance_lx > 0.0, seen.constellation_deg, np.nan)
+                name = f"{light.name} in {camera.name}"
+                angles.append(Series(name, hours, lit, COLOURS[len(angles) % len(COLOURS)]))
+    drawn.append(
+        chart("constellation, degrees off axis", angles, x_label=label, size=(700, 300), x_ticks=ticks)
+    )  # fmt: skip
+    return figures(*drawn)
+
+
+def _time_axis(plan: Plan) -> tuple[Floats, list[tuple[float, str]] | None, str]:
+    """Return places along the axis, ticks and its name: the clock where the scene tells it."""
+    if plan.dates is None:
+        return plan.times_s, None, "seconds"
+    chosen = np.unique(np.round(np.linspace(0, len(plan.dates) - 1, 9)).astype(int))
+    long = plan.times_s[-1] > 2.0 * 86400.0
+    form = "%d.%m. %H:%M" if long else "%H:%M" if plan.times_s[-1] > 600.0 else "%H:%M:%S"
+    return plan.times_s, [(float(plan.times_s[k]), plan.dates[k].strftime(form)) for k in chosen], "time"
+
+
+def _shots(plan: Plan, shots: Sequence[Shot]) -> str:
+    width, left = 700, 130.0
+    cameras = plan.scene.cameras
+    height = 40 + 22 * len(cameras)
+    span = max(float(plan.times_s[-1]), 1e-9)
+    across = (width - left - 14.0) / span
+    marks: list[Mark] = []
+    for c, camera in enumerate(cameras):
+        y = 12.0 + 22.0 * c
+        marks += [Text(left - 8.0, y + 12.0, camera.name[:20], 11.0, INK, "end")]
+        marks += [Line([(left, y + 8.0), (width - 14.0, y + 8.0)], "#e3e8ed")]
+    for number_, shot in enumerate(shots):
+        start = float(plan.times_s[shot.first])
+        end = float(plan.times_s[shots[number_ + 1].first]) if number_ + 1 < len(shots) else span
+        y = 12.0 + 22.0 * shot.camera
+        colour = COLOURS[shot.camera % len(COLOURS)]
+        marks.append(Box(left + start * across, y, max((end - start) * across, 2.0), 16.0, colour))
+    _, ticks, _ = _time_axis(plan)
+    for at, words in ticks or [(float(t), f"{t:.4g} s") for t in np.linspace(0.0, span, 7)]:
+        marks.append(Text(left + at * across, height - 8.0, words, 10.0, FAINT, "middle"))
+    timetable = table(
+        ("camera", "from", "to"),
+        [(cameras[shot.camera].name, time_words(plan, shot.first), time_words(plan, shot.last)) for shot in shots],
+    )
+    return figures(Figure(width, height, "Which camera when", tuple(marks))) + timetable
+
+
+def _map(plan: Plan, found: Found | None) -> Figure:
+    """Draw the plan from above: cameras with their views, lamps, directions of distant lights, tried positions."""
+    size, edge = 560.0, 40.0
+    spots = [track.position_m[:, :2] for track in plan.tracks] + [track.aim_m[:, :2] for track in plan.tracks]
+    spots += [np.array([light.position_m[:2]]) for light in plan.scene.lights if isinstance(light, Lamp)]
+    if found is not None:
+        spots.append(plan.tracks[found.camera].position_m[0, :2] + found.offsets_m[:, :2])
+    whole = np.concatenate(spots)
+    low, high = whole.min(axis=0), whole.max(axis=0)
+    scale = (size - 2.0 * edge) / max(float((high - low).max()), 1e-6)
+    middle = 0.5 * (low + high)
+
+    def place(spot: Floats) -> tuple[float, float]:
+        x, y = (spot[:2] - middle) * scale
+        return 0.5 * size + float(x), 0.5 * size - float(y)
+
+    marks: list[Mark] = []
+    if found is not None:
+        marks += _tried(plan, found, place)
+    for c, (camera, track) in enumerate(zip(plan.scene.cameras, plan.tracks, strict=True)):
+        colour = COLOURS[c % len(COLOURS)]
+        if len(plan.times_s) > 1:
+            marks.append(Line([place(spot) for spot in track.position_m], colour, 1.0))
+        at = place(track.position_m[0])
+        marks += [Line([at, place(track.aim_m[0])], "#cdd6dd", 1.0), Box(at[0] - 4.0, at[1] - 4.0, 8.0, 8.0, colour)]
+        marks.append(Text(at[0] + 7.0, at[1] + 4.0, camera.name, 11.0, colour))
+    for k, light in enumerate(plan.scene.lights):
+        if isinstance(light, Lamp):
+            x, y = place(np.array(light.position_m))
+            marks += [
+                Line([(x - 4.0, y), (x + 4.0, y)], "#b06d10", 2.5),
+                Line([(x, y - 4.0), (x, y + 4.0)], "#b06d10", 2.5),
+            ]
+            marks.append(Text(x + 7.0, y - 4.0, light.name, 11.0, "#b06d10"))
+        else:
+            marks += _far(plan, k, light.name, size)
+    bar = 10.0 ** np.floor(np.log10(0.4 * size / scale))
+    marks += [
+        Line([(14.0, size - 14.0), (14.0 + bar * scale, size - 14.0)], INK, 2.0),
+        Text(14.0, size - 20.0, f"{bar:g} m", 10.0),
+    ]
+    return Figure(int(size), int(size), "Plan from above", tuple(marks))
+
+
+def _far(plan: Plan, k: int, name: str, size: float) -> list[Mark]:
+    """Draw where a distant light comes from, at the edge of the plan: an arc over time."""
+    track, seen = plan.tracks[0], plan.pairs[0][k].sighting
+    angle, roll = np.radians(seen.constellation_deg), np.radians(seen.roll_deg)
+    local = np.stack([np.sin(angle) * np.cos(roll), np.sin(angle) * np.sin(roll), np.cos(angle)], axis=-1)
+    world = np.einsum("tji,tj->ti", track.axes, local)
+    flat = np.hypot(world[:, 0], world[:, 1])
+    lit = (seen.illuminance_lx > 0.0) & (flat > 1e-6)
+    if not lit.any():
+        return []
+    reach = 0.5 * size - 16.0
+    ends = [
+        (0.5 * size + reach * float(x / f), 0.5 * size - reach * float(y / f))
+        for (x, y, _), f in zip(world[lit], flat[lit], strict=True)
+    ]
+    marks: list[Mark] = [Line(ends, "#e0a11e", 3.0)] if len(ends) > 1 else []
+    x, y = ends[0]
+    marks += [Box(x - 4.0, y - 4.0, 8.0, 8.0, "#e0a11e")]
+    marks.append(
+        Text(min(max(x, 40.0), size - 40.0), y + (16.0 if y < 0.5 * size else -9.0), name, 11.0, "#b06d10", "middle")
+    )
+    return marks
+
+
+def _tried(plan: Plan, found: Found, place: Callable[[Floats], tuple[float, float]]) -> list[Mark]:
+    marks: list[Mark] = []
+    start = plan.tracks[found.camera].position_m[0]
+    finite = found.veils_cd_m2[np.isfinite(found.veils_cd_m2)]
+    low, high = float(finite.min()), float(finite.max())
+    for offset, veil in zip(found.offsets_m[1:], found.veils_cd_m2[1:], strict=True):
+        if not np.isfinite(veil):
+            continue
+        part = (float(veil) - low) / (high - low) if high > low else 0.0
+        red, green = round(70 + 150 * part), round(170 - 110 * part)
+        x, y = place(start + offset)
+        marks.append(Box(x - 2.0, y - 2.0, 4.0, 4.0, f"#{red:02x}{green:02x}60"))
+    if found.better:
+        x, y = place(start + found.offsets_m[found.best])
+        marks += [
+            Line([(x - 6, y - 6), (x + 6, y - 6), (x + 6, y + 6), (x - 6, y + 6), (x - 6, y - 6)], "#1d7a4b", 2.0)
+        ]
+    return marks
+
+
+def _worst(plan: Plan, worst: Sequence[Worst]) -> str:
+    scene = plan.scene
+    pictures = [picture for _, picture, _ in worst]
+    if scene.luminance_cd_m2 is not None:
+        # the scene's brightest is white
+        stops = -float(np.log2(scene.luminance_cd_m2[1]))
+        shown = [view(picture, stops) for picture in pictures]
+        how = f"at the scene's exposure: white is {number(scene.luminance_cd_m2[1])} cd/m²"
+    else:
+        shown, stops = shown_together(pictures)
+        how = "all at one exposure"
+    images = ""
+    rows = []
+    for (one, _, mean), pixels in zip(worst, shown, strict=True):
+        camera, light = scene.cameras[one.camera].name, scene.lights[one.light].name
+        words = f"{light} in {camera}, {time_words(plan, one.worst)}, {one.worst_constellation_deg:.1f} degrees"
+        images += image(pixels, words, 232)
+        ratio = one.worst_veil_cd_m2 / mean if mean > 0.0 else float("nan")
+        rows.append((camera, light, number(one.worst_veil_cd_m2), number(mean), number(ratio)))
+    head = ("camera", "light", "predicted veil, cd/m²", "of this picture", "ratio")
+    return images + paragraph(f"Final renders, flare alone, {how}.") + table(head, rows)

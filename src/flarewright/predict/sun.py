@@ -1,0 +1,84 @@
+"""The sun's path at a place and date, and how bright it is on the way."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from datetime import UTC, datetime
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import FlarewrightError
+from ..model.scene import Site
+
+Floats = NDArray[np.float64]
+
+# illuminance on a plane facing the sun outside the atmosphere, lx, and the clear sky's extinction per air mass
+OUTSIDE_LX, CLEAR = 127500.0, 0.21
+
+__all__ = ["sun_illuminance", "sun_path"]
+
+
+def sun_path(site: Site, times: Sequence[datetime]) -> tuple[Floats, Floats]:
+    """Compute where the sun stands.
+
+    Parameters
+    ----------
+    site : Site
+    times : sequence of datetime
+        With their offsets from UTC.
+
+    Returns
+    -------
+    azimuth_deg, elevation_deg : ndarray, shape (T,)
+        Clockwise from north; above the horizon as it is seen, with the refraction of the air.
+
+    Raises
+    ------
+    FlarewrightError
+        When the library for it is not installed, or does not know the date.
+
+    Notes
+    -----
+    By `astral` (NOAA's formulas after Meeus), good to some hundredths of a degree for the years 1900 to 2100, less
+    within a degree of the horizon. Judged by published almanac values in tests/predict/test_sun.py.
+    """
+    try:
+        from astral import Observer
+        from astral.sun import azimuth, elevation
+    except ImportError:
+        raise FlarewrightError(
+            "the sun's path needs the package astral; install it with: pip install 'flarewright[predict]'"
+        ) from None
+    here = Observer(latitude=site.latitude_deg, longitude=site.longitude_deg)
+    found = []
+    for time in times:
+        if not 1900 <= time.year <= 2100:
+            raise FlarewrightError(f"the sun's path is known for the years 1900 to 2100, not for {time.year}")
+        utc = time.astimezone(UTC)
+        found.append((azimuth(here, utc), elevation(here, utc, with_refraction=True)))
+    return np.array([one[0] for one in found]), np.array([one[1] for one in found])
+
+
+def sun_illuminance(elevation_deg: ArrayLike) -> Floats:
+    """Compute the illuminance that the sun of a clear sky gives on a plane facing it.
+
+    Parameters
+    ----------
+    elevation_deg : array_like
+        As it is seen.
+
+    Returns
+    -------
+    ndarray
+        lx; 0 below the horizon.
+
+    Notes
+    -----
+    E = 127.5 klx exp(-0.21 m), the clear sky of the IES' daylight availability (RP-21), with the air mass of Kasten and
+    Young 1989, m = 1 / (sin h + 0.50572 (h + 6.07995)^-1.6364), h in degrees. The orbit's +-3 % is left out.
+    """
+    h = np.asarray(elevation_deg, dtype=np.float64)
+    above = np.maximum(h, 0.0)
+    air_mass = 1.0 / (np.sin(np.radians(above)) + 0.50572 * (above + 6.07995) ** -1.6364)
+    return np.where(h >= 0.0, OUTSIDE_LX * np.exp(-CLEAR * air_mass), 0.0)

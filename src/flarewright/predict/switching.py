@@ -1,0 +1,85 @@
+"""Which camera when: the order of shots with the least flare."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+__all__ = ["Shot", "switching"]
+
+
+@dataclass(frozen=True)
+class Shot:
+    """A camera from one time on.
+
+    Attributes
+    ----------
+    camera : int
+    first, last : int
+        Of the times, both in it.
+    """
+
+    camera: int
+    first: int
+    last: int
+
+
+def switching(cost: Floats, shortest: int = 1) -> tuple[Shot, ...]:
+    """Find the order of cameras with the least sum of costs, no shot shorter than asked for.
+
+    Parameters
+    ----------
+    cost : ndarray, shape (C, T)
+        What each camera costs at each time.
+    shortest : int
+        Times in a shot at least; one shot over all when there are fewer.
+
+    Returns
+    -------
+    tuple of Shot
+        Where costs are equal a camera goes on, and else the first one is taken.
+
+    Notes
+    -----
+    Exact, by dynamic programming over where a shot ends: at time t the best order ends with a camera that has run for
+    at least `shortest`. Judged by trying all orders in tests/predict/test_planning.py.
+    """
+    cameras, count = cost.shape
+    shortest = min(max(shortest, 1), count)
+    sums = np.concatenate([np.zeros((cameras, 1)), np.cumsum(cost, axis=1)], axis=1)
+    # best[t]: least cost of the first t times with whole shots; going[c]: the same, camera c still running
+    best = np.full(count + 1, np.inf)
+    best[0] = 0.0
+    begun = np.zeros(count + 1, dtype=np.int64)
+    chosen = np.zeros(count + 1, dtype=np.int64)
+    # for each camera the least of best[s] - sums[c, s] over the starts s so far, and that start
+    least, start = np.full(cameras, np.inf), np.zeros(cameras, dtype=np.int64)
+    for t in range(shortest, count + 1):
+        fresh = best[t - shortest] - sums[:, t - shortest]
+        # an earlier start is kept where it costs no more: fewer cuts
+        better = fresh < least - 1e-12 * np.abs(least) if np.isfinite(least).all() else np.isfinite(fresh)
+        least, start = np.where(better, fresh, least), np.where(better, t - shortest, start)
+        ends = least + sums[:, t]
+        camera = int(np.argmin(ends))
+        best[t], begun[t], chosen[t] = ends[camera], start[camera], camera
+    shots: list[Shot] = []
+    t = count
+    while t > 0:
+        shots.insert(0, Shot(int(chosen[t]), int(begun[t]), t - 1))
+        t = int(begun[t])
+    return _joined(shots)
+
+
+def _joined(shots: list[Shot]) -> tuple[Shot, ...]:
+    """Join neighbouring shots of one camera."""
+    out: list[Shot] = []
+    for shot in shots:
+        if out and out[-1].camera == shot.camera:
+            out[-1] = Shot(shot.camera, out[-1].first, shot.last)
+        else:
+            out.append(shot)
+    return tuple(out)
