@@ -23,7 +23,7 @@ EPILOG = (
     "Examples:\n\nflarewright predict heliar-tronnier -o heliar.html\n\n"
     "flarewright predict canon-28-80 --fstop 8 --coating preset:staggered --sensor 36x24 --luminance 50,5000 "
     "-o canon.html --json\n\n"
-    "flarewright predict match.toml --near 'main stand' --radius 10 -o match.html"
+    "flarewright predict match.toml --near 'east stand' --radius 10 -o match.html"
 )
 
 _LENS, _CURVES, _SCENE = "Camera", "Curves of a lens or a measured flare", "Scene"
@@ -321,6 +321,8 @@ def _print(found: Occurrence) -> None:
         cells += [number(one["most"]["value"]), number(one["most"]["constellation_deg"])]
         out.add_row(WORDS[name], *cells)
     console().print(out)
+    if not math.isfinite(found.flare.scene_scale):
+        return
     lux, veil = number(found.setting.illuminance_lx), number(max(data["veil_cd_m2"]))
     console().print(f"a light of {lux} lx lights the sensor, on average, as much as a scene of {veil} cd/m² at worst")
     if "k_ratio" in data:

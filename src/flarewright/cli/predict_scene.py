@@ -137,13 +137,9 @@ def _shots(plan: Plan, shortest_s: float) -> Sequence[Shot]:
     """Find which camera when, for several cameras over time."""
     import numpy as np
 
-    from ..predict.switching import switching
+    from ..predict.switching import shots_of
 
-    if len(plan.scene.cameras) < 2 or len(plan.times_s) < 2:
-        return ()
-    cost = np.stack([plan.veil(c) for c in range(len(plan.scene.cameras))])
-    steps = int(np.ceil(shortest_s / plan.scene.time.step_s - 1e-9))
-    return switching(cost, max(steps, 1))
+    return shots_of(np.stack([plan.veil(c) for c in range(len(plan.tracks))]), plan.times_s, shortest_s)
 
 
 def _worst(plan: Plan, ranked: Sequence[Ranked], maker: Callable[..., Any], progress: Any) -> list[Worst]:
@@ -199,6 +195,6 @@ def _print(plan: Plan, ranked: Sequence[Ranked], shots: Sequence[Shot], found: F
     console().print(out)
     for shot in shots:
         camera = scene.cameras[shot.camera].name
-        console().print(f"{time_words(plan, shot.first)} to {time_words(plan, shot.last)}: {camera}")
+        console().print(f"{time_words(plan, shot.first)} to {time_words(plan, shot.until)}: {camera}")
     if found is not None:
         console().print(found_words(plan, found))

@@ -47,7 +47,7 @@ EXAMPLE = """\
 # A scene for light planning; metres, x right and y up in the plan, z to the sky. docs/predict.md
 schema_version = 1
 name = "Evening match"
-luminance_cd_m2 = [2.0, 400.0]   # darkest and brightest of what the cameras see; left out: contrast is not told
+luminance_cd_m2 = [1.0, 200.0]   # darkest and brightest of what the cameras see; left out: contrast is not told
 north_deg = 0.0   # compass direction of y
 
 [site]   # for the sun
@@ -56,13 +56,13 @@ longitude_deg = 16.37
 
 [time]
 start = 2024-06-21T18:00:00+02:00
-duration_s = 7200.0
+duration_s = 9000.0
 step_s = 600.0
 
 [[cameras]]
-name = "main stand"
+name = "east stand"
 lens = "flektogon-35"   # or a lens file; or model = "camera.json", a measured flare, with unit_per_cd_m2
-position_m = [0.0, -60.0, 15.0]
+position_m = [60.0, 0.0, 15.0]
 aim_m = [0.0, 0.0, 0.0]
 f_number = 4.0
 coating = "quarter-wave:550"
@@ -70,10 +70,10 @@ iso = 400.0
 exposure_s = 0.002
 
 [[cameras]]
-name = "west goal"
+name = "south goal"
 lens = "nikkor-85-f1.4"
-position_m = [-70.0, 5.0, 4.0]
-aim_m = [-20.0, 0.0, 1.0]
+position_m = [5.0, -70.0, 4.0]
+aim_m = [0.0, -20.0, 1.0]
 f_number = 2.8
 coating = "quarter-wave:550"
 [[cameras.keyframes]]   # pans to the middle within ten minutes
@@ -86,7 +86,7 @@ kind = "sun"
 [[lights]]
 kind = "lamp"
 name = "north mast"
-position_m = [40.0, 60.0, 40.0]
+position_m = [-40.0, 60.0, 40.0]
 intensity_cd = 2e6   # or luminance_cd_m2 with diameter_m
 diameter_m = 0.6
 aim_m = [0.0, 0.0, 0.0]

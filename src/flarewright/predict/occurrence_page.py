@@ -114,6 +114,11 @@ def shown_together(pictures: Sequence[NDArray[np.float32]]) -> tuple[list[NDArra
 
 
 def _context(found: Occurrence) -> str:
+    if not np.isfinite(found.flare.scene_scale):
+        return paragraph(
+            "There is no scene to compare with: say what value a scene of 1 cd/m² has in the captures with "
+            "--unit-per-cd-m2."
+        )
     at, setting = found.curves.constellation_deg, found.setting
     veil = found.veil_cd_m2
     drawn = [

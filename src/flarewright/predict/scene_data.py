@@ -92,9 +92,9 @@ def scene_data(
             {
                 "camera": cameras[shot.camera].name,
                 "from_s": float(plan.times_s[shot.first]),
-                "to_s": float(plan.times_s[shot.last]),
+                "to_s": float(plan.times_s[shot.until]),
                 "from": time_words(plan, shot.first),
-                "to": time_words(plan, shot.last),
+                "to": time_words(plan, shot.until),
             }
             for shot in shots
         ],

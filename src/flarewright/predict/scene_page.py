@@ -22,6 +22,8 @@ Floats = NDArray[np.float64]
 
 # lines in a chart, rows in the ranking
 LINES, ROWS = 8, 40
+# of 255, and values: a picture with fewer as bright as this shows nothing
+DARKEST_SHOWN, FEWEST_SHOWN = 6, 60
 
 __all__ = ["Worst", "scene_page"]
 
@@ -134,7 +136,7 @@ def _time_axis(plan: Plan) -> tuple[Floats, list[tuple[float, str]] | None, str]
     """Return places along the axis, ticks and its name: the clock where the scene tells it."""
     if plan.dates is None:
         return plan.times_s, None, "seconds"
-    chosen = np.unique(np.round(np.linspace(0, len(plan.dates) - 1, 9)).astype(int))
+    chosen = range(0, len(plan.dates), -(-len(plan.dates) // 9))
     long = plan.times_s[-1] > 2.0 * 86400.0
     form = "%d.%m. %H:%M" if long else "%H:%M" if plan.times_s[-1] > 600.0 else "%H:%M:%S"
     return plan.times_s, [(float(plan.times_s[k]), plan.dates[k].strftime(form)) for k in chosen], "time"
@@ -151,9 +153,8 @@ def _shots(plan: Plan, shots: Sequence[Shot]) -> str:
         y = 12.0 + 22.0 * c
         marks += [Text(left - 8.0, y + 12.0, camera.name[:20], 11.0, INK, "end")]
         marks += [Line([(left, y + 8.0), (width - 14.0, y + 8.0)], "#e3e8ed")]
-    for number_, shot in enumerate(shots):
-        start = float(plan.times_s[shot.first])
-        end = float(plan.times_s[shots[number_ + 1].first]) if number_ + 1 < len(shots) else span
+    for shot in shots:
+        start, end = float(plan.times_s[shot.first]), float(plan.times_s[shot.until])
         y = 12.0 + 22.0 * shot.camera
         colour = COLOURS[shot.camera % len(COLOURS)]
         marks.append(Box(left + start * across, y, max((end - start) * across, 2.0), 16.0, colour))
@@ -162,7 +163,7 @@ def _shots(plan: Plan, shots: Sequence[Shot]) -> str:
         marks.append(Text(left + at * across, height - 8.0, words, 10.0, FAINT, "middle"))
     timetable = table(
         ("camera", "from", "to"),
-        [(cameras[shot.camera].name, time_words(plan, shot.first), time_words(plan, shot.last)) for shot in shots],
+        [(cameras[shot.camera].name, time_words(plan, shot.first), time_words(plan, shot.until)) for shot in shots],
     )
     return figures(Figure(width, height, "Which camera when", tuple(marks))) + timetable
 
@@ -250,7 +251,7 @@ def _tried(plan: Plan, found: Found, place: Callable[[Floats], tuple[float, floa
     if found.better:
         x, y = place(start + found.offsets_m[found.best])
         marks += [
-            Line([(x - 6, y - 6), (x + 6, y - 6), (x + 6, y + 6), (x - 6, y + 6), (x - 6, y - 6)], "#1d7a4b", 2.0)
+            Line([(x - 5, y - 5), (x + 5, y - 5), (x + 5, y + 5), (x - 5, y + 5), (x - 5, y - 5)], "#1d7a4b", 2.0)
         ]
     return marks
 
@@ -271,8 +272,13 @@ def _worst(plan: Plan, worst: Sequence[Worst]) -> str:
     for (one, _, mean), pixels in zip(worst, shown, strict=True):
         camera, light = scene.cameras[one.camera].name, scene.lights[one.light].name
         words = f"{light} in {camera}, {time_words(plan, one.worst)}, {one.worst_constellation_deg:.1f} degrees"
-        images += image(pixels, words, 232)
+        if np.count_nonzero(pixels >= DARKEST_SHOWN) >= FEWEST_SHOWN:
+            images += image(pixels, words, 232)
         ratio = one.worst_veil_cd_m2 / mean if mean > 0.0 else float("nan")
         rows.append((camera, light, number(one.worst_veil_cd_m2), number(mean), number(ratio)))
     head = ("camera", "light", "predicted veil, cd/m²", "of this picture", "ratio")
-    return images + paragraph(f"Final renders, flare alone, {how}.") + table(head, rows)
+    return (
+        images
+        + paragraph(f"Final renders, flare alone, {how}. Those with nothing to be seen are left out.")
+        + table(head, rows)
+    )

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
-__all__ = ["Shot", "switching"]
+__all__ = ["Shot", "shots_of", "switching"]
 
 
 @dataclass(frozen=True)
@@ -19,13 +19,35 @@ class Shot:
     Attributes
     ----------
     camera : int
-    first, last : int
-        Of the times, both in it.
+    first, until : int
+        Of the times: where it begins, and where the next one does.
     """
 
     camera: int
     first: int
-    last: int
+    until: int
+
+
+def shots_of(veil: Floats, times_s: Floats, shortest_s: float) -> tuple[Shot, ...]:
+    """Find the order of cameras with the least veil over time.
+
+    Parameters
+    ----------
+    veil : ndarray, shape (C, T)
+    times_s : ndarray, shape (T,)
+    shortest_s : float
+        No shot is shorter, rounded up to whole steps.
+
+    Returns
+    -------
+    tuple of Shot
+        None for one camera or one time.
+    """
+    if len(veil) < 2 or len(times_s) < 2:
+        return ()
+    steps = np.diff(times_s)
+    cost = 0.5 * (veil[:, 1:] + veil[:, :-1]) * steps
+    return switching(cost, int(np.ceil(shortest_s / steps[0] - 1e-9)))
 
 
 def switching(cost: Floats, shortest: int = 1) -> tuple[Shot, ...]:
@@ -34,9 +56,9 @@ def switching(cost: Floats, shortest: int = 1) -> tuple[Shot, ...]:
     Parameters
     ----------
     cost : ndarray, shape (C, T)
-        What each camera costs at each time.
+        What each camera costs in each interval of time.
     shortest : int
-        Times in a shot at least; one shot over all when there are fewer.
+        Intervals in a shot at least; one shot over all when there are fewer.
 
     Returns
     -------
@@ -69,7 +91,7 @@ def switching(cost: Floats, shortest: int = 1) -> tuple[Shot, ...]:
     shots: list[Shot] = []
     t = count
     while t > 0:
-        shots.insert(0, Shot(int(chosen[t]), int(begun[t]), t - 1))
+        shots.insert(0, Shot(int(chosen[t]), int(begun[t]), t))
         t = int(begun[t])
     return _joined(shots)
 
@@ -79,7 +101,7 @@ def _joined(shots: list[Shot]) -> tuple[Shot, ...]:
     out: list[Shot] = []
     for shot in shots:
         if out and out[-1].camera == shot.camera:
-            out[-1] = Shot(shot.camera, out[-1].first, shot.last)
+            out[-1] = Shot(shot.camera, out[-1].first, shot.until)
         else:
             out.append(shot)
     return tuple(out)

@@ -1,0 +1,126 @@
+"""A measured flare goes where a lens goes: curves and scenes from a ghost model."""
+
+import json
+
+import numpy as np
+import pytest
+
+from flarewright.cli.app import run
+from flarewright.cli.predict_flares import is_model, model_flare
+from flarewright.io.ghost_model_file import write_ghost_model
+from flarewright.measure.replay import replay
+from flarewright.model.ghost_model import BezierGhost, GhostModel, Halo, Reference
+from flarewright.optics.color import luminance_weights
+
+# the captures' light: 1e5 cd/m2 on 1e-4 sr give 10 lx
+CAPTURED = Reference(f_number=2.0, iso=100.0, exposure_s=0.5, luminance_cd_m2=1e5, solid_angle_sr=1e-4)
+
+
+def planted(reference=CAPTURED):
+    numbers = ((30.0, 25.0), (0.0,), (9.0, 0.5), (9.0,), (7.0,), (5.0,), (5.0,), (4.0,), (5.0,), (3.0,), (6.0,), (1.5,),
+               (1.2,), (2.0,), (1.5,), (1.0,), (0.5,), (0.4,), (0.3,))  # fmt: skip
+    return GhostModel(
+        size_px=(160, 90), axis_px=(80.0, 45.0), focal_px=170.0, largest_deg=25.0, constellation_deg=(2.0, 25.0),
+        ghosts=(BezierGhost(name="1", numbers=numbers, visible_deg=(0.0, 26.0)),),
+        halo=Halo(radius_px=(1.0, 100.0), radiance=((9.0, 8.0, 7.0), (0.1, 0.1, 0.1))), reference=reference,
+    )  # fmt: skip
+
+
+@pytest.fixture
+def file(tmp_path):
+    path = tmp_path / "camera.json"
+    write_ghost_model(path, planted())
+    return path
+
+
+def test_its_flare_is_the_replayed_ghosts_per_lux(file):
+    assert is_model(str(file))
+    flare = model_flare(planted(), "camera.json", 36.0, 0.02, 160)
+    ghosts = next(layer for layer in replay(planted(), 12.0, roll_deg=40.0) if layer.name == "ghosts")
+    np.testing.assert_allclose(flare.picture(12.0, 40.0), ghosts.pixels / 10.0, rtol=1e-5, atol=1e-12)
+    assert (flare.least_deg, flare.reach_deg) == (1.0, 26.0)
+    assert (flare.sensor.width, flare.sensor.height) == (36.0, 20.25)
+
+
+def test_curves_of_a_measured_flare(file, tmp_path, capsys):
+    arguments = ["predict", str(file), "--unit-per-cd-m2", "0.02", "--luminance", "1,100", "--illuminance", "5"]
+    assert run([*arguments, "-o", str(tmp_path / "m.html"), "--samples", "20", "--json"]) == 0
+    data = json.loads(capsys.readouterr().out)
+    assert data["quality"] == "measured"
+    assert data["constellation_deg"][0] == 1.0
+    assert data["constellation_deg"][-1] == 26.0
+    # 5 lx on a camera that was measured with 10
+    k = 3
+    layers = replay(planted(), data["constellation_deg"][k], size_px=(192, 108))
+    light = next(one for one in layers if one.name == "ghosts").pixels @ luminance_weights("rec709")
+    assert data["veil_cd_m2"][k] == pytest.approx(light.mean() / 10.0 * 5.0 / 0.02, rel=1e-3)
+    assert data["k_ratio"][k] == pytest.approx(101.0 / (101.0 + 2.0 * data["veil_cd_m2"][k]))
+
+
+def test_without_a_unit_there_is_no_veil_to_tell(file, tmp_path, capsys):
+    assert run(["predict", str(file), "-o", str(tmp_path / "m.html"), "--samples", "14", "--json"]) == 0
+    data = json.loads(capsys.readouterr().out)
+    assert set(data["veil_cd_m2"]) == {None}
+    assert "no scene" in (tmp_path / "m.html").read_text("utf-8")
+
+
+SCENE = """
+schema_version = 1
+luminance_cd_m2 = [1.0, 100.0]
+[[cameras]]
+name = "A"
+model = "camera.json"
+unit_per_cd_m2 = 0.02
+position_m = [0.0, 0.0, 0.0]
+aim_m = [0.0, 10.0, 0.0]
+[[lights]]
+name = "lamp"
+position_m = [{x}, 10.0, 0.0]
+intensity_cd = 2000.0
+"""
+
+
+def test_scene_with_a_measured_camera(file, tmp_path, capsys):
+    scene = tmp_path / "scene.toml"
+    scene.write_text(SCENE.format(x=10.0 * np.tan(np.radians(14.0))))
+    assert run(["predict", str(scene), "--json"]) == 0
+    data = json.loads(capsys.readouterr().out)
+    light = next(one for one in replay(planted(), 14.0, size_px=(192, 108)) if one.name == "ghosts")
+    lux = 2000.0 / (100.0 * (1.0 + np.tan(np.radians(14.0)) ** 2))
+    veil = (light.pixels @ luminance_weights("rec709")).mean() / 10.0 * lux / 0.02
+    assert data["ranking"][0]["worst_veil_cd_m2"] == pytest.approx(veil, rel=1e-3)
+    assert data["ranking"][0]["brightest_stops_from_clipping"] is None
+
+
+def test_beyond_what_was_measured_is_told(file, tmp_path, capsys):
+    scene = tmp_path / "scene.toml"
+    scene.write_text(SCENE.format(x=10.0))
+    assert run(["predict", str(scene), "--json"]) == 0
+    told = capsys.readouterr()
+    assert "was measured from 1 to 26 degrees; lamp stands elsewhere in 100% of the times" in told.err
+    assert json.loads(told.out)["cameras"][0]["lights"][0]["known"] == [False]
+
+
+@pytest.mark.parametrize(
+    ("flags", "words"),
+    [
+        (["--fstop", "8"], "--fstop has no meaning for a measured flare"),
+        (["--unit-per-cd-m2", "0"], "--unit-per-cd-m2 0 is no unit"),
+        (["--to", "50"], "up to 26"),
+        (["--glare"], "--glare has no meaning"),
+    ],
+)
+def test_bad_flags_for_a_measured_flare(flags, words, file, capsys):
+    assert run(["predict", str(file), *flags]) == 2
+    told = capsys.readouterr().err
+    assert words in told
+
+
+def test_a_model_that_does_not_know_its_light_cannot_stand_in_a_scene(tmp_path, capsys):
+    write_ghost_model(tmp_path / "camera.json", planted(Reference(f_number=2.0)))
+    (tmp_path / "scene.toml").write_text(SCENE.format(x=2.0))
+    assert run(["predict", str(tmp_path / "scene.toml")]) == 2
+    assert "does not tell luminance_cd_m2 and solid_angle_sr" in capsys.readouterr().err
+    # curves in its own unit are told all the same
+    assert run(["predict", str(tmp_path / "camera.json"), "--samples", "13", "--json"]) == 0
+    assert "values are in its own unit" in capsys.readouterr().err
