@@ -49,7 +49,7 @@ __all__ = [
     "Sections",
     "accept_text",
     "expand_coating",
-    "expand_spectrum",
+    "expand_light",
     "explain",
     "lens_location",
     "parse_coating_choice",
@@ -170,9 +170,7 @@ def _expanded(data: dict[str, Any], folder: Path, problems: list[str]) -> dict[s
     for section, key in (("", "filter"), ("camera", "cover_glass")):
         _expand_plate(out, section, key, problems)
     if isinstance(out.get("lights"), list):
-        out["lights"] = [
-            expand_spectrum(light, f"lights[{k}]", folder, problems) for k, light in enumerate(out["lights"])
-        ]
+        out["lights"] = [expand_light(light, f"lights[{k}]", folder, problems) for k, light in enumerate(out["lights"])]
     return out
 
 
@@ -235,8 +233,8 @@ def expand_coating(value: Any, folder: Path) -> Any:
     return value
 
 
-def expand_spectrum(light: Any, where: str, folder: Path, problems: list[str]) -> Any:
-    """Return a light's table with the short text of its spectrum expanded; what cannot be is noted and left out."""
+def expand_light(light: Any, where: str, folder: Path, problems: list[str]) -> Any:
+    """Return a light's table with short texts and relative paths expanded; what cannot be is noted and left out."""
     if isinstance(light, dict):
         light = dict(light)
         _expand_paths(light, "holdout", list(HOLDOUT_FILES), folder)

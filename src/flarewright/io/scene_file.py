@@ -22,7 +22,7 @@ from .project_file import (
     Sections,
     accept_text,
     expand_coating,
-    expand_spectrum,
+    expand_light,
     explain,
     lens_location,
 )
@@ -171,7 +171,7 @@ def _light(table: Any, where: str, folder: Path, problems: list[str]) -> Any:
         # without a known kind no other key can be checked: one sentence, and a lamp that is right in its place
         problems.append(f"{where}.kind should be lamp, distant or sun, not {shorten(kind)}")
         return {"kind": "lamp", "name": f"?{where}", "position_m": (0.0, 0.0, 0.0), "intensity_cd": 1.0}
-    return expand_spectrum({**table, "kind": kind}, where, folder, problems)
+    return expand_light({**table, "kind": kind}, where, folder, problems)
 
 
 def scene_json_schema() -> dict[str, Any]:
