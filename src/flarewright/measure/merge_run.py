@@ -37,6 +37,9 @@ Progress = Callable[[float, str], None]
 
 # a light that a person points at is taken to be right within this, pixels
 _POINTED = 0.5
+# bytes of a pixel while its frame is merged (50 megapixels of RAW took 1.5 GB), and of all frames at work together
+_PIXEL_BYTES, _WORKING_BYTES = 124, 4e9
+
 # frames compared for the mirror line, and the part of the width by which the light is off the axis in them
 _MIRRORED, _OFF_AXIS = 12, (0.15, 0.08)
 
@@ -160,7 +163,8 @@ def _merge_all(
         _array_digest(known.black), _array_digest(known.response),
     ])  # fmt: skip
     merged: dict[int, _Merged] = {}
-    with ThreadPoolExecutor(max_workers=threads or os.cpu_count() or 1) as pool:
+    fitting = max(1, int(_WORKING_BYTES / (_PIXEL_BYTES * known.size_px[0] * known.size_px[1])))
+    with ThreadPoolExecutor(max_workers=min(threads or os.cpu_count() or 1, fitting)) as pool:
         jobs = {
             pool.submit(_frame, k, group, folder, output, known, balance, common): k for k, group in enumerate(groups)
         }
