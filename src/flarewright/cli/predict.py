@@ -304,9 +304,9 @@ def _print(found: Occurrence) -> None:
     """Print the extremes of the curves."""
     from rich.table import Table
 
-    from ..predict.chart import number
     from ..predict.occurrence import occurrence_data
     from ..predict.occurrence_page import WORDS
+    from ..render.chart import number
 
     data = occurrence_data(found)
     out = Table(

@@ -177,8 +177,8 @@ def _glare(plan: Plan, c: int, threads: int | None) -> VeilingGlare | None:
 def _print(plan: Plan, ranked: Sequence[Ranked], shots: Sequence[Shot], found: Found | None) -> None:
     from rich.table import Table
 
-    from ..predict.chart import number
     from ..predict.scene_data import found_words, time_words
+    from ..render.chart import number
 
     scene = plan.scene
     out = Table(title=f"{scene.name}: flare as luminance of the scene, cd/m²")

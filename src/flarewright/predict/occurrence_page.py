@@ -7,11 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from ..render.chart import COLOURS, Series, chart, number
 from ..render.display import auto_exposure, view
-from .chart import COLOURS, Series, chart, number
+from ..render.page import figures, image, page, paragraph, remark_list, section, table
 from .curves import bins_of
 from .occurrence import Occurrence, contrast_curve
-from .page import figures, image, page, paragraph, remark_list, section, table
 from .statistics import NAMES
 
 WORDS = {

@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..model.scene import Lamp
+from ..render.chart import COLOURS, Series, chart, number
 from ..render.display import view
 from ..render.figure import FAINT, INK, Box, Figure, Line, Mark, Text
-from .chart import COLOURS, Series, chart, number
+from ..render.page import figures, image, page, paragraph, remark_list, section, table
 from .occurrence_page import shown_together
-from .page import figures, image, page, paragraph, remark_list, section, table
 from .plan import Plan, Ranked
 from .scene_data import found_words, time_words
 from .search import Found

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..io.png import encode_png
-from ..render.figure import Figure, to_svg
+from .figure import Figure, to_svg
 
 __all__ = ["figures", "image", "page", "paragraph", "remark_list", "section", "table"]
 

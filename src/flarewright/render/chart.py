@@ -9,7 +9,7 @@ from math import ceil, floor, log10
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..render.figure import FAINT, INK, Box, Figure, Line, Mark, Text
+from .figure import FAINT, INK, Box, Figure, Line, Mark, Text
 
 Floats = NDArray[np.float64]
 Place = Callable[[float, float], tuple[float, float]]
