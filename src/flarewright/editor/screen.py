@@ -90,7 +90,9 @@ class Screen:
         working = view.grey or view.unclipped
         draft: Picture | None = None
         if fresh or working or self._final_s > SOON_S:
-            draft = studio.take(project, "draft", view)
+            if fresh:
+                self.match = Match()
+            draft = studio.take(project, "draft", view, levels=self.match.levels)
             check()
             if fresh:
                 self.match = Match(exposure_stops=studio.exposure_of(draft))
@@ -100,7 +102,7 @@ class Screen:
             check()
             self._final_s = final.seconds
             if draft is None:
-                draft = studio.take(project, "draft", view)
+                draft = studio.take(project, "draft", view, levels=self.match.levels)
             self.match = studio.matched(draft, final, self.match)
             if fresh:
                 self.match = replace(self.match, exposure_stops=studio.exposure_of(final))
@@ -109,6 +111,18 @@ class Screen:
         self.seen = see(project, grade, self._progress("ghosts", check))
         check()
         self.session.tell({"type": "ghosts"})
+        if not working:
+            self._match_ghosts(project, view, self.seen, check)
+
+    def _match_ghosts(self, project: Project, view: View, seen: Seen, check: Check) -> None:
+        """Learn from the final picture how bright each ghost of the next drafts shall be."""
+        drafted = see(project, "draft", lambda *_: check())
+        levels = studio.levels_of(*({ghost.name: ghost.flux for ghost in each.ghosts} for each in (drafted, seen)))
+        draft = studio.take(project, "draft", view, levels=levels)
+        check()
+        final = self.picture
+        if final is not None:
+            self.match = replace(studio.matched(draft, final, self.match), levels=levels)
 
     def _progress(self, what: str, check: Check) -> Any:
         told = 0.0
@@ -188,7 +202,9 @@ class Screen:
         with self._hand:
             begun = time.perf_counter()
             project = move_light(self.session.project, light, x, y)
-            picture = studio.take(project, "moving", self.session.view, scale=SCALES[self._scale])
+            picture = studio.take(
+                project, "moving", self.session.view, scale=SCALES[self._scale], levels=self.match.levels
+            )
             if picture.seconds > SLOW_S and self._scale + 1 < len(SCALES):
                 self._scale += 1
             elif picture.seconds < FAST_S and self._scale > 0:

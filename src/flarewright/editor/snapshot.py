@@ -71,6 +71,8 @@ def _picture(screen: Screen) -> dict[str, Any]:
         "grade": "" if shown is None else shown.grade,
         "seconds": 0.0 if shown is None else round(shown.seconds, 3),
         "problem": screen.problem,
+        # whether it shows the project as it stands
+        "current": shown is not None and shown.project == screen.session.project,
     }
 
 

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from math import log
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..model import Art, Layer, Output, Project, Quality
+from ..model import Art, Layer, Output, Project, Quality, Rule
 from ..render.display import auto_exposure
 from ..render.render import render
 from ..render.working import working_ghosts
@@ -18,10 +19,14 @@ from .view import View
 
 Floats = NDArray[np.float32]
 Grade = Literal["moving", "draft", "final", "working"]
+Levels = tuple[tuple[float, tuple[str, ...]], ...]
 
 # the viewport's picture fits into this
 WIDEST, HIGHEST = 960, 540
 DRAFT_WAVELENGTHS = 3
+# gains of a draft's ghosts: their step, the least and the largest
+# (one that a rim hides now may come out as the hand goes on, so it is never dimmed altogether)
+STEP, LEAST, MOST = 2.0**0.25, 2.0**-1.5, 2.0
 
 
 @dataclass(frozen=True)
@@ -92,6 +97,7 @@ def take(
     look: View,
     *,
     scale: float = 1.0,
+    levels: Levels = (),
     progress: Callable[[float, str], None] | None = None,
 ) -> Picture:
     """Render a picture for the viewport.
@@ -103,6 +109,8 @@ def take(
         "working" draws what `look` asks for by `working_ghosts`.
     look : View
     scale : float
+    levels : Levels
+        `Match.levels` of a draft.
     progress : callable, optional
         What it raises ends the render.
 
@@ -122,7 +130,7 @@ def take(
         layer = working_ghosts(stage, grey=look.grey, unclipped=look.unclipped)
         light = spread([layer], size)
         return Picture(project, "working", light, np.zeros_like(light), time.perf_counter() - begun)
-    rendering = render(stage, progress=progress)
+    rendering = render(stage.replace(art=_levelled(stage.art, levels)), progress=progress)
     parts = [layer for layer in rendering.layers if layer.name != "beauty"]
     ghosts = spread([layer for layer in parts if layer.name.startswith("ghosts")], size)
     rest = spread([layer for layer in parts if not layer.name.startswith("ghosts")], size)
@@ -146,6 +154,8 @@ class Match:
 
     Attributes
     ----------
+    levels : tuple of (float, names)
+        Gains of single ghosts, alike ones together.
     gain : tuple of float
         Of a draft's ghosts, R, G, B.
     exposure_stops : float
@@ -154,6 +164,7 @@ class Match:
 
     gain: tuple[float, float, float] = (1.0, 1.0, 1.0)
     exposure_stops: float = 0.0
+    levels: Levels = ()
 
 
 def matched(draft: Picture | None, final: Picture, held: Match) -> Match:
@@ -176,7 +187,37 @@ def matched(draft: Picture | None, final: Picture, held: Match) -> Match:
     if min(ours.min(), theirs.min()) <= 0.0:
         return held
     red, green, blue = (float(gain) for gain in np.clip(theirs / ours, 0.02, 4.0))
-    return Match((red, green, blue), held.exposure_stops)
+    return Match((red, green, blue), held.exposure_stops, held.levels)
+
+
+def levels_of(drafted: Mapping[str, float], final: Mapping[str, float]) -> Levels:
+    """Compare the light of single ghosts in a draft and in the final picture of the same project.
+
+    Parameters
+    ----------
+    drafted, final : mapping of str to float
+        Flux by name; a ghost that is missing is dark.
+
+    Returns
+    -------
+    Levels
+        In steps of `STEP`; ghosts that need no gain are left out.
+    """
+    groups: dict[int, list[str]] = {}
+    for name, flux in drafted.items():
+        ratio = min(max(final.get(name, 0.0) / flux, LEAST), MOST) if flux > 0.0 else 1.0
+        groups.setdefault(round(log(ratio, STEP)), []).append(name)
+    return tuple((STEP**step, tuple(names)) for step, names in sorted(groups.items()) if step != 0)
+
+
+def _levelled(art: Art, levels: Levels) -> Art:
+    """Add the gains to what is done by hand."""
+    if not levels:
+        return art
+    rules = tuple(Rule(select=",".join(names), gain=gain) for gain, names in levels)
+    own = () if art.physical else art.rules
+    kept: Art = art.replace(physical=False, rules=(*own, *rules), gain={} if art.physical else art.gain)
+    return kept
 
 
 def exposure_of(picture: Picture, match: Match | None = None) -> float:
@@ -200,9 +241,3 @@ def same_scene(one: Project, other: Project) -> bool:
     """Tell whether two projects differ by their lights, art and design alone, so that one exposure is fair to both."""
     kept = other.replace(lights=one.lights, art=one.art, design=one.design, quality=one.quality)
     return bool(kept == one)
-
-
-def without_art(project: Project) -> Project:
-    """Return the project as physics has it."""
-    bare: Project = project.replace(art=Art())
-    return bare

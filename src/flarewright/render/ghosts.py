@@ -226,10 +226,19 @@ def _draft(
         width, height = shots[0].size_px
         picture = np.zeros((height, width, 3))
         by_hand = [(paths[k], art[paths[k].name]) for k in group if paths[k].name in art]
+        # those that are only graded or moved alike are drawn together
+        graded: dict[object, list[LightPath]] = {}
+        for path, changed in by_hand:
+            if not changed.alone and not changed.framed:
+                graded.setdefault((changed.rgb, changed.offset), []).append(path)
         for shot in points:
             draw_draft(shot, [paths[k] for k in group if paths[k].name not in art], picture)
+            for alike_graded in graded.values():
+                changed = art[alike_graded[0].name]
+                placed = changed.place(shot.to_pixels, None)
+                draw_draft(replace(shot, to_pixels=placed), alike_graded, picture, changed.rgb)
             for path, changed in by_hand:
-                if not changed.alone:
+                if changed.framed and not changed.alone:
                     draw_draft_by_hand(shot, path, changed, picture)
         sum_rows(picture)
         # blurring is linear, so ghosts of one blur are blurred together

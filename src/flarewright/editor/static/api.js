@@ -8,7 +8,15 @@ export async function get(path) {
   return data;
 }
 
+// How many changes are on their way to the server.
+export const under = { way: 0 };
+
 export async function post(path, body) {
+  under.way += 1;
+  try { return await send(path, body); } finally { under.way -= 1; }
+}
+
+async function send(path, body) {
   const raw = body instanceof Blob || body instanceof ArrayBuffer;
   const answer = await fetch(path, {
     method: 'POST',
@@ -22,7 +30,9 @@ export async function post(path, body) {
 
 export const sentence = (text) => {
   const plain = String(text).trim();
-  return plain.charAt(0).toUpperCase() + plain.slice(1) + (/[.!?]$/.test(plain) ? '' : '.');
+  // a file keeps its name as it is
+  const name = /^\S+\.\w+\b/.test(plain);
+  return (name ? plain.charAt(0) : plain.charAt(0).toUpperCase()) + plain.slice(1) + (/[.!?]$/.test(plain) ? '' : '.');
 };
 
 export function complain(error) {

@@ -1,5 +1,5 @@
 // The page: one state from the server, drawn by panels; every change is a deed that the server does or refuses.
-import { complain, get, latest, post, sentence } from './api.js';
+import { complain, get, latest, post, sentence, under } from './api.js';
 import { button, dialog, h, menu, stroke, tips, toast, slider } from './ui.js';
 import { viewport } from './viewport.js';
 import { coatingPanel } from './panel_coating.js';
@@ -12,6 +12,7 @@ import { targetPanel } from './panel_target.js';
 
 const app = { state: null, light: 0, ghost: null, wish: null, ghosts: { fresh: false, ghosts: [] }, tab: 'light', row: null };
 window.flarewright = app;
+app.under = under;
 const $ = (id) => document.getElementById(id);
 
 // ------------------------------------------------------------------------------------------------------------- state
@@ -25,7 +26,7 @@ function take(state) {
   if (moved) { app.view.outline = null; drawSection(); }
   if (moved || JSON.stringify(old?.design) !== JSON.stringify(state.design)) { app.places(); app.view.refreshTarget(); }
   update();
-  if (!old || old.picture.number !== state.picture.number || old.revision !== state.revision) app.view.refresh(Boolean(old));
+  if (state.picture.number !== app.view.shownNumber) app.view.refresh(Boolean(old));
 }
 app.take = take;
 export const reload = latest(async () => take(await get('/api/state')));
@@ -331,7 +332,7 @@ addEventListener('drop', async (event) => {
 // ---------------------------------------------------------------------------------------------------------- listening
 function listen() {
   const socket = new WebSocket(`${location.protocol === 'https:' ? 'wss' : 'ws'}://${location.host}/ws`);
-  socket.onopen = () => { if (listen.lost) { toast('The editor is back.', 'good'); listen.lost = false; app.state = null; } reload(); loadGhosts(); };
+  socket.onopen = () => { if (listen.lost) { toast('The editor is back.', 'good'); listen.lost = false; app.state = null; app.view.shownNumber = -1; } reload(); loadGhosts(); };
   socket.onmessage = (message) => hear(JSON.parse(message.data));
   socket.onclose = () => {
     if (!listen.lost) toast('The editor does not answer. Everything up to here is saved; start flarewright edit again.', 'error');
@@ -348,11 +349,10 @@ function hear(event) {
   if (event.type === 'ghosts') { working('', 1); loadGhosts(); return; }
   if (!state) return;
   if (event.type === 'picture') {
-    const sharper = state.picture.grade !== event.grade || event.number !== state.picture.number;
     state.picture = event;
     state.view.stops = event.stops;
     working('', 1);
-    if (sharper) app.view.refresh(true);
+    if (event.number !== app.view.shownNumber) app.view.refresh(true);
     update();
     if (event.grade === 'final') app.remarks();
   }

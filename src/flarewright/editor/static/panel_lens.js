@@ -1,5 +1,5 @@
 // The prescription: every cell can be written; what is to be said stands beside it.
-import { get, latest, sentence } from './api.js';
+import { get, latest, post, sentence } from './api.js';
 import { button, entry, group, h } from './ui.js';
 
 const COLUMNS = [
@@ -22,10 +22,12 @@ export function lensPanel(app) {
   const facts = h('div', { class: 'facts' });
   const source = h('p', { class: 'quietly' });
   let refused = null;
+  let drawn = '';
   const search = latest(async (words) => { glasses.replaceChildren(...(await get(`/api/glasses?q=${encodeURIComponent(words)}`)).glasses.map((name) => h('option', { value: name }))); });
 
   async function write(box, row, column, text) {
     refused = null;
+    drawn = '';
     try { await app.deed_quiet('set_cell', { row, column, text }); wrong.textContent = ''; } catch (error) {
       refused = { row, column, text, why: sentence(error.message) };
       mark(box);
@@ -44,9 +46,9 @@ export function lensPanel(app) {
     if (refused && refused.row === line.row && refused.column === column) { box.value = refused.text; mark(box); }
     box.addEventListener('focus', () => { app.row = line.row; choose(); if (column === 'glass') search(box.value); box.select(); });
     box.addEventListener('input', () => { if (column === 'glass') search(box.value); });
-    box.addEventListener('change', () => write(box, line.row, column, box.value));
+    box.addEventListener('change', () => { const text = box.value; box.defaultValue = text; write(box, line.row, column, text); });
     box.addEventListener('keydown', (event) => {
-      if (event.key === 'Escape') { refused = null; wrong.textContent = ''; box.value = value; box.classList.remove('bad'); box.blur(); event.stopPropagation(); }
+      if (event.key === 'Escape') { refused = null; wrong.textContent = ''; box.value = value; box.defaultValue = value; box.classList.remove('bad'); drawn = ''; box.blur(); draw(app.state); event.stopPropagation(); }
       const step = { ArrowDown: 1, ArrowUp: -1, Enter: 1 }[event.key];
       if (step && !(column === 'glass' && event.key !== 'Enter')) {
         event.preventDefault();
@@ -57,8 +59,13 @@ export function lensPanel(app) {
     return h('td', { class: column === 'glass' || column === 'coating' ? 'name' : '' }, box);
   }
   function draw(state) {
+    const key = JSON.stringify([state.lens.rows, state.lens.facts.stop]);
+    if (key === drawn && !refused) return;
     const active = document.activeElement;
-    const here = active && body.contains(active) ? { row: active.dataset.row, column: active.dataset.column, text: active.value, dirty: active.value !== active.defaultValue } : null;
+    const here = active && body.contains(active) && active.dataset.column ? { row: active.dataset.row, column: active.dataset.column } : null;
+    // what is being typed is never taken away; the table follows when it is written
+    if (here && active.value !== active.defaultValue && !active.classList.contains('bad')) { active.addEventListener('blur', () => draw(app.state), { once: true }); return; }
+    drawn = key;
     body.replaceChildren(...state.lens.rows.map((line) => {
       const first = h('td', { onclick: () => { app.row = line.row; choose(); app.panels.coating.rowChosen?.(); }, tip: Object.values(line.notes).join(' ') || null }, String(line.row));
       if (line.stop) {
@@ -70,7 +77,7 @@ export function lensPanel(app) {
     choose();
     if (here) {
       const box = body.querySelector(`input[data-row="${here.row}"][data-column="${here.column}"]`);
-      if (box) { box.focus(); if (here.dirty) box.value = here.text; }
+      if (box) box.focus();
     }
   }
   function choose() {
@@ -89,10 +96,7 @@ export function lensPanel(app) {
     entry({ label: 'Wide open', tip: 'The smallest f-number: sets how far the stop opens.', name: 'open', get: (s) => s.lens.open, set: (f_number) => f_number && app.deed('set_lens_facts', { values: { f_number } }).catch(() => {}) }),
   ]);
   app.deed_quiet = async (name, values) => {
-    const answer = await fetch('/api/do', { method: 'POST', headers: { 'Content-Type': 'application/json' }, body: JSON.stringify({ name, values }) });
-    const data = await answer.json();
-    if (!answer.ok) throw new Error(data.error);
-    app.take(data);
+    app.take(await post('/api/do', { name, values }));
   };
   const picker = h('input', { type: 'file', accept: '.lens,.toml,.zmx', hidden: true });
   picker.addEventListener('change', async () => { if (picker.files[0]) await app.importFile(picker.files[0]); picker.value = ''; });

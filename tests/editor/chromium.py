@@ -1,0 +1,148 @@
+"""A real editor and a real browser, for tests and for the pictures of the documentation."""
+
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+from contextlib import contextmanager
+from pathlib import Path
+
+FLAGS = ["--no-sandbox", "--disable-gpu", "--disable-background-networking", "--disable-component-update", "--no-pings"]
+SRC = Path(__file__).parents[2] / "src"
+
+
+def chromium():
+    """Return Debian's browser, or whatever is called alike; None where there is none."""
+    return next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+
+
+class Editor:
+    """`flarewright edit` as a process of its own."""
+
+    def __init__(self, state, *words, port=0):
+        self.state, self.words, self.port = state, words, port
+        self.start()
+
+    def start(self):
+        # the tests' own kernels: they are compiled already
+        environment = {**os.environ, "FLAREWRIGHT_STATE": str(self.state), "PYTHONUNBUFFERED": "1"}
+        if "site-packages" not in str(__import__("flarewright").__file__):
+            environment["PYTHONPATH"] = os.pathsep.join([str(SRC), environment.get("PYTHONPATH", "")]).rstrip(
+                os.pathsep
+            )
+        code = "from flarewright.cli.app import main; main()"
+        self.process = subprocess.Popen(
+            [sys.executable, "-c", code, "edit", "--no-browser", "--port", str(self.port), *self.words],
+            stderr=subprocess.PIPE, text=True, env=environment,
+        )  # fmt: skip
+        line = self.process.stderr.readline()
+        found = re.search(r"(http://\S+)", line)
+        assert found, line + self.process.stderr.read()
+        self.address = found[1]
+        self.port = int(re.search(r":(\d+)/", self.address)[1])
+
+    def kill(self):
+        """As a power cut would."""
+        self.process.send_signal(signal.SIGKILL)
+        self.process.wait()
+        self.process.stderr.close()
+
+    def end(self):
+        if self.process.poll() is None:
+            self.process.send_signal(signal.SIGINT)
+            try:
+                self.process.wait(10.0)
+            except subprocess.TimeoutExpired:
+                self.process.kill()
+                self.process.wait()
+        if not self.process.stderr.closed:
+            self.process.stderr.close()
+
+
+@contextmanager
+def browser():
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as play:
+        found = play.chromium.launch(executable_path=chromium(), args=FLAGS)
+        yield found
+        found.close()
+
+
+class Tab:
+    """A page with the editor, and the few things that a person does there again and again."""
+
+    def __init__(self, page, editor):
+        self.page, self.editor = page, editor
+        self.said, self.asked = [], []
+        page.on("console", lambda message: message.type == "error" and self.said.append(message.text))
+        page.on("pageerror", lambda error: self.said.append(str(error)))
+        page.on("request", lambda request: self.asked.append(request.url))
+        self.open()
+
+    def open(self):
+        self.page.goto(self.editor.address)
+        self.rest()
+
+    def js(self, expression):
+        return self.page.evaluate(expression)
+
+    def until(self, expression, timeout_s=60.0):
+        self.page.wait_for_function(expression, timeout=1000.0 * timeout_s)
+
+    def rest(self):
+        """Wait until the final picture is shown and the ghosts are measured."""
+        self.until("window.flarewright?.state && window.flarewright.view.image")
+        # what was just asked for has reached the page
+        self.page.wait_for_timeout(60)
+        self.until(
+            "(() => { const a = flarewright, p = a.state.picture; return !a.under.way && (p.problem || (p.current &&"
+            "['final', 'working'].includes(p.grade) && a.view.shownNumber === p.number && a.ghosts.fresh)); })()"
+        )
+
+    def state(self):
+        return self.js("JSON.parse(JSON.stringify(flarewright.state))")
+
+    def tab(self, name):
+        self.page.click(f"[data-tab={name}]")
+
+    def light(self):
+        """Return where the light's handle is on the page."""
+        x, y = self.js("flarewright.view.lightPage(0)")
+        box = self.page.locator("#view").bounding_box()
+        return box["x"] + x, box["y"] + y
+
+    def frame(self):
+        box, frame = self.page.locator("#view").bounding_box(), self.js("flarewright.view.frame()")
+        return box["x"] + frame["x"], box["y"] + frame["y"], frame["w"], frame["h"]
+
+    def at(self, u, v):
+        x, y, w, h = self.frame()
+        return x + u * w, y + v * h
+
+    def drag(self, start, end, steps=12, hold_ms=12):
+        mouse = self.page.mouse
+        mouse.move(*start)
+        mouse.down()
+        for k in range(1, steps + 1):
+            mouse.move(*(a + (b - a) * k / steps for a, b in zip(start, end, strict=True)))
+            self.page.wait_for_timeout(hold_ms)
+        mouse.up()
+
+    def shown(self):
+        """Return the pixels that the page shows, as the canvas holds them: shape (H, W, 3)."""
+        import base64
+        import io
+
+        import numpy as np
+        from PIL import Image
+
+        data = self.js(
+            "(() => { const i = flarewright.view.image, c = new OffscreenCanvas(i.width, i.height);"
+            "c.getContext('2d').drawImage(i, 0, 0); return c.convertToBlob({type: 'image/png'}).then(b => new Promise("
+            "done => { const r = new FileReader(); r.onload = () => done(r.result.split(',')[1]);"
+            "r.readAsDataURL(b); })); })()"
+        )
+        return np.asarray(Image.open(io.BytesIO(base64.b64decode(data))).convert("RGB"))

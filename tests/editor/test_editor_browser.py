@@ -1,0 +1,377 @@
+"""The editor driven as a person does, in a real browser: `pytest -m browser`."""
+
+import json
+
+import numpy as np
+import pytest
+
+from flarewright.io.lens_file import read_lens
+from flarewright.io.library import lens_path
+from flarewright.io.project_file import read_project
+from flarewright.model import Project
+from flarewright.render.display import view
+from flarewright.render.render import render
+
+pytest.importorskip("playwright", reason="the extra e2e is not installed")
+pytest.importorskip("starlette", reason="the extra ui is not installed")
+
+from chromium import Editor, Tab, browser, chromium
+
+pytestmark = [
+    pytest.mark.browser,
+    pytest.mark.skipif(chromium() is None, reason="no Chromium was found; on Debian: apt-get install chromium"),
+]
+
+
+@pytest.fixture(scope="module")
+def chrome():
+    with browser() as found:
+        yield found
+
+
+@pytest.fixture
+def tab(chrome, tmp_path):
+    editor = Editor(tmp_path / "state")
+    context = chrome.new_context(viewport={"width": 1280, "height": 720}, accept_downloads=True)
+    yield (opened := Tab(context.new_page(), editor))
+    context.close()
+    editor.end()
+    # the browser tells of every answer 400 by itself; the page told it in words
+    assert [said for said in opened.said if "400" not in said] == []
+    # no request leaves the machine
+    assert {url.split("/")[2] for url in opened.asked if not url.startswith(("blob:", "data:"))} <= {
+        editor.address.split("/")[2]
+    }
+
+
+def project_of(tab, tmp_path) -> Project:
+    """Take the project from the page as a person would: export it, and read the file."""
+    return read_project(download(tab, "Project file", tmp_path / "exported.toml"))
+
+
+def download(tab, entry, path):
+    tab.page.click("#export")
+    with tab.page.expect_download(timeout=60000) as waiting:
+        tab.page.click(f"[role=menuitem]:has-text('{entry}')")
+    waiting.value.save_as(path)
+    return path
+
+
+def judged(tab, project):
+    """Return how far the shown picture is from an ordinary render of a project, in mean codes of 255."""
+    camera = project.camera.replace(size_px=(960, 540), sensor_mm=project.camera.sensor)
+    light = render(project.replace(camera=camera)).layers[0].pixels
+    wanted = view(light, tab.state()["view"]["stops"]).astype(float)
+    return float(np.abs(tab.shown().astype(float) - wanted).mean())
+
+
+def test_drag_the_light_and_see_the_flare_move(tab, tmp_path):
+    before = tab.shown()
+    first = tab.light()
+    tab.drag(first, (first[0] - 120, first[1] + 60))
+    # pictures came while the hand moved, and none of them was final
+    assert len(tab.js("flarewright.view.stats.shown")) >= 3
+    tab.rest()
+    after = tab.shown()
+    assert np.abs(after.astype(float) - before.astype(float)).mean() > 2.0
+    project = project_of(tab, tmp_path)
+    x, y = project.lights[0].field_deg
+    assert x < 7.0
+    assert y < 4.0
+    assert judged(tab, project) < 1.5
+    # one drag is one step
+    assert tab.state()["steps"]["at"] == 1
+    tab.page.keyboard.press("Control+z")
+    tab.rest()
+    assert tab.state()["lights"][0]["field_deg"] == [8.0, 4.4]
+    assert np.abs(tab.shown().astype(float) - before.astype(float)).mean() < 0.5
+
+
+def test_the_light_goes_out_of_the_frame_and_keys_move_it(tab):
+    first = tab.light()
+    x, y, w, _ = tab.frame()
+    tab.drag(first, (x + w + 10, y - 8))
+    tab.rest()
+    across = tab.state()["lights"][0]["field_deg"][0]
+    assert across > 10.3
+    tab.page.locator("#view").focus()
+    tab.page.keyboard.press("Shift+ArrowLeft")
+    tab.rest()
+    assert tab.state()["lights"][0]["field_deg"][0] == pytest.approx(across - 1.0, abs=1e-3)
+
+
+def test_drafts_do_not_jump_in_brightness(tab):
+    def level():
+        # beside the direct image, which moves
+        shown = tab.shown()
+        return shown[:, : shown.shape[1] * 2 // 5].astype(float).mean()
+
+    first = tab.light()
+    mouse = tab.page.mouse
+    mouse.move(*first)
+    mouse.down()
+    mouse.move(first[0] - 20, first[1] + 10)
+    mouse.move(first[0] - 40, first[1] + 20)
+    tab.until("flarewright.view.shownGrade === 'moving'")
+    tab.page.wait_for_timeout(300)
+    moving = level()
+    mouse.up()
+    tab.rest()
+    assert moving == pytest.approx(level(), rel=0.08)
+
+
+def test_a_click_chooses_among_all_ghosts_there(tab):
+    place = tab.at(0.62, 0.52)
+    tab.page.mouse.click(*place)
+    tab.until("flarewright.ghost")
+    stack = tab.js("flarewright.view.stack")
+    assert len(stack) > 2
+    assert tab.js("flarewright.ghost") == stack[0]
+    tab.until("flarewright.view.outline")
+    tab.page.mouse.wheel(0, 100)
+    tab.until(f"flarewright.ghost === {json.dumps(stack[1])}")
+    tab.tab("ghosts")
+    row = tab.page.locator("tr.chosen")
+    assert row.get_attribute("data-ghost") == stack[1]
+    # its rays are in the cross-section
+    tab.until(f"document.querySelector('#section .head').textContent.includes({json.dumps(stack[1])})")
+    before = tab.shown()
+    tab.page.keyboard.press("s")
+    tab.rest()
+    assert tab.state()["solo"] == [stack[1]]
+    assert tab.shown().astype(float).mean() < before.astype(float).mean()
+    tab.page.keyboard.press("s")
+    tab.page.click("#mute")
+    tab.rest()
+    assert "muted" in tab.page.locator("tr.chosen").inner_text()
+    assert tab.state()["by_hand"] == 1
+
+
+def test_edit_cells_undo_five_redo_five(tab, tmp_path):
+    tab.tab("lens")
+
+    def write(row, column, text):
+        box = tab.page.locator(f"input[data-row='{row}'][data-column='{column}']")
+        box.fill(text)
+        box.press("Enter")
+        tab.rest()
+
+    efl = tab.state()["lens"]["facts"]["efl"]
+    write(0, "radius", "33")
+    assert tab.state()["lens"]["facts"]["efl"] > efl
+    write(0, "glass", "N-BK7")
+    write(2, "thickness", "4")
+    write(8, "coating", "quarter-wave:600")
+    write(6, "n_d", "1.6")
+    project = project_of(tab, tmp_path)
+    assert project.lens.rows[2].thickness == 4.0
+    assert judged(tab, project) < 1.5
+    done = tab.state()["lens"]["rows"]
+    assert tab.state()["steps"]["at"] == 5
+    tab.page.locator("#view").focus()
+    for _ in range(5):
+        tab.page.keyboard.press("Control+z")
+    tab.until("!flarewright.state.undo")
+    assert tab.state()["lens"]["facts"]["efl"] == efl
+    for _ in range(5):
+        tab.page.keyboard.press("Control+Shift+z")
+    tab.until("!flarewright.state.redo")
+    assert tab.state()["lens"]["rows"] == done
+    # what cannot be read is refused beside the cell, and nothing is lost
+    box = tab.page.locator("input[data-row='1'][data-column='glass']")
+    box.fill("N-NOTHING")
+    box.press("Enter")
+    tab.until("document.querySelector('.wrong').textContent.includes('N-NOTHING')")
+    assert tab.state()["lens"]["rows"] == done
+
+
+def test_a_broken_lens_keeps_the_last_good_picture(tab):
+    tab.tab("lens")
+    good = tab.shown()
+    for row in (0, 2, 3, 4, 7, 8, 1):
+        box = tab.page.locator(f"input[data-row='{row}'][data-column='radius']")
+        box.fill("flat")
+        box.press("Tab")
+        tab.until(f"flarewright.state.lens.rows[{row}].radius === 'flat'")
+    # on the way there it may have been a lens for a moment
+    tab.until("flarewright.state.lens.problem.includes('no glass') || flarewright.state.lens.problem.includes('afocal')")
+    tab.page.wait_for_timeout(500)
+    tab.until("document.getElementById('problem').textContent.includes('last good picture')")
+    assert tab.shown().shape == good.shape
+    tab.page.locator("#view").focus()
+    while tab.state()["undo"]:
+        tab.page.click("#undo")
+        tab.page.wait_for_timeout(60)
+    tab.until("document.getElementById('problem').hidden")
+    tab.rest()
+    assert np.abs(tab.shown().astype(float) - good.astype(float)).mean() < 0.5
+
+
+def test_import_export_and_a_wrong_file(tab, tmp_path):
+    drop(tab, "tessar.toml", lens_path("tessar-brendel").read_bytes())
+    tab.until("flarewright.state.lens.name.includes('Tessar')")
+    tab.rest()
+    lens = read_lens(download(tab, "Lens file", tmp_path / "lens.toml")).lens
+    assert lens.name == tab.state()["lens"]["name"]
+    assert download(tab, "PNG as shown", tmp_path / "shown.png").read_bytes()[:4] == b"\x89PNG"
+    table = download(tab, "Ghosts as CSV", tmp_path / "ghosts.csv").read_text()
+    assert len(table.splitlines()) == 1 + len(tab.js("flarewright.ghosts.ghosts"))
+    before = tab.state()["lens"]
+    drop(tab, "holiday.pdf", b"%PDF-1.4 nothing of use")
+    tab.until(told("holiday.pdf cannot be opened here"))
+    drop(tab, "broken.toml", b"schema_version = 1\nname = 'x'\n")
+    tab.until(told("broken.toml"))
+    assert tab.state()["lens"] == before
+
+
+def told(words):
+    return f"[...document.querySelectorAll('.toast')].some(t => t.textContent.includes({json.dumps(words)}))"
+
+
+def drop(tab, name, data):
+    """Drop a file on the page, as the system's file manager does."""
+    tab.page.evaluate(
+        "([name, bytes]) => { const box = new DataTransfer();"
+        "box.items.add(new File([new Uint8Array(bytes)], name));"
+        "document.body.dispatchEvent(new DragEvent('drop', {dataTransfer: box, bubbles: true, cancelable: true})); }",
+        [name, list(data)],
+    )
+
+
+def test_the_exported_exr_is_a_render_of_the_project(tab, tmp_path):
+    from flarewright.io.exr import read_exr
+
+    tab.tab("light")
+    tab.page.select_option("select[name=size]", "1280x720")
+    tab.rest()
+    exr = read_exr(download(tab, "EXR", tmp_path / "flare.exr"))
+    project = project_of(tab, tmp_path)
+    assert exr.size_px == (1280, 720)
+    wanted = {layer.name: layer for layer in render(project).layers}
+    assert [layer.name for layer in exr.layers] == list(wanted)
+    np.testing.assert_array_equal(exr.layers[0].pixels, wanted["beauty"].pixels)
+
+
+def test_nothing_is_lost_when_the_server_is_killed(tab):
+    tab.drag(tab.light(), tab.at(0.4, 0.3))
+    tab.tab("iris")
+    box = tab.page.locator("input[name=blades]")
+    box.fill("9")
+    box.press("Enter")
+    tab.rest()
+    before, shown = tab.state(), tab.shown()
+    tab.page.wait_for_timeout(300)
+    tab.editor.kill()
+    tab.until("document.querySelector('.toast.error')")
+    tab.editor.start()
+    tab.said.clear()
+    # the page finds its way back by itself
+    tab.until(told("is back"))
+    tab.rest()
+    after = tab.state()
+    for key in ("lights", "iris", "lens", "steps", "undo"):
+        assert after[key] == before[key]
+    assert np.abs(tab.shown().astype(float) - shown.astype(float)).mean() < 0.5
+    tab.page.reload()
+    tab.rest()
+    assert tab.state()["iris"]["blades"] == 9
+    tab.page.click("#undo")
+    tab.until("flarewright.state.iris.blades === 6")
+    tab.said.clear()
+
+
+def test_two_tabs_show_one_project(tab):
+    other = Tab(tab.page.context.new_page(), tab.editor)
+    other.tab("iris")
+    box = other.page.locator("input[name=rotation]")
+    box.fill("33")
+    box.press("Enter")
+    tab.until("flarewright.state.iris.rotation_deg === 33")
+    tab.rest()
+    other.rest()
+    np.testing.assert_array_equal(tab.shown(), other.shown())
+    tab.page.click("#undo")
+    other.until("flarewright.state.iris.rotation_deg === 10")
+    assert other.said == []
+
+
+def test_annotate_solve_accept(tab, tmp_path):
+    name = tab.state()["lens"]["name"]
+    tab.page.keyboard.press("g")
+    tab.rest()
+    tab.tab("target")
+    tab.until("flarewright.view.places.length > 0")
+    place = next(p for p in tab.js("flarewright.view.places") if p["name"] == "8-6")
+    tab.js("flarewright.choose('8-6')")
+    tab.rest()
+    # pull it by its middle, along the line
+    x, y = tab.js(f"flarewright.view.toPage(...flarewright.view.line({place['place']}))")
+    box = tab.page.locator("#view").bounding_box()
+    start = (box["x"] + x, box["y"] + y)
+    tab.drag(start, (start[0] + 30, start[1] - 16))
+    tab.until("flarewright.state.design?.wishes.length === 1")
+    wish = tab.state()["design"]["wishes"][0]
+    assert wish["ghost"] == "8-6"
+    assert wish["move_mm"] > 0.5
+    tab.page.click("[data-compare=wipe]")
+    tab.until("flarewright.view.target")
+    tab.page.fill("input[name=seconds]", "4")
+    tab.page.press("input[name=seconds]", "Enter")
+    tab.page.click("#solve")
+    tab.until("flarewright.state.solve.running")
+    tab.until("!flarewright.state.solve.running", 60.0)
+    count = len(tab.state()["solve"]["found"])
+    assert 1 <= count <= 5
+    assert tab.page.locator(".candidates img").count() == count
+    tab.until("[...document.querySelectorAll('.candidates img')].every(i => i.naturalWidth > 0)")
+    tab.page.click("[data-accept='0']")
+    tab.until("flarewright.state.lens.name.startsWith('After')")
+    tab.rest()
+    project = project_of(tab, tmp_path)
+    assert project.lens.name == f"After {name} 1"
+    # the ghost is where it was wanted, as far as the solver says it met the wish
+    tab.page.locator("#view").focus()
+    tab.page.keyboard.press("Control+z")
+    tab.until(f"flarewright.state.lens.name === {json.dumps(name)}")
+    assert tab.state()["design"]["wishes"][0]["ghost"] == "8-6"
+
+
+def test_the_library_and_the_keys(tab):
+    tab.tab("library")
+    tab.until("document.querySelectorAll('.library button').length > 10")
+    tab.page.fill("input[name=search]", "tessar")
+    assert tab.page.locator(".library button").count() == 1
+    tab.until("document.querySelector('.library img').naturalWidth > 0")
+    tab.page.click(".library button")
+    tab.until("flarewright.state.lens.name.includes('Tessar')")
+    tab.rest()
+    tab.page.locator("#view").focus()
+    for key, expression in (
+        ("v", "flarewright.state.view.look === 'filmic'"), ("h", "flarewright.state.view.safe_frame"),
+        ("g", "flarewright.state.view.grey"), ("e", "flarewright.state.view.unclipped"),
+        ("3", "flarewright.tab === 'lens'"), ("n", "flarewright.ghost !== null"),
+        ("Escape", "flarewright.ghost === null"),
+    ):  # fmt: skip
+        tab.page.keyboard.press(key)
+        tab.until(expression)
+    tab.page.keyboard.press("?")
+    assert "move the light" in tab.page.locator("dialog").inner_text()
+    tab.page.keyboard.press("Escape")
+    # every control can be reached without a mouse and has a name
+    tab.page.keyboard.press("1")
+    names = tab.js(
+        "[...document.querySelectorAll('button, select, input:not([hidden])')].filter(e => e.offsetParent).map(e =>"
+        "[e.tagName, e.textContent || e.ariaLabel || e.labels?.[0]?.textContent || e.title || '', e.tabIndex])"
+    )
+    assert [each for each in names if not each[1]] == []
+
+
+def test_readable_at_1280x720(tab):
+    for name in ("light", "ghosts", "lens", "iris", "coating", "target", "library"):
+        tab.tab(name)
+        wide = tab.js("[document.documentElement.scrollWidth, document.getElementById('page').scrollWidth,"
+                      "document.getElementById('page').clientWidth]")  # fmt: skip
+        assert wide[0] <= 1280
+        assert wide[1] <= wide[2]
+    bar = tab.js("[...document.getElementById('bar').children].map(e => e.getBoundingClientRect().right)")
+    assert max(bar) <= 1280
