@@ -235,12 +235,14 @@ def test_a_hand_is_followed_and_let_go(project):
     screen.start()
     screen.wait(60.0)
     before, exposure = screen.picture, screen.exposure_stops
-    data, seconds = screen.moving(0, 3.0, 1.0)
+    data, seconds = screen.moving(0, 3.0, 1.0, session.revision)
     assert data[:2] == b"\xff\xd8"
     assert seconds > 0.0
     # nothing is decided while the hand holds the light
     assert session.project == before.project
     session.do("move_light", {"light": 0, "x": 3.0, "y": 1.0})
+    # what the hand asked for before it let go neither ends the final picture nor is drawn any more
+    assert screen.moving(0, 2.9, 1.0, session.revision - 1) is None
     assert screen.wait(60.0)
     assert screen.picture.grade == "final"
     assert screen.picture.project.lights[0].field_deg == (3.0, 1.0)

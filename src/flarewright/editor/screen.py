@@ -18,8 +18,8 @@ from .studio import Match, Picture
 from .view import View
 
 # pictures of a dragging hand: their sides as parts of the viewport's, and the time that one may take
-SCALES = (1.0, 2.0 / 3.0, 0.5, 1.0 / 3.0)
-SLOW_S, FAST_S = 0.045, 0.016
+SCALES = (1.0, 2.0 / 3.0, 0.5)
+SLOW_S, FAST_S = 0.036, 0.02
 # a lens whose final picture takes less needs no draft in front of it
 SOON_S = 0.35
 TELL_S = 0.12
@@ -179,7 +179,7 @@ class Screen:
         plate = plate_for(view, (light.shape[1], light.shape[0]))
         return pixels_of(light, self.exposure_stops, view, plate)
 
-    def moving(self, light: int, x: float, y: float) -> tuple[bytes, float]:
+    def moving(self, light: int, x: float, y: float, revision: int) -> tuple[bytes, float] | None:
         """Draw the picture with a light elsewhere, as sharp as a dragging hand has patience for.
 
         Parameters
@@ -187,19 +187,27 @@ class Screen:
         light : int
         x, y : float
             Field angles, degrees.
+        revision : int
+            Of the session that the hand sees.
 
         Returns
         -------
         picture : bytes
             JPEG.
         seconds : float
+            None in place of both where the hand has let go already.
         """
         from .edit_shot import move_light
 
-        # the final picture of a place that the hand has left is of no use
-        self._lane.cancel()
-        self._busy = None
+        with self.session.lock:
+            if revision != self.session.revision:
+                return None
+            # the final picture of a place that the hand has left is of no use
+            self._lane.cancel()
+            self._busy = None
         with self._hand:
+            if revision != self.session.revision:
+                return None
             begun = time.perf_counter()
             project = move_light(self.session.project, light, x, y)
             picture = studio.take(
@@ -209,8 +217,9 @@ class Screen:
                 self._scale += 1
             elif picture.seconds < FAST_S and self._scale > 0:
                 self._scale -= 1
-            data = jpeg(self._pixels(picture), 80)
-            return data, time.perf_counter() - begun
+        # the next one is drawn while this one is packed
+        data = jpeg(self._pixels(picture), 80)
+        return data, time.perf_counter() - begun
 
     def rest(self) -> None:
         """Go on with the final picture after a drag that changed nothing."""

@@ -159,8 +159,9 @@ def _picture(desk: Desk, _request: Request, _body: Any) -> Any:
 
 def _moving(desk: Desk, request: Request, _body: Any) -> Any:
     asked = request.query_params
-    data, seconds = desk.screen.moving(int(asked["light"]), float(asked["x"]), float(asked["y"]))
-    return _jpeg(data, {"X-Seconds": f"{seconds:.4f}"})
+    revision = int(asked.get("revision", desk.session.revision))
+    found = desk.screen.moving(int(asked["light"]), float(asked["x"]), float(asked["y"]), revision)
+    return Response(status_code=204) if found is None else _jpeg(found[0], {"X-Seconds": f"{found[1]:.4f}"})
 
 
 def _target(desk: Desk, _request: Request, _body: Any) -> Any:

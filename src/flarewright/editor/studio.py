@@ -5,14 +5,17 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from math import log
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..model import Art, Layer, Output, Project, Quality, Rule
+from ..io.library import lens_path
+from ..model import Art, Layer, Lens, Output, Project, Quality, Rule
 from ..render.display import auto_exposure
+from ..render.prepare import load_lens
 from ..render.render import render
 from ..render.working import working_ghosts
 from .view import View
@@ -79,6 +82,8 @@ def staged(project: Project, grade: Grade, scale: float = 1.0) -> Project:
     -------
     Project
     """
+    if isinstance(project.lens, str):
+        project = project.replace(lens=_loaded(project.lens, lens_path(project.lens).stat().st_mtime_ns))
     camera = project.camera.replace(size_px=view_size(project, scale), sensor_mm=project.camera.sensor)
     own = project.quality
     if grade == "final":
@@ -89,6 +94,13 @@ def staged(project: Project, grade: Grade, scale: float = 1.0) -> Project:
     output = Output(layers="passes", starburst=project.output.starburst)
     found: Project = project.replace(camera=camera, quality=quality, output=output)
     return found
+
+
+@lru_cache(maxsize=8)
+def _loaded(name: str, changed_ns: int) -> Lens:
+    """Read a lens once, and anew when its file has changed."""
+    del changed_ns
+    return load_lens(name)
 
 
 def take(

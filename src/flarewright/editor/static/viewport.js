@@ -36,7 +36,7 @@ export function viewport(canvas, app) {
   const toMm = (px, py, f = frame()) => [(px - f.x - f.w / 2) / f.mm, -(py - f.y - f.h / 2) / (f.mm * stretch(f))];
   const angle = (mm) => Math.max(-STEEPEST, Math.min(STEEPEST, Math.atan(mm / efl()) * 180 / Math.PI));
   const place = (light) => light.field_deg.map((deg) => efl() * Math.tan(deg * Math.PI / 180));
-  const lightAt = (k) => (self.drag?.kind === 'light' && self.drag.light === k && self.drag.now) || app.state.lights[k].field_deg;
+  const lightAt = (k) => (self.drag?.kind === 'light' && self.drag.light === k && self.shownLight) || app.state.lights[k].field_deg;
   const lightPage = (k) => toPage(...place({ field_deg: lightAt(k) }));
   // a handle far outside is held at the border, so that it can always be taken
   function handle(k) {
@@ -68,7 +68,7 @@ export function viewport(canvas, app) {
     if (!app.state) return;
     const f = frame();
     pen.imageSmoothingEnabled = self.zoom < 3;
-    pen.imageSmoothingQuality = 'high';
+    pen.imageSmoothingQuality = self.drag?.kind === 'light' ? 'low' : 'high';
     picture(f, now);
     border(f);
     if (doubled()) { pen.save(); pen.translate(f.shift, 0); border(f); pen.restore(); }
@@ -215,25 +215,38 @@ export function viewport(canvas, app) {
   let next = null;
   let sent = 0;
   let received = 0;
-  async function pump() {
-    while (next && under < 2) {
-      const now = next;
-      next = null;
-      const number = ++sent;
-      under += 1;
-      ask(now, number).finally(() => { under -= 1; pump(); });
+  let asked = 0;
+  let usual = 30;
+  let waiting = 0;
+  function pump() {
+    if (!next || under >= 2) return;
+    // the second one leaves shortly before the first is done, so that it asks for the newest place
+    const early = under === 1 ? asked + 0.6 * usual - performance.now() : 0;
+    if (early > 1) {
+      waiting ||= setTimeout(() => { waiting = 0; pump(); }, early);
+      return;
     }
+    const now = next;
+    next = null;
+    under += 1;
+    asked = performance.now();
+    ask(now, ++sent).finally(() => { under -= 1; pump(); });
   }
   async function ask(now, number) {
     try {
-      const answer = await fetch(`/api/moving?light=${now.light}&x=${now.x}&y=${now.y}`);
+      const answer = await fetch(`/api/moving?light=${now.light}&x=${now.x}&y=${now.y}&revision=${app.state.revision}`);
+      if (answer.status === 204) return;
       if (!answer.ok) throw new Error((await answer.json()).error);
       const bitmap = await createImageBitmap(await answer.blob());
       if (number < received || self.drag?.kind !== 'light') return;
       received = number;
+      self.shownLight = [Number(now.x), Number(now.y)];
+      app.lightMoved(now.light, self.shownLight);
       self.show(bitmap, false);
       self.shownGrade = 'moving';
-      self.stats.server.push(Number(answer.headers.get('X-Seconds')));
+      const seconds = Number(answer.headers.get('X-Seconds'));
+      usual += 0.2 * (1000 * seconds - usual);
+      self.stats.server.push(seconds);
       requestAnimationFrame((time) => { self.stats.shown.push(time); self.stats.latency.push(performance.now() - now.time); });
     } catch (error) { complain(error); }
   }
@@ -242,9 +255,9 @@ export function viewport(canvas, app) {
     const [mx, my] = toMm(px - drag.offX, py - drag.offY);
     drag.now = [angle(mx), angle(my)];
     next = { light: drag.light, x: drag.now[0].toFixed(4), y: drag.now[1].toFixed(4), time };
-    app.lightMoved(drag.light, drag.now);
+    // the handle moves with the picture: painting costs more than all else here
     pump();
-    redraw();
+    if (!under) redraw();
   }
   async function dropLight() {
     const { light, now, group } = self.drag;
@@ -360,7 +373,7 @@ export function viewport(canvas, app) {
     if (drag.kind === 'pan') { self.panX = drag.x + px - drag.px; self.panY = drag.y + py - drag.py; redraw(); return; }
     if (drag.kind === 'wipe') { const f = frame(); self.wipe = Math.max(0, Math.min(1, (px - f.x) / f.w)); redraw(); return; }
     if (drag.kind === 'ghost' || drag.kind === 'rim') { pull(px, py); return; }
-    if (drag.kind === 'maybe' && Math.hypot(px - drag.px, py - drag.py) >= CLICK_PX) { drag.kind = 'light'; self.hover = null; }
+    if (drag.kind === 'maybe' && Math.hypot(px - drag.px, py - drag.py) >= CLICK_PX) { drag.kind = 'light'; self.hover = null; self.shownLight = null; }
     if (drag.kind === 'light') moveLight(px, py, performance.now());
   });
   canvas.addEventListener('pointerup', async (event) => {
