@@ -11,6 +11,7 @@ from flarewright.editor.seen import Seen, SeenGhost, alone, is_there, outline, s
 from flarewright.editor.session import begin
 from flarewright.editor.shown import FALSE_COLOURS, jpeg, pixels_of, plate_for
 from flarewright.editor.view import View
+from flarewright.editor.viewing import outline_png, picked, shown_jpeg, target_jpeg
 from flarewright.errors import ProjectError
 from flarewright.model import Camera, Everywhere, Light, Output, Quality, QuarterWave
 from flarewright.optics.color import luminance_weights
@@ -222,7 +223,7 @@ def test_the_screen_keeps_the_last_good_picture(project):
     assert screen.wait(60.0)
     assert screen.problem
     assert screen.picture.project != session.project
-    assert len(screen.encoded()) > 1000
+    assert len(shown_jpeg(screen)) > 1000
     session.put(lens, "Back")
     assert screen.wait(60.0)
     assert screen.problem == ""
@@ -248,7 +249,7 @@ def test_a_hand_is_followed_and_let_go(project):
     assert screen.picture.project.lights[0].field_deg == (3.0, 1.0)
     # the exposure is held, so that brightness can be compared
     assert screen.exposure_stops == exposure
-    names = screen.pick(*screen.seen.ghosts[0].centre)
+    names = picked(screen, *screen.seen.ghosts[0].centre)
     assert screen.seen.ghosts[0].name in names
-    assert screen.outlined(names[0])[:4] == b"\x89PNG"
-    assert screen.target()[:2] == b"\xff\xd8"
+    assert outline_png(screen, names[0])[:4] == b"\x89PNG"
+    assert target_jpeg(screen)[:2] == b"\xff\xd8"

@@ -7,13 +7,16 @@ import time
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ..errors import FlarewrightError
 from ..model import Project
 from . import studio
 from .jobs import Check, Lane
-from .seen import Seen, alone, is_there, outline, see, under
+from .seen import Seen, see
 from .session import Session
-from .shown import jpeg, pixels_of, plate_for, png
+from .shown import jpeg, pixels_of, plate_for
 from .studio import Match, Picture
 from .view import View
 
@@ -23,9 +26,6 @@ SLOW_S, FAST_S = 0.036, 0.02
 # a lens whose final picture takes less needs no draft in front of it
 SOON_S = 0.35
 TELL_S = 0.12
-OUTLINE = (240, 176, 84)
-# ghosts under the pointer that are looked at closely before one is believed
-LOOKED_AT = 6
 
 
 class Screen:
@@ -69,9 +69,6 @@ class Screen:
             return
         self._busy = wanted
         self._lane.submit(lambda check: self._work(project, view, check))
-
-    # -----------------------------------------------------------------------------------------------------------------
-    # Work
 
     def _work(self, project: Project, view: View, check: Check) -> None:
         try:
@@ -145,9 +142,6 @@ class Screen:
         self.number += 1
         self.session.tell({"type": "picture"})
 
-    # -----------------------------------------------------------------------------------------------------------------
-    # What the page asks for
-
     @property
     def exposure_stops(self) -> float:
         """What the picture is shown with."""
@@ -159,25 +153,6 @@ class Screen:
         if self.picture is not None:
             self.match = replace(self.match, exposure_stops=studio.exposure_of(self.picture, self.match))
         self.session.set_view({"exposure_stops": None})
-
-    def encoded(self, quality: int = 92) -> bytes:
-        """Return the picture that is shown, as JPEG; black before there is one."""
-        return jpeg(self.pixels(), quality)
-
-    def pixels(self) -> Any:
-        """Return the picture that is shown as sRGB pixels."""
-        import numpy as np
-
-        picture = self.picture
-        if picture is None:
-            width, height = studio.view_size(self.session.project)
-            return np.zeros((height, width, 3), dtype=np.uint8)
-        return self._pixels(picture)
-
-    def _pixels(self, picture: Picture) -> Any:
-        view, light = self.session.view, studio.light_of(picture, self.match)
-        plate = plate_for(view, (light.shape[1], light.shape[0]))
-        return pixels_of(light, self.exposure_stops, view, plate)
 
     def moving(self, light: int, x: float, y: float, revision: int) -> tuple[bytes, float] | None:
         """Draw the picture with a light elsewhere, as sharp as a dragging hand has patience for.
@@ -218,7 +193,7 @@ class Screen:
             elif picture.seconds < FAST_S and self._scale > 0:
                 self._scale -= 1
         # the next one is drawn while this one is packed
-        data = jpeg(self._pixels(picture), 80)
+        data = jpeg(pixels_of_picture(self, picture), 80)
         return data, time.perf_counter() - begun
 
     def rest(self) -> None:
@@ -226,38 +201,9 @@ class Screen:
         if self._busy is None:
             self._heard({"type": "changed"})
 
-    def target(self, quality: int = 92) -> bytes:
-        """Draw the fictional target: the picture as the wishes would have it."""
-        import numpy as np
 
-        from .edit_wishes import new_discs, target_project
-
-        project = self.session.project
-        picture = studio.take(target_project(project), "draft", self.session.view)
-        ghosts = studio.light_of(picture, self.match)
-        height, width = ghosts.shape[:2]
-        across = width / project.camera.sensor[0]
-        level = float(np.percentile(ghosts.max(axis=2), 90.0)) + 0.25 * 2.0**-self.exposure_stops
-        rows, columns = np.mgrid[0:height, 0:width] + 0.5
-        for x, y, radius in new_discs(project):
-            away = np.hypot(columns - width / 2 - x * across, rows - height / 2 + y * across)
-            ghosts[away < radius * across] += np.float32(level)
-        return jpeg(pixels_of(ghosts, self.exposure_stops, self.session.view), quality)
-
-    def pick(self, u: float, v: float) -> tuple[str, ...]:
-        """Return the ghosts under a place, brightest first; the first of them are looked at in full size."""
-        seen = self.seen
-        if seen is None:
-            return ()
-        found = under(seen, u, v)
-        grade = self._grade()
-        near = [name for name in found[:LOOKED_AT] if is_there(alone(seen.project, name, grade), u, v)]
-        return (*near, *found[LOOKED_AT:])
-
-    def outlined(self, ghost: str) -> bytes:
-        """Draw the border of a ghost as PNG, clear elsewhere."""
-        return png(outline(alone(self.session.project, ghost, self._grade()), OUTLINE))
-
-    def _grade(self) -> studio.Grade:
-        view = self.session.view
-        return "draft" if view.grey or view.unclipped or self.picture is None else "final"
+def pixels_of_picture(screen: Screen, picture: Picture) -> NDArray[np.uint8]:
+    """Return sRGB pixels of a picture as the session's view has it."""
+    view, light = screen.session.view, studio.light_of(picture, screen.match)
+    plate = plate_for(view, (light.shape[1], light.shape[0]))
+    return pixels_of(light, screen.exposure_stops, view, plate)

@@ -20,7 +20,7 @@ from starlette.staticfiles import StaticFiles
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from ..errors import FlarewrightError, ProjectError
-from . import drawings, files
+from . import drawings, files, viewing
 from .autosave import state_folder
 from .edit_lens import choose_lens
 from .guard import Application, Guard
@@ -154,7 +154,7 @@ def _rest(desk: Desk, _request: Request, _body: Any) -> Any:
 
 
 def _picture(desk: Desk, _request: Request, _body: Any) -> Any:
-    return _jpeg(desk.screen.encoded())
+    return _jpeg(viewing.shown_jpeg(desk.screen))
 
 
 def _moving(desk: Desk, request: Request, _body: Any) -> Any:
@@ -165,16 +165,18 @@ def _moving(desk: Desk, request: Request, _body: Any) -> Any:
 
 
 def _target(desk: Desk, _request: Request, _body: Any) -> Any:
-    return _jpeg(desk.screen.target())
+    return _jpeg(viewing.target_jpeg(desk.screen))
 
 
 def _pick(desk: Desk, request: Request, _body: Any) -> Any:
     asked = request.query_params
-    return {"ghosts": list(desk.screen.pick(float(asked["u"]), float(asked["v"])))}
+    return {"ghosts": list(viewing.picked(desk.screen, float(asked["u"]), float(asked["v"])))}
 
 
 def _outline(desk: Desk, request: Request, _body: Any) -> Any:
-    return Response(desk.screen.outlined(request.query_params["ghost"]), media_type="image/png", headers=_FRESH)
+    return Response(
+        viewing.outline_png(desk.screen, request.query_params["ghost"]), media_type="image/png", headers=_FRESH
+    )
 
 
 def _ghosts(desk: Desk, _request: Request, _body: Any) -> Any:
@@ -272,7 +274,7 @@ def _export(desk: Desk, request: Request, _body: Any) -> Any:
     if kind == "png":
         from .shown import png
 
-        return Response(png(desk.screen.pixels()), media_type="image/png", headers=name)
+        return Response(png(viewing.shown_pixels(desk.screen)), media_type="image/png", headers=name)
     if kind == "csv" and desk.screen.seen is None:
         raise ProjectError("the ghosts are still being measured; try again in a moment")
     from ..io.project_file import project_text
@@ -402,6 +404,8 @@ def serve(desk: Desk, host: str, port: int, token: str | None, ready: Callable[[
                 f"the editor cannot listen on {host}:{port} ({(error.strerror or str(error)).lower()}); choose another "
                 "--port, or 0 for any that is free"
             ) from None
+        # whoever comes now waits until the server is up
+        place.listen(128)
         desk.screen.start()
         config = uvicorn.Config(make_app(desk, token), log_level="warning", lifespan="off", ws="websockets-sansio")
         ready(place.getsockname()[1])

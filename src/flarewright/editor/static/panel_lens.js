@@ -8,16 +8,17 @@ const COLUMNS = [
   ['glass', 'Glass', 'What fills the gap behind the surface: a catalogue name, or empty for air.'],
   ['n_d', 'n_d', 'Index at 587.6 nm: how strongly the glass bends light, and how much bare glass reflects.'],
   ['v_d', 'V_d', 'Abbe number: the smaller, the more the glass spreads colours.'],
-  ['semi_diameter', 'Semi-ø', 'Half the clear diameter, mm: rims cut ghosts. In italics: estimated.'],
+  ['semi_diameter', 'Semi', 'Half the clear diameter, mm: rims cut ghosts. In italics: estimated.'],
   ['coating', 'Coating', 'none, quarter-wave:550, film:1.38:96, early-multicoat… What is coated well makes faint ghosts.'],
 ];
-const WIDTHS = ['24px', '62px', '52px', '74px', '50px', '44px', '50px', ''];
+const WIDTHS = ['23px', '60px', '50px', '64px', '46px', '38px', '44px', ''];
 
 export function lensPanel(app) {
   const body = h('tbody');
   const head = h('tr', {}, h('th', {}, '#'), ...COLUMNS.map(([, words, tip]) => h('th', { scope: 'col', tip }, words)));
   const table = h('table', { class: 'rows', style: 'table-layout:fixed' }, h('colgroup', {}, ...WIDTHS.map((width) => h('col', { style: width ? `width:${width}` : '' }))), h('thead', {}, head), body);
   const wrong = h('div', { class: 'wrong', role: 'alert' });
+  const notes = h('div', { class: 'group quietly', style: 'min-height:40px' });
   const glasses = h('datalist', { id: 'glasses' });
   const facts = h('div', { class: 'facts' });
   const source = h('p', { class: 'quietly' });
@@ -83,6 +84,7 @@ export function lensPanel(app) {
   function choose() {
     for (const line of body.children) line.classList.toggle('chosen', Number(line.dataset.line) === app.row);
     const line = app.state?.lens.rows.find((each) => each.row === app.row);
+    notes.replaceChildren(...Object.entries(line?.notes ?? {}).map(([column, words]) => h('div', {}, `${COLUMNS.find(([key]) => key === column)?.[1] ?? column}: ${words}`)));
     for (const each of [add, copy, remove, stop]) each.disabled = !line;
     if (line) { copy.disabled = remove.disabled = stop.disabled = line.stop; }
   }
@@ -101,7 +103,7 @@ export function lensPanel(app) {
   const picker = h('input', { type: 'file', accept: '.lens,.toml,.zmx', hidden: true });
   picker.addEventListener('change', async () => { if (picker.files[0]) await app.importFile(picker.files[0]); picker.value = ''; });
   return {
-    element: h('div', {}, own.element, h('div', { class: 'group' }, facts, source, h('div', { class: 'buttons' }, add, copy, remove, stop, button('Import…', () => picker.click(), { tip: 'A lens file; it can also be dropped on the page.' })), picker), table, wrong, glasses),
+    element: h('div', {}, own.element, h('div', { class: 'group' }, facts, source, h('div', { class: 'buttons' }, add, copy, remove, stop, button('Import…', () => picker.click(), { tip: 'A lens file; it can also be dropped on the page.' })), picker), table, wrong, notes, glasses),
     update(state) {
       own.update(state);
       const f = state.lens.facts;

@@ -49,7 +49,7 @@ export function slider({ label, tip, get, set, min, max, step = 0.01, digits = 2
   const to = (value) => Math.pow(Math.max(0, (value - min) / (max - min)), 1 / curve);
   const from = (part) => min + (max - min) * Math.pow(part, curve);
   const bar = h('input', { type: 'range', min: 0, max: 1, step: curve === 1 ? step / (max - min) : 0.001, 'aria-label': label });
-  const box = h('input', { class: 'number', type: 'text', inputmode: 'decimal', 'aria-label': label, name });
+  const box = h('input', { class: 'number small', type: 'text', inputmode: 'decimal', 'aria-label': label, name });
   let held = null;
   let kept = null;
   const rounded = (value) => Number((Math.round(value / step) * step).toFixed(6));

@@ -131,7 +131,9 @@ export function viewport(canvas, app) {
   function overlays(f) {
     if (self.drag?.kind !== 'light') {
       if (self.hover) { pen.globalAlpha = 0.55; pen.drawImage(self.hover, f.x, f.y, f.w, f.h); pen.globalAlpha = 1; }
-      if (self.outline) pen.drawImage(self.outline, f.x, f.y, f.w, f.h);
+      // it is the physical ghost's
+      const part = self.compare === 'wipe' ? self.wipe : self.compare === 'target' ? 0 : 1;
+      if (self.outline && part > 0) pen.drawImage(self.outline, 0, 0, self.outline.width * part, self.outline.height, f.x, f.y, f.w * part, f.h);
     }
     if (!self.annotate) return;
     const [ax, ay] = toPage(...line(-400));

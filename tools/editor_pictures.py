@@ -1,0 +1,90 @@
+"""Make the pictures of docs/editor.md: `python tools/editor_pictures.py [FOLDER]`. Needs the extra e2e and Chromium."""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+from io import BytesIO
+from pathlib import Path
+
+from PIL import Image
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "editor"))
+
+from chromium import Editor, Tab, browser
+
+ROOT = Path(__file__).parents[1]
+
+
+def shoot(tab: Tab, path: Path) -> None:
+    """Save the page as a small JPEG."""
+    tab.page.mouse.move(5, 715)
+    tab.page.wait_for_timeout(350)
+    image = Image.open(BytesIO(tab.page.screenshot())).convert("RGB")
+    image.save(path, quality=78, subsampling=0, optimize=True)
+    print(f"{path} {path.stat().st_size // 1024} KB")
+
+
+def panels(tab: Tab, folder: Path) -> None:
+    """Visit every panel once, as a person would who tries the program."""
+    shoot(tab, folder / "editor-light.jpg")
+    tab.page.mouse.click(*tab.at(0.62, 0.6))
+    tab.until("flarewright.ghost && flarewright.view.outline")
+    tab.tab("ghosts")
+    tab.rest()
+    shoot(tab, folder / "editor-ghosts.jpg")
+    tab.tab("lens")
+    box = tab.page.locator("input[data-row='3'][data-column='thickness']")
+    box.fill("0.4")
+    box.press("Enter")
+    tab.rest()
+    shoot(tab, folder / "editor-lens.jpg")
+    tab.page.click("#undo")
+    tab.tab("iris")
+    tab.rest()
+    shoot(tab, folder / "editor-iris.jpg")
+    tab.tab("coating")
+    tab.js("flarewright.choose('8-6')")
+    tab.until("document.querySelector('.map img').naturalWidth > 0 && document.querySelector('.plot svg')")
+    tab.rest()
+    shoot(tab, folder / "editor-coating.jpg")
+    tab.tab("target")
+    tab.until("flarewright.view.places.length > 0")
+    tab.js("flarewright.deed('set_wish', {ghost: '8-6', values: {move_mm: 3.5, height: 0.6}})")
+    tab.rest()
+    tab.page.click("[data-compare=wipe]")
+    tab.until("flarewright.view.target")
+    tab.page.fill("input[name=seconds]", "6")
+    tab.page.press("input[name=seconds]", "Enter")
+    tab.page.click("#solve")
+    tab.until("flarewright.state.solve.running")
+    tab.until("!flarewright.state.solve.running")
+    tab.until("[...document.querySelectorAll('.candidates img')].every(i => i.naturalWidth > 0)")
+    shoot(tab, folder / "editor-target.jpg")
+    tab.tab("library")
+    # every flare is drawn once
+    page = tab.page.locator("#page")
+    for k in range(6):
+        page.evaluate(f"(p) => p.scrollTop = {k * 400}")
+        tab.page.wait_for_timeout(700)
+    tab.until("[...document.querySelectorAll('.library img')].every(i => i.naturalWidth > 0)")
+    page.evaluate("(p) => p.scrollTop = 0")
+    shoot(tab, folder / "editor-library.jpg")
+    tab.page.locator("#view").focus()
+    tab.page.keyboard.press("?")
+    shoot(tab, folder / "editor-keys.jpg")
+
+
+def main() -> None:
+    """Start an editor of its own, and leave nothing behind but the pictures."""
+    folder = Path(sys.argv[1]) if len(sys.argv) > 1 else ROOT / "docs" / "images"
+    with tempfile.TemporaryDirectory() as state, browser() as chrome:
+        editor = Editor(state)
+        try:
+            panels(Tab(chrome.new_page(viewport={"width": 1280, "height": 720}), editor), folder)
+        finally:
+            editor.end()
+
+
+if __name__ == "__main__":
+    main()
