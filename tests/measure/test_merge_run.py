@@ -4,9 +4,9 @@ from dataclasses import replace as changed
 
 import numpy as np
 import pytest
+from measured_run import SETUP, Measured
 from star_run import ANGLES, CAMERA, light_px, shoot, shoot_raw, star
 
-from conftest import SETUP, Measured
 from flarewright.errors import FlarewrightError
 from flarewright.io.captures import read_captures
 from flarewright.io.merged import read_frame, read_run

@@ -22,7 +22,7 @@ _AXIS, _LIGHT, _GUESSED, _PATH = (90, 220, 255), (255, 90, 60), (160, 120, 255),
 
 
 def write_overview(folder: Path, run: MergedRun) -> None:
-    """Draw `merged.png`: the brightest of all frames on a logarithmic scale, the axis, the light's places and path.
+    """Write `overview_picture` as `merged.png`.
 
     Parameters
     ----------
@@ -34,6 +34,29 @@ def write_overview(folder: Path, run: MergedRun) -> None:
     ------
     FlarewrightError
         When a frame cannot be read or the picture not be written.
+    """
+    about = {"Description": "logarithmic, four decades; red: light, blue: optical axis, green: mirror lines"}
+    write_png(folder / OVERVIEW, overview_picture(folder, run), about)
+
+
+def overview_picture(folder: Path, run: MergedRun) -> NDArray[np.uint8]:
+    """Draw the brightest of all frames on a logarithmic scale, the axis, the light's places and mirror lines.
+
+    Parameters
+    ----------
+    folder : Path
+        Of the run.
+    run : MergedRun
+
+    Returns
+    -------
+    ndarray, shape (height, width, 3), uint8
+        Reduced to at most 960 pixels across.
+
+    Raises
+    ------
+    FlarewrightError
+        When a frame cannot be read.
 
     Notes
     -----
@@ -54,7 +77,7 @@ def write_overview(folder: Path, run: MergedRun) -> None:
     for k, unit in enumerate(((1.0, 0.0), (0.0, 1.0))):
         arm = np.linspace(-1.0, 1.0, 200) * max(6.0, 3.0 * run.axis_error_px[k] / block)
         _dots(shown, axis[0] + arm * unit[0], axis[1] + arm * unit[1], _AXIS)
-    write_png(folder / OVERVIEW, shown, {"Description": "logarithmic, four decades; red: light, blue: optical axis"})
+    return shown
 
 
 def _laid_over(folder: Path, run: MergedRun) -> tuple[Floats, int]:

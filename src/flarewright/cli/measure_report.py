@@ -1,0 +1,40 @@
+"""`flarewright measure report`: a page about a measurement."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .common import check_place, print_json
+
+EPILOG = "Example:\n\nflarewright measure report run"
+
+
+def report(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="A folder that `measure run` has written.")],
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", metavar="OUT.html", help="DIR/report.html when left out.")
+    ] = None,
+    model: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="A ghost model; DIR/model.json if it is there.")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+) -> None:
+    """Write a page with pictures, geometry, ghosts and replay, as one HTML file that needs nothing else."""
+    place = output or folder / "report.html"
+    from ..io.merged import read_run
+
+    run = read_run(folder)
+    check_place(place, (".html", ".htm"))
+    from ..io.ghost_model_file import read_ghost_model
+    from ..measure.report import write_report
+
+    given = model or (folder / "model.json" if (folder / "model.json").is_file() else None)
+    known = None if given is None else read_ghost_model(given)
+    write_report(folder, run, known, place)
+    if as_json:
+        print_json({"report": str(place), "ghosts": None if known is None else len(known.ghosts)})
+    else:
+        print(f"{place}: {len(run.frames)} frames" + ("" if known is None else f", {len(known.ghosts)} ghosts"))
