@@ -224,6 +224,8 @@ COMMAND_LINES = {
     "depth that is not there": ([*H, *GOOD, "--depth", "no.exr"], "--depth no.exr does not exist"),
     "holdout and depth": (
         [*H, *GOOD, "--holdout", "no.png", "--depth", "no.exr"], "--holdout and --depth both say what hides"),
+    "rays from the moon": (
+        [*H, *GOOD, *REF, "--rays-from", "moon"], "--rays-from should be 'auto', 'light' or 'camera'"),
     "sun nowhere": ([*H, "--light", "sun", "-o", "a.exr"], "--light sun@10,5"),
     "rectangle of words": ([*H, *GOOD, "--light-size", "big"], "--light-size 'big' is not two numbers"),
     "rectangle below zero": ([*H, *GOOD, "--light-size", "-1x2"], "--light-size"),

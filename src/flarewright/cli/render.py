@@ -266,6 +266,10 @@ def render(
         str | None,
         typer.Option(help="Of blocks (16x16 pixels) or of the total of all ghosts.", rich_help_panel=_REFERENCE),
     ] = None,
+    rays_from: Annotated[
+        str | None,
+        typer.Option(help="Of area lights: auto, light or camera.", rich_help_panel=_REFERENCE),
+    ] = None,
     samples: Annotated[
         int | None, typer.Option(help="Trace no more points of the front than this.", rich_help_panel=_REFERENCE)
     ] = None,
@@ -330,7 +334,8 @@ def render(
         wavelengths=wavelengths, paths=paths, layers=layers, brightest=brightest, no_starburst=no_starburst,
         colorspace=colorspace, half=half, mute=mute or [], solo=solo or [], gain=gain or [], physical=physical,
         orders=orders, order4_limit=order4_limit,
-        seed=seed, error=error, error_of=error_of, samples=samples, resumed=None if state is None else state.project,
+        seed=seed, error=error, error_of=error_of, samples=samples, rays_from=rays_from,
+        resumed=None if state is None else state.project,
         ringing=ringing, scatter=scatter, surface_roughness=surface_roughness, cleanliness=cleanliness,
         holdout=holdout, depth=depth,
         zoom=zoom, filter_plate=filter_plate, imperfection=imperfection, ghost_offset=ghost_offset,

@@ -56,6 +56,7 @@ _FLAG_OF = {
     "quality.reference_error": "--error",
     "quality.reference_error_of": "--error-of",
     "quality.reference_samples": "--samples",
+    "quality.reference_from": "--rays-from",
     "output.layers": "--layers",
     "output.brightest": "--brightest",
     "output.colorspace": "--colorspace",
@@ -124,6 +125,7 @@ class Flags:
     error: float | None = None
     error_of: str | None = None
     samples: int | None = None
+    rays_from: str | None = None
     resumed: Project | None = None
 
 
@@ -226,6 +228,7 @@ def _sections(flags: Flags) -> dict[str, dict[str, Any]]:
             "reference_error": flags.error,
             "reference_error_of": flags.error_of,
             "reference_samples": flags.samples,
+            "reference_from": flags.rays_from,
         },
         "dirt": {
             "dust_per_mm2": flags.dust,

@@ -54,6 +54,7 @@ ABOUT = {
     "quality.seed": "begins the random numbers",
     "quality.reference_error": "where reference quality ends: relative standard error of the ghosts",
     "quality.reference_error_of": '"total": of their flux in the picture, "blocks": of blocks of 16 x 16 pixels',
+    "quality.reference_from": 'where rays of area lights begin: "light", "camera", or "auto"',
     "quality.reference_samples": "10000000   # left out: as many points of the front as the error needs",
     "output.layers": '"beauty", "passes" or "ghosts" (one layer a ghost)',
     "output.brightest": "20   # of the single ghosts only so many",

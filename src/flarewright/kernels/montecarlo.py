@@ -12,6 +12,7 @@ from .clip import blade_value
 from .intersect import intersect_conic
 from .mask import mask_value
 from .philox import refill
+from .radiance import radiance_from
 from .shapes import cross_shape
 from .stray import scatter_once
 
@@ -139,7 +140,7 @@ def trace_batch(
     cell_x, cell_y = (box[1] - box[0]) / side, (box[3] - box[2]) / side
     stream, pool = np.empty(6, dtype=np.uint64), np.empty(4)
     stack = np.empty((STACK, 11))
-    start = np.empty(5)
+    start = np.empty(6)
     stream[4], stream[5] = key[0], key[1]
     noted = 0
     for point in range(points):
@@ -152,10 +153,11 @@ def trace_batch(
         # a near light's rays spread, and fall off (`kernels.bend.ray_from_near`)
         dx, dy, dz = direction[0] + direction[3] * x, direction[1] + direction[3] * y, direction[2]
         inverse = 1.0 / np.sqrt(dx * dx + dy * dy + dz * dz) if direction[3] > 0.0 else 1.0
-        start[0], start[1], start[2], start[3], start[4] = x, y, inverse * dx, inverse * dy, inverse * dz
+        start[0], start[1], start[2] = x, y, 0.0
+        start[3], start[4], start[5] = inverse * dx, inverse * dy, inverse * dz
         amount = unit * inverse * inverse * inverse
         first = rows[1]
-        front = _cross(curvature, conic, first, z_vertex[first], x, y, 0.0, start[2], start[3], start[4], 1.0, 1.0)
+        front = _cross(curvature, conic, first, z_vertex[first], x, y, 0.0, start[3], start[4], start[5], 1.0, 1.0)
         if not front[12] or front[9] * inv_semi[first] * inv_semi[first] > 1.0:
             continue
         chance = pool[2]
@@ -166,36 +168,49 @@ def trace_batch(
                 s += 1
             stream[0], stream[1] = np.uint64(0), np.uint64(point * heroes + hero)
             stream[2], stream[3] = np.uint64(batch), np.uint64(2 * light + 1)
-            noted = _trace_tree(
-                curvature, conic, z_vertex, inv_semi, n_gap[s], reflectance[s], sensor_z, rows[0], start,
+            tallies[ENTERED] += amount * luminances[s]
+            noted = trace_tree(
+                curvature, conic, z_vertex, inv_semi, n_gap[s], reflectance[s], sensor_z, rows[0], start, 1,
                 amount, luminances[s], rgbs[s], boosts, stream, pool, stack, blades, mask, half, to_pixels, size,
-                planes, tallies, paths, fours, noted, scatter, s,
+                planes, tallies, paths, fours, noted, scatter, s, None,
             )  # fmt: skip
     return noted
 
 
 @inner
-def _trace_tree(
-    curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, stop_row, start,
+def trace_tree(
+    curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, stop_row, start, forward,
     unit, luminance, rgb, boosts, stream, pool, stack, blades, mask, half, to_pixels, size, planes, tallies, paths,
-    fours, noted, scatter, sample,
+    fours, noted, scatter, sample, lit,
 ):  # fmt: skip
-    """Follow one ray and everything that splits off it; return the number of rays of four reflections so far."""
+    """Follow one ray and everything that splits off it; return the number of rays of four reflections so far.
+
+    `start` is its place and direction; `forward` 1 begins in front of row 0, -1 behind the last. `lit` None puts what
+    reaches the sensor into the picture, else `kernels.camera_rays` asks it what light comes in by the front.
+    """
     count = curvature.shape[0]
     samples = reflectance.shape[1]
     bright = unit * luminance
-    tallies[ENTERED] += bright
     drawn = 4
-    x, y, z, dx, dy, dz = start[0], start[1], 0.0, start[2], start[3], start[4]
+    x, y, z, dx, dy, dz = start[0], start[1], start[2], start[3], start[4], start[5]
     weight = 1.0
     # the rows of the first four reflections stand in one number
-    row, heading, order, mirrors = np.int64(0), np.int64(1), np.int64(0), np.int64(0)
+    row, heading = np.int64(0 if forward > 0 else count - 1), np.int64(forward)
+    order, mirrors = np.int64(0), np.int64(0)
     waiting = 0
     steps = 0
     while True:
         ended = False
         if row < 0:
-            tallies[RETURNED] += bright * weight
+            if lit is None:
+                tallies[RETURNED] += bright * weight
+            else:
+                radiance = radiance_from(lit, x, y, z, dx, dy, dz)
+                if radiance > 0.0:
+                    light = radiance * weight
+                    _arrive(order, mirrors, bright * light, unit * light, rgb, lit, planes, tallies, paths)
+            ended = True
+        elif row >= count and lit is not None:
             ended = True
         elif row >= count:
             t = (sensor_z - z) / dz
@@ -319,3 +334,16 @@ def _land(x, y, order, mirrors, bright, amount, rgb, to_pixels, size, planes, ta
         for channel in range(3):
             planes[min(kind, 2) - 1, channel, int(line), int(column)] += amount * rgb[channel]
     return inside
+
+
+@inner
+def _arrive(order, mirrors, bright, amount, rgb, lit, planes, tallies, paths):
+    """Put light that a ray from a pixel met into that pixel; its reflections were met in the light's reverse order."""
+    kind = min(order // 2, 3)
+    tallies[IN_PICTURE + kind] += bright
+    if order == 2:
+        count = paths.shape[1]
+        paths[0, mirrors % count, mirrors // count] += bright
+    if order > 0:
+        for channel in range(3):
+            planes[min(kind, 2) - 1, channel, np.int64(lit[1][1]), np.int64(lit[1][0])] += amount * rgb[channel]

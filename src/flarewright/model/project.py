@@ -85,6 +85,9 @@ class Quality(Frozen):
         Reference quality ends when the ghosts' relative standard error is below this.
     reference_error_of : {"total", "blocks"}
         Whose error: of the ghosts' whole flux in the picture, or of its blocks of 16 x 16 pixels.
+    reference_from : {"auto", "light", "camera"}
+        Where reference quality begins the rays of area lights: at the light, at the sensor, or where less work makes
+        less error.
     reference_samples : int or None
         Reference quality traces no more points of the front than this; None: as many as the error needs.
     """
@@ -102,6 +105,7 @@ class Quality(Frozen):
     seed: int = Field(0, ge=0, lt=2**63)
     reference_error: float = Field(0.02, gt=0.0, le=1.0)
     reference_error_of: Literal["total", "blocks"] = "blocks"
+    reference_from: Literal["auto", "light", "camera"] = "auto"
     reference_samples: int | None = Field(None, ge=1)
 
 

@@ -26,6 +26,7 @@ __all__ = [
     "mapped",
     "points",
     "rim",
+    "solid_angle",
 ]
 
 
@@ -101,6 +102,29 @@ def rim(border: Floats) -> float:
     """Return the length of all edges, each times its weight."""
     along = border[:, END] - border[:, START]
     return float(np.hypot(along[:, 0], along[:, 1]) @ np.abs(border[:, WEIGHT]))
+
+
+def solid_angle(border: Floats) -> float:
+    """Add up brightness over the solid angle of a shape in the sky.
+
+    Parameters
+    ----------
+    border : ndarray, shape (N, 5)
+        Slopes (tan X, tan Y) from the axis.
+
+    Returns
+    -------
+    float
+        Steradians of a plain polygon.
+
+    Notes
+    -----
+    Each edge and the axis make a triangle; its solid angle after A. van Oosterom and J. Strackee, IEEE Trans. Biomed.
+    Eng. 30, 125 (1983), with one corner at (0, 0, 1).
+    """
+    a, b = (np.sqrt(1.0 + (border[:, end] ** 2).sum(axis=1)) for end in (START, END))
+    across = 1.0 + (border[:, START] * border[:, END]).sum(axis=1)
+    return float(2.0 * np.arctan2(_cross(border), a * b + a + b + across) @ border[:, WEIGHT])
 
 
 def brightness(border: Floats, places: Floats) -> Floats:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ..errors import ProjectError
 from ..model import Light
 from ..model.light import Rectangle
-from .border import centroid, closed, content
+from .border import centroid, closed, content, solid_angle
 
 Floats = NDArray[np.float64]
 
@@ -127,7 +127,7 @@ def parts(light: Light, step_deg: float) -> tuple[Part, ...]:
 
     Notes
     -----
-    The light's radiance is even, so a part's share goes by its solid angle: the area of its slopes times cos^3.
+    The light's radiance is even, so a part's share goes by its solid angle.
     """
     corners = outline(light)
     if corners is None:
@@ -144,12 +144,12 @@ def parts(light: Light, step_deg: float) -> tuple[Part, ...]:
                 cell = _cut(cell, axis, edges[axis][k + 1], -1.0)
             area = content(closed(cell)) if len(cell) > 2 else 0.0
             if area > 1e-9 * abs(content(closed(corners))):
-                found.append((cell, area, centroid(closed(cell))))
-    weights = np.array([area / (1.0 + middle @ middle) ** 1.5 for _, area, middle in found])
+                found.append((cell, centroid(closed(cell))))
+    weights = np.array([solid_angle(closed(cell)) for cell, _ in found])
     weights /= weights.sum()
     return tuple(
         Part((degrees(atan(middle[0])), degrees(atan(middle[1]))), float(share), cell - middle)
-        for (cell, _, middle), share in zip(found, weights, strict=True)
+        for (cell, middle), share in zip(found, weights, strict=True)
     )
 
 

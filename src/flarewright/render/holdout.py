@@ -13,7 +13,7 @@ from ..errors import ProjectError
 from ..io.plate_image import read_depth, read_matte
 from ..model import Lens, Light, Project
 from ..model.holdout import Holdout
-from ..optics.border import backward, centroid, content, mapped
+from ..optics.border import backward, centroid, content, mapped, solid_angle
 from ..optics.holdout import behind, hidden_at
 from ..optics.paths import direct_path
 from .shot import Shot, moved
@@ -148,6 +148,6 @@ def _cut(shot: Shot, matrix: Floats, place: Floats, hidden: NDArray[np.float32])
     here, offset = np.tan(np.radians(shot.light.field_deg)), centroid(left)
     there = here + offset
     # even radiance, so light goes by solid angle
-    turned = ((1.0 + here @ here) / (1.0 + there @ there)) ** 1.5
-    found = _dimmed(moved(shot, there), content(left) / content(shot.border) * float(turned))
+    before, after = (solid_angle(mapped(border, np.eye(2), here)) for border in (shot.border, left))
+    found = _dimmed(moved(shot, there), after / before)
     return replace(found, border=mapped(left, np.eye(2), -offset))

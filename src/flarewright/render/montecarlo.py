@@ -14,10 +14,11 @@ from numpy.typing import NDArray
 
 from ..kernels.montecarlo import BESIDE, ENTERED, IN_PICTURE, TALLIES, trace_batch
 from ..kernels.stray import STRAYS
-from ..optics.border import brightness, content, points
+from ..optics.border import brightness, content, mapped, points, solid_angle
 from ..optics.bundle import front_box
 from ..optics.color import luminance_weights
 from ..optics.scatter import ScatterTables
+from .camera_rays import CameraSource, run_camera
 from .shot import Shot, moved
 
 Floats = NDArray[np.float64]
@@ -49,6 +50,7 @@ class RaySource:
     seed, side, light : int
     followed : tuple of float
     scatter : ScatterTables or None
+    drawn : bool
         As given to `ray_source`.
     """
 
@@ -60,6 +62,7 @@ class RaySource:
     light: int
     followed: tuple[float, float]
     scatter: ScatterTables | None = None
+    drawn: bool = True
 
 
 def ray_source(
@@ -70,6 +73,7 @@ def ray_source(
     light: int,
     followed: tuple[float, float] = (FOLLOWED, FOLLOWED),
     scatter: ScatterTables | None = None,
+    drawn: bool = True,
 ) -> RaySource:
     """Prepare a light for random rays.
 
@@ -85,6 +89,10 @@ def ray_source(
     followed : tuple of float
         Reflections to follow, on average, while a ray crosses the lens once: of rays of two or three reflections, and
         of those of more.
+    scatter : ScatterTables, optional
+        What surfaces scatter of the direct light; None: nothing.
+    drawn : bool
+        Whether the picture takes its ghosts; they may be met from the camera instead.
 
     Returns
     -------
@@ -95,26 +103,48 @@ def ray_source(
     if packed.symmetric:
         box[0] = -box[1]
     direction = np.array([np.sin(tilt) * axes[1, 0], np.sin(tilt) * axes[1, 1], np.cos(tilt), packed.nearness])
-    rgb = shot.weights(packed.wavelengths_nm)
-    # a sample is drawn as often as it colours the picture
-    chance = np.abs(rgb).sum(axis=1)
-    chance /= chance.sum()
-    over = np.divide(1.0, chance, out=np.zeros_like(chance), where=chance > 0.0)[:, None] * shot.gain
     # rays run in the lens' own frame here, whatever the light
     form = packed.conic if packed.shapes is None else packed.shapes
-    middle = len(rgb) // 2
-    # R of the whole lens at normal incidence decides how many reflections of high order are worth following
-    total = float(packed.reflectance[middle, :, -1].sum())
     before = (
         packed.curvature, form, packed.z_vertex, packed.inv_semi, packed.n_gap, packed.reflectance,
         packed.sensor_z, (int(np.flatnonzero(packed.inv_semi == 0.0)[0]), packed.first_surface), direction, axes, box,
-        side, np.cumsum(chance), (over * rgb) @ luminance_weights(shot.colorspace), over * rgb,
-        min(HEROES, len(rgb)), np.array(followed) / max(total, 1e-9),
-        np.array([seed & 0xFFFFFFFF, seed >> 32], dtype=np.uint64),
+        side, *spectrum_of(shot, shot.gain, seed, followed),
     )  # fmt: skip
     opening = shot.opening
     behind = (light, opening.blades, opening.mask, opening.half, shot.to_pixels, shot.size_px)
-    return RaySource(shot, before, behind, seed, side, light, followed, scatter)
+    return RaySource(shot, before, behind, seed, side, light, followed, scatter, drawn)
+
+
+def spectrum_of(
+    shot: Shot, gain: float, seed: int, followed: tuple[float, float] = (FOLLOWED, FOLLOWED)
+) -> tuple[Any, ...]:
+    """Return what random rays take of wavelengths and chance, from `cumulative` to `key` of `trace_batch`.
+
+    Parameters
+    ----------
+    shot : Shot
+    gain : float
+        Of a light of irradiance or radiance 1.
+    seed : int
+    followed : tuple of float
+        As in `ray_source`.
+
+    Returns
+    -------
+    tuple
+    """
+    packed, rgb = shot.packed, shot.weights(shot.packed.wavelengths_nm)
+    # a sample is drawn as often as it colours the picture
+    chance = np.abs(rgb).sum(axis=1)
+    chance /= chance.sum()
+    over = np.divide(1.0, chance, out=np.zeros_like(chance), where=chance > 0.0)[:, None] * gain
+    # R of the whole lens at normal incidence decides how many reflections of high order are worth following
+    total = float(packed.reflectance[len(rgb) // 2, :, -1].sum())
+    return (
+        np.cumsum(chance), (over * rgb) @ luminance_weights(shot.colorspace), over * rgb,
+        min(HEROES, len(rgb)), np.array(followed) / max(total, 1e-9),
+        np.array([seed & 0xFFFFFFFF, seed >> 32], dtype=np.uint64),
+    )  # fmt: skip
 
 
 def _aimed(source: RaySource, batch: int) -> Iterator[RaySource]:
@@ -129,15 +159,22 @@ def _aimed(source: RaySource, batch: int) -> Iterator[RaySource]:
     rng = np.random.default_rng([source.seed, batch, source.light])
     here = np.tan(np.radians(shot.light.field_deg))
     aims = AIMS if source.side % AIMS == 0 else 1
+    mean = content(shot.border) / solid_angle(mapped(shot.border, np.eye(2), here))
     for k, offset in enumerate(_points_within(shot.border, aims * aims, rng)):
         # even radiance: by solid angle
-        share = ((1.0 + here @ here) / (1.0 + (here + offset) @ (here + offset))) ** 1.5 / aims**2
+        share = mean / (1.0 + (here + offset) @ (here + offset)) ** 1.5 / aims**2
         there = moved(shot, here + offset)
         there = replace(there, light=there.light.replace(intensity=shot.light.intensity * share))
         # numbers of points stay apart from those of parts
         number = (source.light + 1) * 4096 + k
         yield ray_source(
-            there, source.seed, side=source.side // aims, light=number, followed=source.followed, scatter=source.scatter
+            there,
+            source.seed,
+            side=source.side // aims,
+            light=number,
+            followed=source.followed,
+            scatter=source.scatter,
+            drawn=source.drawn,
         )
 
 
@@ -152,7 +189,14 @@ def _points_within(border: Floats, count: int, rng: np.random.Generator) -> Floa
     return found[:count]
 
 
-def run_batch(sources: Sequence[RaySource], batch: int, *, picture: bool, fours: int = 0) -> Batch:
+def run_batch(
+    sources: Sequence[RaySource],
+    batch: int,
+    *,
+    picture: bool,
+    fours: int = 0,
+    cameras: Sequence[CameraSource] = (),
+) -> Batch:
     """Trace one batch of every light.
 
     Parameters
@@ -164,11 +208,14 @@ def run_batch(sources: Sequence[RaySource], batch: int, *, picture: bool, fours:
         Whether pixels are wanted, or numbers only.
     fours : int
         For how many rays of four reflections of a light there is room to begin with; 0: they are not asked for.
+    cameras : sequence of CameraSource
+        Of lights whose ghosts are met from the camera, and not `drawn` from the light.
 
     Returns
     -------
     dict of str to ndarray
-        "figures", shape (15,): luminous flux by what became of it (`kernels.montecarlo`), then BALANCE and GHOSTS;
+        "figures", shape (15,): luminous flux by what became of it (`kernels.montecarlo`), all from the lights, then
+        BALANCE, and GHOSTS as the picture has them;
         where surfaces scatter 3 more, STRAY. "paths", shape (2, K, K): of two reflections, in the picture and beside
         it. With a picture also "planes", shape (2, 3, H, W), float32: flux per pixel after two reflections and after
         more, and third what was scattered; "blocks", shape (2, A, B): luminous flux in blocks of 16 x 16 pixels, after
@@ -181,20 +228,25 @@ def run_batch(sources: Sequence[RaySource], batch: int, *, picture: bool, fours:
     figures, paths = np.zeros(TALLIES + 2), np.zeros((2, rows, rows))
     strays, plane = np.zeros(STRAYS), np.zeros(planes.shape[1:], dtype=np.float32)
     notes = []
+    nowhere, ghosts = np.zeros((2, 3, 0, 0), dtype=np.float32), 0.0
     for source in (aimed for each in sources for aimed in _aimed(each, batch)):
-        room = np.empty((fours, 2))
+        room, ghosts_before = np.empty((fours, 2)), figures[IN_PICTURE + 1 : BESIDE].sum()
         table = source.scatter
         scatter = None if table is None else (table.tables, table.amounts, strays, plane)
-        noted = trace_batch(*source.before, batch, *source.behind, planes, figures[:TALLIES], paths, room, scatter)
+        own = planes if source.drawn else nowhere
+        noted = trace_batch(*source.before, batch, *source.behind, own, figures[:TALLIES], paths, room, scatter)
+        ghosts += (figures[IN_PICTURE + 1 : BESIDE].sum() - ghosts_before) * source.drawn
         if 0 < fours < noted:
             # the same rays once more, for their notes only
-            room, nowhere = np.empty((noted, 2)), np.zeros((2, 3, 0, 0), dtype=np.float32)
+            room = np.empty((noted, 2))
             aside = np.zeros(TALLIES), np.zeros_like(paths)
             elsewhere = None if table is None else (table.tables, table.amounts, np.zeros(STRAYS), nowhere[0])
             trace_batch(*source.before, batch, *source.behind, nowhere, *aside, room, elsewhere)
         notes.append(room[:noted])
+    for camera in cameras:
+        ghosts += run_camera(camera, batch, planes, np.zeros_like(paths))[1:].sum()
     figures[BALANCE] = figures[ENTERED + 1 : TALLIES].sum() + strays.sum() - figures[ENTERED]
-    figures[GHOSTS] = figures[IN_PICTURE + 1 : BESIDE].sum()
+    figures[GHOSTS] = ghosts
     scatters = sources[0].scatter is not None
     result: Batch = {"figures": np.concatenate([figures, strays]) if scatters else figures, "paths": paths}
     if fours:

@@ -15,7 +15,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
 from dataclasses import dataclass, replace
-from math import ceil, inf, sqrt
+from math import ceil, inf
 from pathlib import Path
 from typing import Any
 
@@ -27,8 +27,9 @@ from ..io.reference_state import write_state
 from ..model import Layer, Quality
 from ..model.reference_state import ReferenceState
 from .ledger import Ledger, ledger_of
-from .montecarlo import GHOSTS, HEROES, Sums, batches_in_order, ray_source, run_batch
+from .montecarlo import GHOSTS, HEROES, Sums, batches_in_order, run_batch
 from .prepare import Settled
+from .reference_rays import ReferenceRays, reference_rays, relative_spread
 from .scatter import chosen_scatter, scatter_of
 from .shot import Shot, make_opening, make_shots
 
@@ -41,6 +42,8 @@ SIDE = 128
 FEWEST = 16
 # a spectrum is sampled at so many wavelengths, 5 nm apart, whatever final quality traces
 SPECTRAL_SAMPLES = 62
+# parts of area lights
+WIDEST_PART_DEG = 60.0
 # batches in work at once take no more memory than this, bytes
 MOST_MEMORY = 1.5e9
 # a state is written when this much time has gone by, and never so often that writing takes a tenth of the time
@@ -110,6 +113,9 @@ def spectral_shots(settled: Settled, mask: Floats | None) -> tuple[Shot, ...]:
     quality = project.quality
     if quality.bridge:
         quality = quality.replace(wavelengths=max(quality.wavelengths, SPECTRAL_SAMPLES))
+    if all(holdout is None for holdout in (project.holdout, *(light.holdout for light in project.lights))):
+        # random directions need no parts; only what is hidden is told part by part
+        quality = quality.replace(source_step_deg=WIDEST_PART_DEG)
     fine = replace(settled, project=project.replace(quality=quality))
     return make_shots(fine, make_opening(fine, mask))
 
@@ -151,12 +157,9 @@ def render_reference(
             "none; choose a sensor_reflectance below 1"
         )
     shots = spectral_shots(settled, mask)
-    prints = _fingerprints(settled, shots)
     tables = scatter_of(settled, shots)
-    sources = [
-        ray_source(shot, quality.seed, side=SIDE, light=k, scatter=None if tables is None else tables[k])
-        for k, shot in enumerate(shots)
-    ]
+    rays = reference_rays(shots, quality, SIDE, tables)
+    prints = _fingerprints(settled, shots, rays)
     sums = _start(run.resume, prints)
     begin, saved, saving_s = time.monotonic(), time.monotonic(), 0.0
 
@@ -166,7 +169,9 @@ def render_reference(
             write_state(run.state_file, ReferenceState(project, prints, sums.batches, sums.sums, sums.squares))
 
     results = batches_in_order(
-        lambda batch: run_batch(sources, batch, picture=True), sums.batches, _at_once(shots[0], threads)
+        lambda batch: run_batch(rays.sources, batch, picture=True, cameras=rays.cameras),
+        sums.batches,
+        _at_once(shots[0], threads),
     )
     # sums are added in a thread of their own, where Ctrl-C cannot leave them half-added
     with ThreadPoolExecutor(1) as adder:
@@ -183,7 +188,8 @@ def render_reference(
         finally:
             adder.shutdown(wait=True)
             save()
-    return _finish(sums, shots, quality, reason, 1.0 - settled.project.camera.sensor_reflectance)
+    kept = 1.0 - settled.project.camera.sensor_reflectance
+    return _finish(sums, shots, quality, reason, kept, rays.from_camera)
 
 
 def _at_once(shot: Shot, threads: int | None) -> int:
@@ -204,7 +210,7 @@ def _start(state: ReferenceState | None, prints: dict[str, str]) -> Sums:
     return Sums(state.batches, state.sums, state.squares)
 
 
-def _fingerprints(settled: Settled, shots: Sequence[Shot]) -> dict[str, str]:
+def _fingerprints(settled: Settled, shots: Sequence[Shot], rays: ReferenceRays) -> dict[str, str]:
     """Digest each part of what decides the samples."""
     project, quality = settled.project, settled.project.quality
     packed, opening = shots[0].packed, shots[0].opening
@@ -222,6 +228,7 @@ def _fingerprints(settled: Settled, shots: Sequence[Shot]) -> dict[str, str]:
         "scatter": None if scatter is None else scatter.model_dump(mode="json"),
         "spectral sampling": [quality.wavelengths, quality.bridge, SPECTRAL_SAMPLES, HEROES],
         "seed": [quality.seed, SIDE],
+        "choice of lights met from the camera": rays.from_camera,
     }
     return {name: hashlib.sha256(json.dumps(value).encode()).hexdigest() for name, value in parts.items()}
 
@@ -246,11 +253,8 @@ def relative_error(sums: Sums, of: str) -> float:
     """
     if sums.batches < FEWEST:
         return inf
-    if of == "total":
-        mean, error = float(sums.mean("figures")[GHOSTS]), sqrt(float(sums.variance("figures")[GHOSTS]))
-    else:
-        mean, error = float(sums.mean("blocks")[1].sum()), float(np.sqrt(sums.variance("blocks")[1]).sum())
-    return error / mean if mean > 0.0 else 0.0
+    spread = relative_spread(sums, of)
+    return spread if spread < inf else 0.0
 
 
 def _most_batches(quality: Quality) -> float:
@@ -282,7 +286,9 @@ def _estimate(sums: Sums, quality: Quality, run: ReferenceRun, begin: float) -> 
     return min(1.0, max(parts)), f"{told}, {sums.batches * SIDE**2 / 1e6:.2f} million points"
 
 
-def _finish(sums: Sums, shots: Sequence[Shot], quality: Quality, reason: str, kept: float) -> ReferencePass:
+def _finish(
+    sums: Sums, shots: Sequence[Shot], quality: Quality, reason: str, kept: float, from_camera: Sequence[int]
+) -> ReferencePass:
     shot = shots[0]
     # a ray ends in the sensor with what the sensor keeps of it; the picture is what falls on the sensor
     area = kept / float(shot.to_pixels[2] * shot.to_pixels[3])
@@ -298,6 +304,7 @@ def _finish(sums: Sums, shots: Sequence[Shot], quality: Quality, reason: str, ke
         "wavelengths_nm": [float(w) for w in shot.packed.wavelengths_nm],
         "seed": quality.seed,
         "stopped_by": reason,
+        "lights_from_camera": list(from_camera),
         "ghost_flux_mm2": flux,
         "relative_standard_error": errors["total"],
         "relative_standard_error_of_blocks": errors["blocks"],
@@ -313,6 +320,9 @@ def _finish(sums: Sums, shots: Sequence[Shot], quality: Quality, reason: str, ke
     if reason != "error" and errors[quality.reference_error_of] > quality.reference_error:
         limit = "the number of samples" if reason == "samples" else "the time"
         remarks.append(f"{limit} ended the render before the wanted error of {quality.reference_error:.2%}")
+    if from_camera:
+        told = ", ".join(str(number) for number in from_camera)
+        remarks.append(f"the ghosts of area lights were met from the sensor: lights {told}, counted from 0")
     if flux == 0.0:
         remarks.append("no ray met a ghost in the picture")
     return ReferencePass(
