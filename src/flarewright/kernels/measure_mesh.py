@@ -13,9 +13,9 @@ from .measure_edges import add_edge, add_edge_changes
 from .measure_pupil import DISC_NUMBERS, FIRST_DISC, FIRST_G, FIRST_I, TERMS, border, monomials, place, rims, slopes
 
 # pixels by which a chord may leave its arc, up to so many spokes
-_CHORD = 0.12
-_LEAST_SPOKES, _MOST_SPOKES = 16, 160
-_LEAST_RINGS, _MOST_RINGS = 3, 14
+_CHORD = 0.05
+_LEAST_SPOKES, _MOST_SPOKES = 16, 208
+_LEAST_RINGS, _MOST_RINGS = 3, 16
 
 
 @inner
@@ -130,9 +130,10 @@ def _grain(parameters, disc_count, sigma, scale):
         x, y, _, _, _, _ = place(parameters, pupil[1, j, 0], pupil[1, j, 1], sigma)
         reach = max(reach, sqrt((x - x0) ** 2 + (y - y0) ** 2))
     reach *= scale
-    spokes = int(min(max(pi * sqrt(reach / (2.0 * _CHORD)), _LEAST_SPOKES), _MOST_SPOKES))
-    rings = int(min(max(0.16 * spokes, _LEAST_RINGS), _MOST_RINGS))
-    return 4 * ((spokes + 3) // 4), rings
+    spokes = min(max(pi * sqrt(reach / (2.0 * _CHORD)), _LEAST_SPOKES), _MOST_SPOKES)
+    # coarse steps: while a ghost is fitted its mesh had better stay the same
+    spokes = 16 * int(ceil(spokes / 16.0))
+    return spokes, int(min(max(spokes // 6, _LEAST_RINGS), _MOST_RINGS))
 
 
 @compiled
@@ -392,5 +393,8 @@ def draw_with_changes(parameters, disc_count, sigma, free, frame, left, top, pla
                 _triangle_changes(
                     parameters, sigma, free, pupil, pupil_by, spots, spots_by, i, j, i + 1, k, i, k, changes[i, j, 1]
                 )
+    # the model's irradiance is per pixel of the model, whatever the picture's scale
+    densities *= frame[4] * frame[4]
+    changes *= frame[4] * frame[4]
     _draw_mesh(spots, densities, left, top, width, height, plane)
     _draw_changes(spots, spots_by, densities, changes, left, top, width, height, out)

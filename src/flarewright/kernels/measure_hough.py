@@ -1,0 +1,126 @@
+"""Look for ghosts in all constellations at once: circles whose centre runs along the light's line with the field."""
+
+from math import cos, floor, pi, sin, sqrt
+
+import numpy as np
+
+from ._jit import compiled, inner
+
+_LEAST_SPOTS, _MOST_SPOTS = 12, 40
+
+
+@inner
+def _edge(tx, ty, cx, cy, radius, cosines, sines, every):
+    """Return the mean inward slope on a circle and the part of it that was seen."""
+    height, width = tx.shape
+    total, seen, asked = 0.0, 0, 0
+    for k in range(0, cosines.size, every):
+        asked += 1
+        x, y = int(floor(cx + radius * cosines[k])), int(floor(cy + radius * sines[k]))
+        if 0 <= x < width and 0 <= y < height:
+            value = tx[y, x] * cosines[k] + ty[y, x] * sines[k]
+            if value == value:
+                total -= value
+                seen += 1
+    if seen * 3 < asked or seen < 6:
+        return 0.0, 0.0
+    return total / seen, seen / asked
+
+
+@compiled
+def search(slopes_x, slopes_y, sigmas, frames, speeds, sizes, bends, floor_level, sign, scores, runs):
+    """Score circles by how bright their border's inside is against its outside, over the best run of views.
+
+    Parameters
+    ----------
+    slopes_x, slopes_y : ndarray, shape (V, H, W), float32
+        Gradient over noise, each at most 1 long; not a number where nothing was measured.
+    sigmas : ndarray, shape (V,)
+    frames : ndarray, shape (V, 5)
+        Axis x and y, cosine and sine of the light's direction, pixels per pixel of the model.
+    speeds : ndarray, shape (S,)
+        Place of the centre over the field, pixels of the model.
+    sizes : ndarray, shape (R,)
+        Radii, pixels of the model.
+    bends : ndarray, shape (B,)
+        Third order of the centre's place.
+    floor_level : float
+        Mean slope below which a view counts against.
+    sign : float
+        1 for bright discs; -1 for dark ones, which no ghost makes.
+    scores : ndarray, shape (S, R)
+        Filled: the best over the bends.
+    runs : ndarray, shape (S, R, 3), int64
+        Filled: first and last view of the best run, and the bend.
+    """
+    spots = _MOST_SPOTS
+    cosines, sines = np.empty(spots), np.empty(spots)
+    for k in range(spots):
+        cosines[k], sines[k] = cos(2.0 * pi * (k + 0.5) / spots), sin(2.0 * pi * (k + 0.5) / spots)
+    for s in range(speeds.size):
+        for r in range(sizes.size):
+            scores[s, r] = 0.0
+            for b in range(bends.size):
+                run, start = 0.0, 0
+                for v in range(sigmas.size):
+                    scale = frames[v, 4]
+                    away = sigmas[v] * (speeds[s] + bends[b] * sigmas[v] * sigmas[v]) * scale
+                    radius = sizes[r] * scale
+                    every = 2 if radius < 8.0 else 1
+                    slope, part = _edge(
+                        slopes_x[v], slopes_y[v], frames[v, 0] + frames[v, 2] * away,
+                        frames[v, 1] - frames[v, 3] * away, radius, cosines, sines, every,
+                    )  # fmt: skip
+                    if part > 0.0:
+                        run += (sign * slope - floor_level) * part
+                    if run <= 0.0:
+                        run, start = 0.0, v + 1
+                    elif run > scores[s, r]:
+                        scores[s, r] = run
+                        runs[s, r, 0], runs[s, r, 1], runs[s, r, 2] = start, v, b
+
+
+@inner
+def _smooth(picture, along, out):
+    """Spread a picture by the binomial kernel 1 4 6 4 1 along rows (`along`) or columns."""
+    height, width = picture.shape
+    for r in range(height):
+        for c in range(width):
+            total = 0.0
+            for k in range(-2, 3):
+                weight = 6.0 if k == 0 else (4.0 if abs(k) == 1 else 1.0)
+                if along:
+                    total += weight * picture[r, min(max(c + k, 0), width - 1)]
+                else:
+                    total += weight * picture[min(max(r + k, 0), height - 1), c]
+            out[r, c] = total / 16.0
+
+
+@compiled
+def salient_slopes(picture, variance, salient, slopes_x, slopes_y):
+    """Fill the gradient of a smoothed picture, shortened to at most 1: half at `salient` standard deviations.
+
+    Parameters
+    ----------
+    picture : ndarray, shape (H, W), float64
+    variance : ndarray, shape (H, W), float64
+        Of its pixels; infinite or not a number where nothing was measured.
+    salient : float
+    slopes_x, slopes_y : ndarray, shape (H, W), float32
+        Filled; not a number at the border and where nothing was measured.
+    """
+    height, width = picture.shape
+    once, smooth = np.empty((height, width)), np.empty((height, width))
+    _smooth(picture, True, once)
+    _smooth(once, False, smooth)
+    # the variance that the kernel leaves in the half difference of the pixels beside
+    left = (70.0 / 256.0) * 0.5 * (70.0 - 28.0) / 256.0
+    for r in range(height):
+        for c in range(width):
+            noise = variance[r, c] * left
+            if not (0 < r < height - 1 and 0 < c < width - 1 and noise < 1e300):
+                slopes_x[r, c], slopes_y[r, c] = np.nan, np.nan
+                continue
+            gx, gy = 0.5 * (smooth[r, c + 1] - smooth[r, c - 1]), 0.5 * (smooth[r + 1, c] - smooth[r - 1, c])
+            length = sqrt(gx * gx + gy * gy + salient * salient * noise)
+            slopes_x[r, c], slopes_y[r, c] = gx / length, gy / length

@@ -1,0 +1,148 @@
+"""Find ghosts without help: circles that run along the light's line, in all constellations at once.
+
+A ghost of a lens of revolution is mirrored at the line through axis and light, and at small fields its centre runs
+along that line in proportion to the field: in the picture of position over field it is a straight band that meets the
+axis at field 0. So two numbers, speed and size, describe a candidate, and every constellation votes for it with its
+border.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..kernels.measure_hough import salient_slopes, search
+from .fit import scaled
+from .numbers import Floats
+from .views import Pixels, View, halved
+
+# slopes, in standard deviations of their noise, that count half
+SALIENT = 4.0
+# a view whose border is not brighter inside by this much counts against a candidate
+LEVEL = 0.16
+_BENDS = (0.0,)
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A ghost that may be there.
+
+    Attributes
+    ----------
+    speed, radius : float
+        Pixels: place of the centre at field 1, and size.
+    first, last : int
+        Views in which its border was seen.
+    score : float
+        Sum of the views' votes.
+    """
+
+    speed: float
+    radius: float
+    first: int
+    last: int
+    score: float
+
+
+@dataclass(frozen=True)
+class Slopes:
+    """Gradients over their noise, of every view at half the resolution."""
+
+    x: Pixels
+    y: Pixels
+    sigmas: Floats
+    frames: Floats
+
+
+def slopes_of(
+    views: Sequence[View],
+    pixels: Sequence[Pixels],
+    masks: Sequence[NDArray[np.bool_]],
+    channel: int = 1,
+    pool: ThreadPoolExecutor | None = None,
+) -> Slopes:
+    """Return the gradients that candidates are looked for in.
+
+    Parameters
+    ----------
+    views : sequence of View
+    pixels : sequence of ndarray, shape (H, W)
+        One channel with glow and known ghosts taken off.
+    masks : sequence of ndarray of bool, shape (H, W)
+        Where to look.
+    channel : int
+        Whose variance counts.
+    pool : executor, optional
+    """
+
+    def one(view: View, picture: Pixels, mask: NDArray[np.bool_]) -> tuple[Pixels, Pixels]:
+        small = halved(picture, 1).astype(float)
+        variance = halved(view.variance[..., channel], 1, variance=True).astype(float)
+        variance[~(halved(mask.astype(np.float32), 1) > 0.99)] = np.inf
+        sx, sy = np.empty(small.shape, np.float32), np.empty(small.shape, np.float32)
+        salient_slopes(np.where(np.isfinite(variance), small, 0.0), variance, SALIENT, sx, sy)
+        return sx, sy
+
+    found = list((map if pool is None else pool.map)(one, views, pixels, masks))
+    frames = np.stack([scaled(view.frame, 1) for view in views])
+    return Slopes(
+        np.stack([each[0] for each in found]), np.stack([each[1] for each in found]),
+        np.array([view.sigma for view in views]), frames,
+    )  # fmt: skip
+
+
+def candidates(
+    slopes: Slopes,
+    width: int,
+    *,
+    sign: float = 1.0,
+    most: int = 8,
+    pool: ThreadPoolExecutor | None = None,
+) -> list[Candidate]:
+    """Return the best candidates, best first, none close to a better one.
+
+    Parameters
+    ----------
+    slopes : Slopes
+    width : int
+        Of the full picture, pixels.
+    sign : float
+        -1 looks for dark discs: how well those score tells what chance does.
+    most : int
+    pool : executor, optional
+    """
+    fine = 0.004 * width
+    speeds = np.concatenate([np.arange(-2.6 * width, -1.0 * width, 2.0 * fine), np.arange(-width, width, fine),
+                             np.arange(width, 2.6 * width, 2.0 * fine)])  # fmt: skip
+    sizes = np.concatenate([np.arange(0.006, 0.06, 0.0028), np.geomspace(0.06, 0.45, 40)]) * width
+    parts = np.array_split(speeds, 16)
+
+    def one(part: Floats) -> tuple[Floats, NDArray[np.int64]]:
+        scores, runs = np.zeros((part.size, sizes.size)), np.zeros((part.size, sizes.size, 3), np.int64)
+        search(
+            slopes.x, slopes.y, slopes.sigmas, slopes.frames, part, sizes, np.array(_BENDS), LEVEL, sign, scores, runs
+        )
+        return scores, runs
+
+    found = [one(part) for part in parts] if pool is None else list(pool.map(one, parts))
+    scores, runs = np.concatenate([each[0] for each in found]), np.concatenate([each[1] for each in found])
+    best: list[Candidate] = []
+    for place in np.argsort(scores, axis=None)[::-1]:
+        s, r = np.unravel_index(place, scores.shape)
+        if scores[s, r] <= 0.0 or len(best) == most:
+            break
+        speed, radius = float(speeds[s]), float(sizes[r])
+        first, last = int(runs[s, r, 0]), int(runs[s, r, 1])
+        reach = 0.3 * radius + 3.0 * fine
+        if any(
+            abs(speed - other.speed) < reach + 0.3 * other.radius and abs(radius - other.radius) < 0.5 * reach + fine
+            and not (last < other.first or first > other.last)
+            for other in best
+        ):  # fmt: skip
+            continue
+        best.append(Candidate(speed, radius, first, last, float(scores[s, r])))
+    return best

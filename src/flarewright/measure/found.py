@@ -1,0 +1,91 @@
+"""A ghost that was found, and what the views show beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..kernels.measure_pupil import FIRST_DISC, FIRST_I
+from .fit import MODEL_ERROR, Fit, Patch, Shape, cost_of, render
+from .views import Pixels, View
+
+CHANNELS = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """A ghost that was found.
+
+    Attributes
+    ----------
+    shapes : tuple of Shape
+        Red, green, blue.
+    first, last : int
+        Views in which it is there.
+    fits : tuple of Fit or None
+        Of each colour, when fitted.
+    """
+
+    shapes: tuple[Shape, Shape, Shape]
+    first: int
+    last: int
+    fits: tuple[Fit | None, Fit | None, Fit | None] = (None, None, None)
+
+
+def by_light(ghosts: Sequence[Found]) -> list[int]:
+    """Return the ghosts' places, the most light first."""
+    return sorted(range(len(ghosts)), key=lambda k: -float(ghosts[k].shapes[1].numbers[FIRST_I]))
+
+
+def rest_of(ghosts: Sequence[Found], views: Sequence[View], channel: int) -> list[Pixels]:
+    """Return what the views show of a channel beside all ghosts, shape (H, W) each."""
+    out = []
+    for k, view in enumerate(views):
+        left = view.pixels[..., channel].astype(float)
+        for ghost in ghosts:
+            if ghost.first <= k <= ghost.last:
+                left = left - render(ghost.shapes[channel], view)
+        out.append(left.astype(np.float32))
+    return out
+
+
+def alone(ghost: Found, channel: int, views: Sequence[View], rest: Sequence[Pixels], most: int) -> list[View]:
+    """Return at most so many of a ghost's views, holding it alone: the rest and its own light.
+
+    Parameters
+    ----------
+    ghost : Found
+    channel : int
+    views : sequence of View
+    rest : sequence of ndarray, shape (H, W)
+        Of the channel.
+    most : int
+    """
+    run = np.arange(ghost.first, ghost.last + 1)
+    few = run[np.unique(np.linspace(0, run.size - 1, min(run.size, most)).round().astype(int))]
+    out = []
+    for k in few:
+        own = (rest[k] + render(ghost.shapes[channel], views[k])).astype(np.float32)
+        out.append(views[k].showing(np.broadcast_to(own[..., None], views[k].pixels.shape)))
+    return out
+
+
+def exchange(old: Shape, new: Shape, ghost: Found, views: Sequence[View], rest: list[Pixels]) -> None:
+    """Put a ghost's new light in the place of the old in the rest."""
+    for k in range(ghost.first, ghost.last + 1):
+        rest[k] = (rest[k] + (render(old, views[k]) - render(new, views[k]))).astype(np.float32)
+
+
+def darkened(shape: Shape) -> Shape:
+    """Return a shape without light."""
+    numbers = shape.numbers.copy()
+    numbers[FIRST_I:FIRST_DISC] = 0.0
+    return Shape(numbers, shape.discs)
+
+
+def gain(shape: Shape, patches: Sequence[Patch], error: float = MODEL_ERROR) -> float:
+    """Return the part of the squares inside its windows that a ghost explains."""
+    before = cost_of(darkened(shape), patches, error=error)
+    return 1.0 - cost_of(shape, patches, error=error) / max(before, 1e-300)

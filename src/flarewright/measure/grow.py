@@ -1,0 +1,125 @@
+"""From a rough ghost to a full one: numbers are freed, and rims added, only as far as they pay."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..kernels.measure_pupil import DISC_NUMBERS, FIRST_DISC, FIRST_G, FIRST_I, MOST_DISCS
+from .fit import MODEL_ERROR, Fit, Patch, Shape, cost_of, free_numbers, patches_of, refine
+from .views import View
+
+# part of the cost by which a rim, or a higher order, must lower it to stay
+RIM_PAYS = 0.02
+ORDER_PAYS = 0.02
+# where the search for a rim begins: its centre over s, and how far it bites into the first rim at the largest field
+_CENTRES = (-2.4, -1.2, -0.6, 0.6, 1.2, 2.4)
+_BITES = (0.3, 0.9)
+
+
+@dataclass(frozen=True)
+class Growth:
+    """How far a ghost may grow.
+
+    Attributes
+    ----------
+    order, intensity_order, discs : int
+        At most.
+    error : float
+        Part of the light that the model may miss.
+    """
+
+    order: int = 2
+    intensity_order: int = 1
+    discs: int = 2
+    error: float = MODEL_ERROR
+
+
+def grow(
+    shape: Shape,
+    views: Sequence[View],
+    channel: int,
+    *,
+    most: Growth = Growth(),
+    pool: ThreadPoolExecutor | None = None,
+) -> Fit | None:
+    """Fit a ghost in stages.
+
+    Parameters
+    ----------
+    shape : Shape
+        Place, size and brightness, roughly.
+    views : sequence of View
+        Their pixels hold this ghost alone, as far as it is known.
+    channel : int
+    most : Growth
+    pool : executor, optional
+
+    Returns
+    -------
+    Fit or None
+        None when no view shows it.
+    """
+    width = views[0].size_px[0]
+
+    def polish(start: Shape, order: int, light: int, steps: int) -> tuple[Fit, list[Patch]] | None:
+        patches = patches_of(start, views, channel)
+        if not patches:
+            return None
+        free = free_numbers(order, start.discs, light)
+        return refine(start, patches, free, width=width, steps=steps, error=most.error, pool=pool), patches
+
+    found = polish(shape, 0, 0, 8)
+    order = 0
+    while found is not None:
+        fit, patches = found
+        grown: Fit | None = None
+        if fit.shape.discs < most.discs:
+            grown = _with_rim(fit.shape, patches, free_numbers(order, 0, min(order, 1)), width, most, pool)
+            before = cost_of(fit.shape, patches, error=most.error)
+            if grown is not None and cost_of(grown.shape, patches, error=most.error) < (1.0 - RIM_PAYS) * before:
+                found = polish(grown.shape, order, min(order, most.intensity_order), 6) or found
+                continue
+        if order >= most.order:
+            break
+        order += 1
+        higher = polish(fit.shape, order, min(order, most.intensity_order), 10)
+        if higher is None:
+            break
+        before = cost_of(fit.shape, higher[1], error=most.error)
+        if order == 2 and higher[0].cost > (1.0 - ORDER_PAYS) * before:
+            break
+        found = higher
+    return None if found is None else found[0]
+
+
+def _with_rim(
+    shape: Shape, patches: Sequence[Patch], free: np.ndarray, width: int, most: Growth, pool: ThreadPoolExecutor | None
+) -> Fit | None:
+    """Return the best fit with one more rim, tried from several places on a third of the patches."""
+    if shape.discs >= MOST_DISCS:
+        return None
+    few = patches[:: max(1, len(patches) // 8)]
+    at = FIRST_DISC + DISC_NUMBERS * shape.discs
+    largest = max(patch.sigma for patch in patches)
+    own = np.concatenate([free[free >= FIRST_I], [at, at + 2]])
+    trials = []
+    for centre in _CENTRES:
+        for bite in _BITES:
+            numbers = shape.numbers.copy()
+            numbers[at : at + 3] = centre, 0.0, 1.0 + abs(centre) * largest - bite
+            # what is seen is what the rim leaves: the whole is larger, and its middle lies towards the rim's bite
+            away = 0.5 * bite * np.sign(centre)
+            numbers[0] -= 0.5 * away * numbers[FIRST_G] / max(largest, 0.1)
+            numbers[FIRST_G] *= 1.0 + 0.25 * bite
+            trial = replace(shape, numbers=numbers, discs=shape.discs + 1)
+            trials.append(refine(trial, few, own, width=width, steps=3, error=most.error, pool=pool))
+    everything = np.concatenate([free, [at, at + 2]])
+    best = [
+        refine(trial.shape, few, everything, width=width, steps=6, error=most.error, pool=pool)
+        for trial in sorted(trials, key=lambda fit: fit.cost)[:3]
+    ]
+    return min(best, key=lambda fit: fit.cost)

@@ -1,0 +1,177 @@
+"""Find ghost after ghost: the best candidate is fitted, taken off, and the rest is looked through again."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..kernels.measure_pupil import FIRST_G, FIRST_I
+from .find import Candidate, candidates, slopes_of
+from .fit import Shape, cost_of, patches_of, presence, render
+from .found import Found, darkened
+from .grow import Growth, grow
+from .numbers import NUMBERS
+from .settle import touch_up
+from .views import Pixels, View
+
+# votes below which a candidate is chance
+SCORE = 0.9
+# part of the light's squares inside its windows that a ghost must explain
+EXPLAINS = 0.06
+# standard deviations of its brightness over all views
+SURE = 6.0
+# how bright a ghost must be in a view, by its own measure, to be there
+THERE = 0.35
+# part of the light taken off that may stay behind
+LEFT_BEHIND = 0.08
+# views that a first fit looks at
+_FEW = 16
+
+
+def beginning(candidate: Candidate, views: Sequence[View], pixels: Sequence[Pixels]) -> Shape:
+    """Return a candidate as a shape: an even disc as bright as the views say."""
+    numbers = np.zeros(NUMBERS)
+    numbers[0], numbers[FIRST_G] = candidate.speed, candidate.radius
+    numbers[FIRST_I] = candidate.radius**2
+    shape = Shape(numbers)
+    seen = []
+    for view, picture in zip(views, pixels, strict=True):
+        alone = view.showing(np.repeat(picture[..., None], 3, axis=2))
+        there = presence(shape, alone, 1, 0.0)
+        if np.isfinite(there.error):
+            seen.append(there.amplitude)
+    numbers[FIRST_I] *= max(float(np.median(seen)) if seen else 0.0, 1e-12)
+    return Shape(numbers)
+
+
+def pursue(
+    views: Sequence[View],
+    masks: Sequence[NDArray[np.bool_]],
+    *,
+    most: int = 60,
+    pool: ThreadPoolExecutor | None = None,
+    tell: Callable[[str], None] = lambda _: None,
+) -> list[Found]:
+    """Find all ghosts of a run, brightest votes first.
+
+    Parameters
+    ----------
+    views : sequence of View
+        Glow taken off.
+    masks : sequence of ndarray of bool, shape (H, W)
+        Where to look.
+    most : int
+    pool : executor, optional
+    tell : callable
+        Gets a line for each ghost.
+
+    Returns
+    -------
+    list of Found
+    """
+    # masked pixels weigh nothing, in all fits
+    shown = [
+        replace(view, variance=np.where(mask[..., None], view.variance, np.inf).astype(np.float32))
+        for view, mask in zip(views, masks, strict=True)
+    ]
+    rest = [view.pixels[..., 1].copy() for view in shown]
+    found: list[Found] = []
+    refused: list[Candidate] = []
+    while len(found) < most:
+        slopes = slopes_of(_doubted(shown, rest), rest, masks, pool=pool)
+        trials = [
+            each for each in candidates(slopes, shown[0].size_px[0], most=12 + len(refused), pool=pool)
+            if each.score > SCORE and not any(_same(each, other) for other in refused)
+        ]  # fmt: skip
+        taken = 0
+        for trial in trials[:4]:
+            if taken and trial.score < 0.6 * trials[0].score:
+                break
+            ghost = _try(trial, shown, rest, pool)
+            if ghost is None:
+                refused.append(trial)
+                continue
+            taken += 1
+            found.append(ghost)
+            rest = _take_off(ghost, shown, rest)
+            numbers = ghost.shapes[1].numbers
+            tell(
+                f"ghost {len(found)}: speed {numbers[0]:.0f} px, size {abs(numbers[FIRST_G]):.1f} px, votes "
+                f"{trial.score:.1f}, views {ghost.first}-{ghost.last}"
+            )
+        if not trials:
+            break
+        if taken:
+            found = touch_up(found, shown, rest, steps=4, pool=pool)
+    return found
+
+
+def _doubted(views: Sequence[View], rest: Sequence[Pixels]) -> list[View]:
+    """Return the views less certain where light was taken off: a part of it stays behind as edges."""
+    out = []
+    for view, picture in zip(views, rest, strict=True):
+        known = LEFT_BEHIND * np.abs(view.pixels[..., 1] - picture)
+        out.append(replace(view, variance=view.variance + (known**2)[..., None]))
+    return out
+
+
+def _same(a: Candidate, b: Candidate) -> bool:
+    near = 0.1 * (a.radius + b.radius) + 4.0
+    overlap = min(a.last, b.last) - max(a.first, b.first)
+    return abs(a.speed - b.speed) < near and abs(a.radius - b.radius) < 0.6 * near and overlap >= 0
+
+
+def _alone(views: Sequence[View], rest: Sequence[Pixels], keep: Sequence[int]) -> list[View]:
+    """Return some views with one channel's rest as their green."""
+    return [views[k].showing(np.broadcast_to(rest[k][..., None], views[k].pixels.shape)) for k in keep]
+
+
+def _try(
+    trial: Candidate, views: Sequence[View], rest: Sequence[Pixels], pool: ThreadPoolExecutor | None
+) -> Found | None:
+    """Fit a candidate and judge it."""
+    run = np.arange(trial.first, trial.last + 1)
+    few = run[np.unique(np.linspace(0, run.size - 1, min(run.size, _FEW)).round().astype(int))]
+    shown = _alone(views, rest, list(few))
+    start = beginning(trial, shown, [rest[k] for k in few])
+    fit = grow(start, shown, 1, most=Growth(order=1, discs=1, error=0.05), pool=pool)
+    if fit is None or fit.shape.numbers[FIRST_I] <= 0.0:
+        return None
+    shape = fit.shape
+    patches = patches_of(shape, shown, 1)
+    if not patches:
+        return None
+    before, after = cost_of(darkened(shape), patches, error=0.05), cost_of(shape, patches, error=0.05)
+    if not (after < (1.0 - EXPLAINS) * before and before - after > SURE**2):
+        return None
+    first, last = _span(shape, views, rest, (trial.first + trial.last) // 2)
+    if last - first < 1:
+        return None
+    return Found((shape, shape, shape), first, last)
+
+
+def _span(shape: Shape, views: Sequence[View], rest: Sequence[Pixels], middle: int) -> tuple[int, int]:
+    """Return the views, around a middle one, in which a shape is there: its birth and its death."""
+    there = []
+    for k in range(len(views)):
+        seen = presence(shape, _alone(views, rest, [k])[0], 1)
+        # a view that does not reach it, or cannot tell, is no reason for a death
+        unsure = not np.isfinite(seen.error) or seen.error > 0.5
+        there.append(unsure or seen.amplitude > THERE)
+    first = last = middle
+    while first > 0 and (there[first - 1] or (first > 1 and there[first - 2])):
+        first -= 1
+    while last < len(views) - 1 and (there[last + 1] or (last < len(views) - 2 and there[last + 2])):
+        last += 1
+    return first, last
+
+
+def _take_off(ghost: Found, views: Sequence[View], rest: Sequence[Pixels]) -> list[Pixels]:
+    return [
+        (picture - render(ghost.shapes[1], view)).astype(np.float32) if ghost.first <= k <= ghost.last else picture
+        for k, (view, picture) in enumerate(zip(views, rest, strict=True))
+    ]

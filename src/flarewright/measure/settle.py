@@ -1,0 +1,196 @@
+"""Fit all found ghosts together, colour by colour, and keep those that explain light that no other does."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from ..kernels.measure_pupil import FIRST_DISC, FIRST_I
+from ..model.ghost_model import AberrationGhost
+from .fit import Fit, Shape, free_numbers, patches_of, presence, refine, render
+from .found import CHANNELS, Found, alone, by_light, exchange, gain, rest_of
+from .grow import Growth, grow
+from .numbers import channel_of
+from .views import Pixels, View
+
+# part of the squares inside its windows by which the picture must get worse without a ghost
+NEEDED = 0.03
+
+
+@dataclass(frozen=True)
+class Settling:
+    """How thoroughly.
+
+    Attributes
+    ----------
+    rounds : int
+        How often every ghost is fitted anew against the rest.
+    most : Growth
+        How far a ghost may grow.
+    views : int
+        Constellations that one fit looks at, at most.
+    """
+
+    rounds: int = 2
+    most: Growth = field(default_factory=lambda: Growth(order=2, discs=2))
+    views: int = 32
+
+
+def settle(
+    found: Sequence[Found],
+    views: Sequence[View],
+    *,
+    how: Settling = Settling(),
+    pool: ThreadPoolExecutor | None = None,
+    tell: Callable[[str], None] = lambda _: None,
+) -> list[Found]:
+    """Fit every ghost against all others until they agree.
+
+    Parameters
+    ----------
+    found : sequence of Found
+    views : sequence of View
+        Glow taken off; what shall not count has infinite variance.
+    how : Settling
+    pool : executor, optional
+    tell : callable
+        Gets a line for each round.
+
+    Returns
+    -------
+    list of Found
+        Those that are needed, brightest first.
+    """
+    ghosts = list(found)
+    rest = [rest_of(ghosts, views, m) for m in range(CHANNELS)]
+    for turn in range(how.rounds):
+        for k in by_light(ghosts):
+            ghosts[k] = _again(ghosts[k], views, rest, how, turn, pool)
+        before = len(ghosts)
+        ghosts = needed(ghosts, views, rest)
+        tell(f"round {turn + 1}: {len(ghosts)} of {before} ghosts are needed")
+    return [ghosts[k] for k in by_light(ghosts)]
+
+
+def _again(
+    ghost: Found,
+    views: Sequence[View],
+    rest: list[list[Pixels]],
+    how: Settling,
+    turn: int,
+    pool: ThreadPoolExecutor | None,
+) -> Found:
+    """Fit one ghost anew in all colours and put its new light in the place of the old."""
+    fits: list[Fit | None] = list(ghost.fits)
+    shapes = list(ghost.shapes)
+    for m in (1, 0, 2):
+        shown = alone(ghost, m, views, rest[m], how.views)
+        if m == 1 and turn == 0:
+            fits[m] = grow(shapes[1], shown, m, most=how.most, pool=pool) or fits[m]
+        else:
+            start = shapes[m] if turn else _like(shapes[1], shapes[m], shown, m)
+            fits[m] = _refined(start, shown, m, fits[1], pool) or fits[m]
+        fit = fits[m]
+        if fit is not None:
+            shapes[m] = fit.shape
+        exchange(ghost.shapes[m], shapes[m], ghost, views, rest[m])
+    return replace(ghost, shapes=(shapes[0], shapes[1], shapes[2]), fits=(fits[0], fits[1], fits[2]))
+
+
+def touch_up(
+    ghosts: list[Found], views: Sequence[View], rest: list[Pixels], *, steps: int, pool: ThreadPoolExecutor | None
+) -> list[Found]:
+    """Fit the green of every ghost anew, a few steps each, against the others' newest.
+
+    Parameters
+    ----------
+    ghosts : list of Found
+        All colours alike.
+    views : sequence of View
+    rest : list of ndarray, shape (H, W)
+        Green beside all ghosts; brought up to date.
+    steps : int
+    pool : executor or None
+
+    Returns
+    -------
+    list of Found
+    """
+    out = list(ghosts)
+    for k in by_light(ghosts):
+        ghost = out[k]
+        shape = ghost.shapes[1]
+        patches = patches_of(shape, alone(ghost, 1, views, rest, 14), 1)
+        if not patches:
+            continue
+        free = free_numbers(1, shape.discs, 1)
+        new = refine(shape, patches, free, width=views[0].size_px[0], steps=steps, pool=pool).shape
+        exchange(shape, new, ghost, views, rest)
+        out[k] = replace(ghost, shapes=(new, new, new))
+    return out
+
+
+def _like(green: Shape, own: Shape, alone: Sequence[View], channel: int) -> Shape:
+    """Return green's shape as bright as another colour is."""
+    seen = [presence(green, view, channel) for view in alone]
+    sure = [each.amplitude for each in seen if np.isfinite(each.error)]
+    if not sure:
+        return own
+    numbers = green.numbers.copy()
+    numbers[FIRST_I:FIRST_DISC] *= max(float(np.median(sure)), 0.0)
+    return replace(green, numbers=numbers)
+
+
+def _refined(
+    start: Shape, alone: Sequence[View], channel: int, like: Fit | None, pool: ThreadPoolExecutor | None
+) -> Fit | None:
+    patches = patches_of(start, alone, channel)
+    if not patches:
+        return None
+    free = like.free if like is not None and like.shape.discs == start.discs else free_numbers(1, start.discs, 1)
+    return refine(start, patches, free, width=alone[0].size_px[0], steps=8, pool=pool)
+
+
+def needed(ghosts: Sequence[Found], views: Sequence[View], rest: list[list[Pixels]]) -> list[Found]:
+    """Leave out ghosts without which the views are explained as well, faintest first; the rest gets their light."""
+    kept = list(ghosts)
+    for k in reversed(by_light(ghosts)):
+        ghost = ghosts[k]
+        patches = patches_of(ghost.shapes[1], alone(ghost, 1, views, rest[1], 12), 1)
+        bright = ghost.shapes[1].numbers[FIRST_I] > 0.0
+        if bright and patches and gain(ghost.shapes[1], patches) > NEEDED:
+            continue
+        kept = [other for other in kept if other is not ghost]
+        for m in range(len(rest)):
+            for v in range(ghost.first, ghost.last + 1):
+                rest[m][v] = (rest[m][v] + render(ghost.shapes[m], views[v])).astype(np.float32)
+    return kept
+
+
+def to_model(ghosts: Sequence[Found], views: Sequence[View]) -> tuple[AberrationGhost, ...]:
+    """Return found ghosts as a model's, named by number."""
+    angles = [view.constellation_deg for view in views]
+    out = []
+    for number, ghost in enumerate(ghosts, 1):
+        channels = [
+            channel_of(shape.numbers, shape.discs, None if fit is None else fit.uncertainty)
+            for shape, fit in zip(ghost.shapes, ghost.fits, strict=True)
+        ]
+        born = angles[0] if ghost.first == 0 else 0.5 * (angles[ghost.first - 1] + angles[ghost.first])
+        last = len(angles) - 1
+        died = angles[last] if ghost.last == last else 0.5 * (angles[ghost.last] + angles[ghost.last + 1])
+        out.append(
+            AberrationGhost(
+                name=str(number), red=channels[0], green=channels[1], blue=channels[2], visible_deg=(born, died)
+            )
+        )
+    return tuple(out)
+
+
+def numbers_of(ghost: Found) -> int:
+    """Return how many numbers describe a ghost's green."""
+    fit = ghost.fits[1]
+    return int(np.count_nonzero(ghost.shapes[1].numbers)) if fit is None else int(fit.free.size)

@@ -1,0 +1,102 @@
+"""What the fitter sees of a merged frame: pixels, how well they are known, and where the light stands."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import FlarewrightError
+from ..model.capture import MergedFrame
+from .numbers import Floats, field, frame
+
+Pixels = NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class View:
+    """One constellation.
+
+    Attributes
+    ----------
+    constellation_deg : float
+    sigma : float
+        Length of the field s, at least 0.
+    frame : ndarray, shape (5,)
+        Axis x and y in pixels, cosine and sine of the light's direction, 1.
+    light_px : tuple of float
+    pixels : ndarray, shape (height, width, 3), float32
+        Radiance; what is not looked for is taken off.
+    variance : ndarray, shape (height, width, 3), float32
+        Of the pixels, infinite where nothing was measured.
+    """
+
+    constellation_deg: float
+    sigma: float
+    frame: Floats
+    light_px: tuple[float, float]
+    pixels: Pixels
+    variance: Pixels
+
+    @property
+    def size_px(self) -> tuple[int, int]:
+        """Width and height."""
+        return self.pixels.shape[1], self.pixels.shape[0]
+
+    def showing(self, pixels: Pixels) -> View:
+        """Return the same view with other pixels."""
+        return replace(self, pixels=pixels)
+
+
+def views_of(frames: Sequence[MergedFrame], largest_deg: float | None = None) -> tuple[View, ...]:
+    """Return the views of merged frames, by rising constellation.
+
+    Parameters
+    ----------
+    frames : sequence of MergedFrame
+        Of one size.
+    largest_deg : float, optional
+        Constellation at which the field has length 1; None: the largest of the frames.
+
+    Returns
+    -------
+    tuple of View
+
+    Raises
+    ------
+    FlarewrightError
+        When there are fewer than three frames, sizes differ, or all are at one constellation.
+    """
+    if len(frames) < 3:
+        raise FlarewrightError(f"{len(frames)} constellations are too few to follow a ghost; photograph at least 3")
+    shapes = {frame.radiance.shape for frame in frames}
+    if len(shapes) > 1:
+        raise FlarewrightError(f"the merged frames have {len(shapes)} different sizes; capture all at one size")
+    largest = largest_deg or max(abs(each.constellation_deg) for each in frames)
+    if not largest > 0.0:
+        raise FlarewrightError("all frames have the light on the axis; turn the camera between the captures")
+    views = [
+        View(
+            each.constellation_deg, abs(field(each.constellation_deg, largest)),
+            frame(each.axis_px, each.roll_deg, each.constellation_deg, 1.0), each.light_px, each.radiance,
+            each.variance,
+        )
+        for each in frames
+    ]  # fmt: skip
+    return tuple(sorted(views, key=lambda view: view.constellation_deg))
+
+
+def halved(pixels: Pixels, times: int, variance: bool = False) -> Pixels:
+    """Average a picture of shape (H, W, ...) over squares of 2**times pixels; a rest at the border is left out.
+
+    With `variance` the numbers are variances of pixels, and those of the averages are returned.
+    """
+    side = 2**times
+    if side == 1:
+        return pixels
+    height, width = pixels.shape[0] // side, pixels.shape[1] // side
+    cut = pixels[: height * side, : width * side]
+    mean = cut.reshape(height, side, width, side, *pixels.shape[2:]).mean(axis=(1, 3))
+    return np.asarray(mean / side**2 if variance else mean, dtype=np.float32)

@@ -1,0 +1,165 @@
+"""Fitting: planted ghosts come back within their stated uncertainty, from wherever the fit begins."""
+
+import numpy as np
+import pytest
+from planted_run import GHOSTS, LARGEST, NOISE, SIZE, shape, views
+
+from flarewright.measure.compress import compress
+from flarewright.measure.find import Candidate, candidates, slopes_of
+from flarewright.measure.fit import Shape, free_numbers, patches_of, presence, refine, render
+from flarewright.measure.found import Found
+from flarewright.measure.grow import Growth
+from flarewright.measure.pursuit import pursue
+from flarewright.measure.replay import replay
+from flarewright.measure.settle import Settling, settle, to_model
+from flarewright.measure.walch import circle, cost, descend, draw, edges, fit_bezier, window_of
+from flarewright.model.ghost_model import GhostModel
+
+FEW = np.linspace(1.0, LARGEST, 9)
+
+
+def masks(shown):
+    return [np.ones(view.pixels.shape[:2], bool) for view in shown]
+
+
+@pytest.mark.parametrize("planted", [GHOSTS[0], GHOSTS[2]])
+def test_planted_numbers_come_back_within_their_uncertainty(planted):
+    shown = views((planted,), angles=FEW)
+    start = planted.numbers.copy()
+    start[[0, 10]] += 3.0, -1.0
+    start[20] *= 1.1
+    free = free_numbers(1, planted.discs, 1)
+    free = free[free != 31] if planted.discs else free
+    fit = refine(
+        Shape(start, planted.discs), patches_of(planted, shown, 1), free, width=SIZE[0], steps=30, offset=False,
+        error=0.0,
+    )  # fmt: skip
+    pulls = (fit.shape.numbers - planted.numbers)[free] / fit.uncertainty[free]
+    assert fit.cost / fit.count == pytest.approx(1.0, abs=0.03)
+    assert np.sqrt(np.mean(pulls**2)) < 1.7
+    assert np.abs(pulls).max() < 4.0
+    # and the uncertainty says something: places are known to a fraction of a pixel
+    assert fit.uncertainty[0] < 0.5
+
+
+def test_replay_equals_the_fit_at_captured_angles():
+    shown = views((), angles=FEW)
+    found = [
+        Found((one, other, one), first, 8) for one, other, first in zip(GHOSTS, GHOSTS[::-1], range(4), strict=True)
+    ]
+    model = GhostModel(
+        size_px=SIZE, axis_px=(float(shown[0].frame[0]), float(shown[0].frame[1])), focal_px=300.0, largest_deg=LARGEST,
+        constellation_deg=(1.0, LARGEST), ghosts=to_model(found, shown),
+    )  # fmt: skip
+    for k in (0, 2, 8):
+        there = [ghost for ghost in found if ghost.first <= k]
+        for m in range(3):
+            fitted = sum(render(ghost.shapes[m], shown[k]) for ghost in there)
+            assert np.allclose(replay(model, float(FEW[k]))[0].pixels[..., m], fitted, atol=1e-5)
+
+
+@pytest.mark.slow
+def test_all_ghosts_are_found_and_none_besides():
+    shown = views(GHOSTS[:2])
+    settled = settle(pursue(shown, masks(shown)), shown, how=Settling(rounds=1, most=Growth(order=1, discs=1)))
+    for planted in GHOSTS[:2]:
+        near = min(settled, key=lambda ghost: abs(ghost.shapes[1].numbers[0] - planted.numbers[0]))
+        assert near.shapes[1].numbers[[0, 10]] == pytest.approx(planted.numbers[[0, 10]], abs=2.0)
+    assert len(settled) <= 3
+
+
+def test_noise_alone_has_no_ghosts():
+    shown = views((), angles=FEW)
+    assert pursue(shown, masks(shown)) == []
+
+
+def test_a_rolled_camera_sees_the_same_ghosts():
+    best = []
+    for roll in (0.0, 37.0):
+        shown = views(GHOSTS[:2], angles=FEW, roll_deg=roll)
+        slopes = slopes_of(shown, [view.pixels[..., 1] for view in shown], masks(shown))
+        best.append(candidates(slopes, SIZE[0], most=2))
+    for one, other in zip(*best, strict=True):
+        assert other.speed == pytest.approx(one.speed, abs=8.0)
+        assert other.radius == pytest.approx(one.radius, abs=3.0)
+
+
+def test_permuted_starts_give_the_same_picture():
+    planted = GHOSTS[1]
+    shown = views((planted,), angles=FEW)
+    pictures = []
+    for speed, size in ((4.0, 1.5), (-5.0, -1.0)):
+        fitted = shape(planted.numbers[0] + speed, planted.numbers[10] + size, 0.4)
+        for order in (0, 1):
+            patches = patches_of(planted, shown, 1)
+            free = free_numbers(order, 0, order)
+            fitted = refine(fitted, patches, free, width=SIZE[0], steps=30, error=0.0).shape
+        pictures.append(render(fitted, shown[5]))
+    assert np.abs(pictures[0] - pictures[1]).max() < 0.3 * NOISE
+
+
+def test_presence_tells_births_and_deaths():
+    there, gone = views((GHOSTS[1],), angles=FEW)[4], views((), angles=FEW)[4]
+    assert presence(GHOSTS[1], there, 1).amplitude == pytest.approx(1.0, abs=0.05)
+    assert presence(GHOSTS[1], gone, 1).amplitude == pytest.approx(0.0, abs=0.05)
+    assert not np.isfinite(presence(shape(3000.0, 5.0, 1.0), there, 1).error)
+
+
+def test_candidates_say_which_views_saw_them():
+    some = views((GHOSTS[0],), angles=FEW)[:5] + views((), angles=FEW)[5:]
+    slopes = slopes_of(some, [view.pixels[..., 1] for view in some], masks(some))
+    best = candidates(slopes, SIZE[0], most=1)[0]
+    assert isinstance(best, Candidate)
+    assert (best.first, best.last) == (0, 4)
+
+
+BEZIER = np.array([
+    20.0, 1.5, 30.0, 36.0, 24.0, 18.0, 15.0, 14.0, 17.0, 6.0, 15.0, 1.3, 1.8, 1.0, 0.8, 0.5, 0.3, 0.25, 0.2,
+])  # fmt: skip
+FRAME = np.array([80.2, 60.1, np.cos(0.4), np.sin(0.4), 1.0])
+
+
+def test_bezier_ghosts_come_back_within_their_uncertainty():
+    window = window_of(BEZIER, FRAME, (160, 120), 10)
+    clean = draw(BEZIER, FRAME, window)
+    noisy = clean + np.random.default_rng(2).normal(0.0, 0.02, clean.shape)
+    start = circle(22.0, 29.0, np.full(3, 0.7), np.full(3, 0.3))
+    fit, deviation = fit_bezier(start, noisy, np.full(clean.shape, 0.02**-2), FRAME, window)
+    pulls = (fit.numbers - BEZIER) / deviation
+    assert fit.cost / clean.size == pytest.approx(1.0, abs=0.03)
+    assert np.sqrt(np.mean(pulls**2)) < 1.6
+    assert np.abs(pulls).max() < 4.0
+
+
+def test_gradient_descent_lowers_walchs_cost_but_needs_far_more_pictures():
+    window = window_of(BEZIER, FRAME, (160, 120), 10)
+    grey = BEZIER.copy()
+    grey[13:16], grey[16:] = 0.8, 0.25
+    wanted = draw(grey, FRAME, window)[..., 1]
+    start = circle(20.5, 30.0, np.full(3, 0.8), np.full(3, 0.25))
+    found = descend(start, wanted, FRAME, window, rounds=2)
+    assert found.cost < 0.7 * cost(draw(start, FRAME, window)[..., 1], wanted)
+    one = np.zeros((*wanted.shape, 3))
+    one[..., 1] = 1.0
+    fitted, _ = fit_bezier(start, np.repeat(wanted[..., None], 3, 2), one, FRAME, window)
+    # with fewer pictures, a hundredth of the error; its cost is the sum of squares
+    assert fitted.evaluations < found.evaluations
+    assert fitted.cost / wanted.size < 0.01 * found.cost
+
+
+def test_edges_of_a_plane_are_none():
+    y, x = np.mgrid[:30, :40].astype(float)
+    assert np.abs(edges(2.0 * x - y)[6:-6, 6:-6]).max() < 1e-12
+
+
+@pytest.mark.parametrize("order", [0, 1, 3])
+def test_compress_finds_the_order(order):
+    rng = np.random.default_rng(order)
+    angles = np.linspace(3.0, 21.0, 40)
+    z = (angles - 12.0) / 9.0
+    truth = np.polynomial.polynomial.polyval(z, [5.0, -3.0, 0.0, 2.0][: order + 1])
+    values = truth + rng.normal(0.0, 0.05, 40)
+    values[7] += 4.0
+    curve = compress(angles, values, np.full(40, 0.05), (3.0, 21.0))
+    assert len(curve.coefficients) - 1 <= order + 1
+    assert np.abs(np.polynomial.polynomial.polyval(z, curve.coefficients) - truth).max() < 0.1
