@@ -37,7 +37,11 @@ ROOTS = {
         f"{_GEOMETRY}, f8[:,::1], f8[:,:,::1], f8, f8, f8, i8, f8, f8, f8[::1], i8, i8, i8, f8, f8, f8, f8",
         5.0,
     ),
-    "prepass": ("prepass.find_box", f"{_GEOMETRY}, f8[::1], f8[:,::1], f8, f8, f8, i8, f8, f8, f8[::1], i8, i8", 2.4),
+    "prepass": (
+        "prepass.find_box",
+        f"{_GEOMETRY}, f8[::1], f8[:,::1], f8, f8, f8, i8, f8, f8, f8[::1], i8, i8, f8, f8",
+        2.4,
+    ),
     "draw": ("bundle.draw_bundle", f"{_BUNDLE}, f8[::1], i8, f8[:,::1], none, f8, {_CANVAS}, i8", 3.5),
     "draw masked": ("bundle.draw_bundle", f"{_BUNDLE}, f8[::1], i8, f8[:,::1], f8[:,::1], f8, {_CANVAS}, i8", 4.8),
     "draw ringing": (

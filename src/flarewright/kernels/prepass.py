@@ -9,7 +9,7 @@ import numpy as np
 from ._jit import compiled, inner
 from .trace import ALIVE, REL, STOP, STOP_X, WEIGHT, X, Y, trace_lanes
 
-# paths seen by fewer cells of the pre-pass than this are searched for spots between its samples
+# paths seen by fewer cells of the pre-pass than this are searched for spots between its samples, at most so many a side
 FEW_CELLS = 12
 PROBES = 8
 # how often the gap between two rays that end at different surfaces is halved
@@ -57,7 +57,7 @@ def rejected(data, nodes, crossings, iris_radius, slack):
 @compiled
 def find_box(
     rows, actions, curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, tilt, nearness,
-    crossings, iris_radius, view_radius, box, nx, ny,
+    crossings, iris_radius, view_radius, box, nx, ny, finest_x, finest_y,
 ):  # fmt: skip
     """Bound the part of the pupil that a path accepts, and estimate what it carries.
 
@@ -75,6 +75,8 @@ def find_box(
         x0, x1, y0, y1 of the pupil to look at.
     nx, ny : int
         Cells of the pre-pass.
+    finest_x, finest_y : float
+        How near to each other samples need to stand where a spot may hide between those of the cells, mm.
 
     Returns
     -------
@@ -135,7 +137,7 @@ def find_box(
             corners[k, 1] = box[2] + (doubtful[k] % ny) * hy
         _probe(
             rows, actions, curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, tilt, nearness,
-            crossings, iris_radius, corners, hx, hy, spots, sums,
+            crossings, iris_radius, corners, hx, hy, _probes(hx, finest_x), _probes(hy, finest_y), spots, sums,
         )  # fmt: skip
         _halve(
             rows, actions, curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, tilt, nearness,
@@ -207,24 +209,30 @@ def _widen(spots, sums, data, k, x, y, hx, hy, share):
 
 
 @inner
+def _probes(step, finest):
+    """Into how many samples to divide a cell's side: no more than needed, and at most PROBES."""
+    return min(max(int(np.ceil(step / finest)), 1), PROBES)
+
+
+@inner
 def _probe(
     rows, actions, curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, tilt, nearness,
-    crossings, iris_radius, corners, hx, hy, spots, sums,
+    crossings, iris_radius, corners, hx, hy, across, along, spots, sums,
 ):  # fmt: skip
-    """Look into doubtful cells with PROBES x PROBES rays each and note what passes."""
-    each = PROBES * PROBES
+    """Look into doubtful cells with `across` x `along` rays each and note what passes."""
+    each = across * along
     px, py = np.empty(corners.shape[0] * each), np.empty(corners.shape[0] * each)
     for k in range(px.size):
         cell, m = k // each, k % each
-        px[k] = corners[cell, 0] + (m // PROBES + 0.5) * hx / PROBES
-        py[k] = corners[cell, 1] + (m % PROBES + 0.5) * hy / PROBES
+        px[k] = corners[cell, 0] + (m // along + 0.5) * hx / across
+        py[k] = corners[cell, 1] + (m % along + 0.5) * hy / along
     data = np.empty((px.size, STOP_X + 2 * crossings))
     trace_lanes(
         rows, actions, curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, tilt, nearness, px, py, data
     )
     for k in range(px.size):
         if _passes(data, k, crossings, iris_radius):
-            _widen(spots, sums, data, k, px[k], py[k], hx / PROBES, hy / PROBES, hx * hy / each * np.cos(tilt))
+            _widen(spots, sums, data, k, px[k], py[k], hx / across, hy / along, hx * hy / each * np.cos(tilt))
 
 
 @inner

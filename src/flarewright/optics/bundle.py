@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..kernels.intersect import AXES, ORIGIN, sag_of_shape
 from ..kernels.mesh import build_mesh
-from ..kernels.prepass import find_box
+from ..kernels.prepass import PROBES, find_box
 from ..kernels.trace import STOP_X, trace_nodes
 from .pack import PackedLens
 from .paths import LightPath
@@ -131,6 +131,9 @@ def _arguments(packed: PackedLens, w: int | list[int], path: LightPath, tilt: fl
     """List what every tracing kernel takes first."""
     geometry = (packed.curvature, packed.form, packed.z_vertex, packed.inv_semi)
     light = (tilt, packed.nearness)
+    if w == list(range(len(packed.wavelengths_nm))):
+        # a list would copy them
+        return (path.rows, path.actions, *geometry, packed.n_gap, packed.reflectance, packed.sensor_z, *light)
     return (path.rows, path.actions, *geometry, packed.n_gap[w], packed.reflectance[w], packed.sensor_z, *light)
 
 
@@ -246,6 +249,8 @@ def find_region(
     limits = (path.stop_crossings, iris_radius, view_radius)
     middle, *others = [(*_arguments(packed, w, path, tilt), *limits) for w in _fitted(packed)]
     box, cells = front_box(packed, tilt), _cells(packed, PREPASS)
+    # what hides between the samples of a part is looked for as finely as on the whole front
+    finest = ((box[1] - box[0]) / (PROBES * cells[0]), (box[3] - box[2]) / (PROBES * cells[1]))
     if within is not None:
         # as dense as on the whole front
         parts = (within[1::2] - within[0::2]) / (box[1::2] - box[0::2])
@@ -255,14 +260,14 @@ def find_region(
     whole = True
     held = np.array([np.inf, -np.inf, np.inf, -np.inf])
     for _ in range(4):
-        found, sums, spots = _scan(packed, middle, box, cells)
+        found, sums, spots = _scan(packed, middle, box, cells, finest)
         plenty = sums[4] >= (SPECK if whole else SMALL_REGION)
         near, few = box, _cells(packed, COARSE) if plenty else cells
         if whole and sums[4] > 0.0:
             # the whole front is too much to scan thrice where one colour has shown the place
             near, few = _around(found, box, cells), _cells(packed, COARSE if plenty else FINER)
         for other in others:
-            elsewhere, more, _ = _scan(packed, other, near, few)
+            elsewhere, more, _ = _scan(packed, other, near, few, finest)
             found = _joined(found, elsewhere)
             if not plenty:
                 sums = np.maximum(sums, more)
@@ -302,10 +307,14 @@ def _fitted(packed: PackedLens) -> list[int]:
 
 
 def _scan(
-    packed: PackedLens, arguments: tuple[Any, ...], box: Floats, cells: tuple[int, int]
+    packed: PackedLens,
+    arguments: tuple[Any, ...],
+    box: Floats,
+    cells: tuple[int, int],
+    finest: tuple[float, float],
 ) -> tuple[Floats, Floats, Floats]:
     """Run the pre-pass over a box at one wavelength."""
-    found, sums, spots = find_box(*arguments, box, *cells)
+    found, sums, spots = find_box(*arguments, box, *cells, *finest)
     if packed.halves == 1:
         # the kernel counts every ray for its mirror image too
         sums[:3] *= 0.5
