@@ -1,5 +1,6 @@
 """Merging is unbiased, its variance is honest, it streams, and the noise it needs is found in the photographs."""
 
+import zlib
 from dataclasses import replace
 from itertools import pairwise
 
@@ -8,7 +9,7 @@ import pytest
 from synthetic_camera import Setup, expose
 
 from flarewright.io.photo import open_photo
-from flarewright.measure.merge import Exposure, exposure_ratios, merge
+from flarewright.measure.merge import Exposure, exposure_ratios, merge, without_idle_digits
 from flarewright.measure.noise import common_black, fit_transfer, noise_of, smooth, transfers
 from flarewright.model.capture import CameraNoise
 
@@ -136,3 +137,20 @@ def test_an_even_scene_tells_the_same_noise(tmp_path):
                                                          np.ones(a.shape[:2], bool), 1.0)]  # fmt: skip
     found = fit_transfer(points, CameraNoise(read_noise=CAMERA.read_noise), 1.0)
     assert found.electrons_per_unit == pytest.approx(CAMERA.electrons_per_unit, rel=0.04)
+
+
+def test_digits_of_noise_are_rounded_away_and_nothing_else():
+    rng = np.random.default_rng(2)
+    variance = (10.0 ** rng.uniform(-12, 4, (50, 60, 3))).astype(np.float32)
+    variance[3, 4] = np.inf
+    mean = (rng.normal(size=variance.shape) * 100.0).astype(np.float32)
+    short, told = without_idle_digits(mean, variance)
+    known = np.isfinite(variance)
+    off = (short - mean)[known] / np.sqrt(variance[known])
+    assert np.abs(off).max() <= 1.0 / 32.0 + 1e-4
+    assert off.var() < 1.0 / 3000.0
+    assert np.abs(told[known] / variance[known] - 1.0).max() < 1.0 / 500.0
+    assert np.array_equal(short[~known], mean[~known])
+    assert np.isinf(told[~known]).all()
+    packed, full = (len(zlib.compress(values.tobytes())) for values in (told, variance))
+    assert packed < 0.8 * full

@@ -108,6 +108,27 @@ def merge(exposures: Sequence[Exposure], *, rows: int = ROWS) -> tuple[Band, Ban
     return radiance, variance
 
 
+def without_idle_digits(radiance: Band, variance: Band) -> tuple[Band, Band]:
+    """Round away the digits that noise has made up, so that files get less than half as large.
+
+    Parameters
+    ----------
+    radiance, variance : ndarray, shape (height, width, 3), float32
+
+    Returns
+    -------
+    radiance, variance : ndarray of the same shape
+        The former to a sixteenth of its standard error or finer, which adds less than 1/3000 to its variance; the
+        latter to 1 in 500.
+    """
+    known = np.isfinite(variance) & (variance > 0.0)
+    step = np.exp2(np.floor(np.log2(np.sqrt(np.where(known, variance, 1.0)))) - 4.0)
+    rounded = np.where(known, np.rint(radiance / step) * step, radiance).astype(np.float32)
+    bits = np.ascontiguousarray(variance).view(np.uint32)
+    coarse = ((bits + np.uint32(1 << 14)) & np.uint32(0xFFFF8000)).view(np.float32)
+    return rounded, np.where(known, coarse, variance).astype(np.float32)
+
+
 def _merge_band(
     exposures: Sequence[Exposure], readings: Sequence[tuple[Band, NDArray[np.bool_]]]
 ) -> tuple[NDArray[np.floating], NDArray[np.floating]]:

@@ -27,12 +27,12 @@ from ..model.capture import CameraNoise, Capture, FrameInfo, MergedFrame, Merged
 from .calibrate import Calibration, calibrate
 from .geometry import Geometry, Seen, believable, solve_geometry
 from .light import Sighting, find_light
-from .merge import exposure_ratios, merge
+from .merge import exposure_ratios, merge, without_idle_digits
 from .symmetry import axis_beside_path, reduced
 
 FRAMES = "frames"
 # raise when the same photographs give other pixels
-_VERSION = 1
+_VERSION = 2
 Progress = Callable[[float, str], None]
 
 # a light that a person points at is taken to be right within this, pixels
@@ -198,7 +198,7 @@ def _frame(
     # 1 fills the sensor in a second
     full = float(np.mean(shots[0].full)) if np.isfinite(known.white) else 1.0
     scale = np.asarray(balance, np.float32) / np.float32(full)
-    mean, variance = mean * scale, variance * scale**2
+    mean, variance = without_idle_digits(mean * scale, variance * scale**2)
     sighting = find_light(mean, variance)
     pointed = next((one for one in group if one.light_x_px is not None), None)
     if pointed is not None and pointed.light_x_px is not None and pointed.light_y_px is not None:
