@@ -21,7 +21,7 @@ def shoot(tab: Tab, path: Path) -> None:
     tab.page.mouse.move(5, 715)
     tab.page.wait_for_timeout(350)
     image = Image.open(BytesIO(tab.page.screenshot())).convert("RGB")
-    image.save(path, quality=78, subsampling=0, optimize=True)
+    image.save(path, quality=72, subsampling=2, optimize=True)
     print(f"{path} {path.stat().st_size // 1024} KB")
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ..errors import FlarewrightError
 from ..model import Project
 from . import studio
-from .jobs import Check, Lane
+from .jobs import Check, Lane, Overtaken
 from .seen import Seen, see
 from .session import Session
 from .shown import jpeg, pixels_of, plate_for
@@ -76,10 +76,17 @@ class Screen:
         except FlarewrightError as error:
             check()
             self.problem = str(error)
-            self.session.tell({"type": "picture"})
+            self._publish()
         except MemoryError:
             self.problem = "there is not enough memory for this picture; choose a smaller one"
-            self.session.tell({"type": "picture"})
+            self._publish()
+        except Overtaken:
+            raise
+        except Exception:
+            # a mistake of ours: the person shall know that the picture is old
+            self.problem = "the picture could not be drawn, and the terminal tells why"
+            self._publish()
+            raise
 
     def _draw(self, project: Project, view: View, check: Check) -> None:
         shown = self.picture

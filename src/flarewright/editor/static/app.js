@@ -19,6 +19,8 @@ const $ = (id) => document.getElementById(id);
 function take(state) {
   if (app.state && state.revision < app.state.revision) return;
   const old = app.state;
+  // what is told of the picture on its own may come before an answer that is older
+  if (old && old.picture.number > state.picture.number) state.picture = old.picture;
   app.state = state;
   app.light = Math.min(app.light, state.lights.length - 1);
   const shot = (s) => JSON.stringify([s.lights, s.lens, s.camera, s.iris, s.dirt, s.coating, s.pass_gain, s.by_hand, s.view.grey, s.view.unclipped]);
