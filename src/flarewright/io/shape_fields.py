@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -63,9 +64,7 @@ def read_shape(entry: dict[str, Any], where: str, folder: Path | None, problems:
             problems.append(f"{where}: asphere has {len(terms)} terms: give 1 to {MOST_TERMS}, A4 first, A6 next, ...")
         elif terms is not None:
             values["asphere"] = terms
-    for key, field in (("decentre", OFFSET), ("tilt_deg", TILT)):
-        if key in entry and (pair := _pair(entry[key], f"{where}: {key}", field, problems)) is not None:
-            values[key] = pair
+    values |= _moved(entry, where, problems)
     if "figure" in entry:
         values["figure"] = _figure(entry["figure"], f"{where}: figure", folder, problems)
     return values
@@ -73,40 +72,23 @@ def read_shape(entry: dict[str, Any], where: str, folder: Path | None, problems:
 
 def read_elements(table: object, problems: list[str]) -> tuple[Element, ...]:
     """Check the `[[elements]]` of a lens file; what they make together the lens itself checks."""
-    if not isinstance(table, list):
-        problems.append(f"elements is {shorten(table)}: write [[elements]] with rows = [FIRST, LAST] below it")
-        return ()
     found = []
-    for number, entry in enumerate(table):
-        where = f"element {number}"
-        if not isinstance(entry, dict):
-            problems.append(f"{where} is {shorten(entry)}: a table with rows = [FIRST, LAST] was expected")
-            continue
+    for where, entry in _tables(table, "element", "rows = [FIRST, LAST]", problems):
         before = len(problems)
         _unknown(entry, ELEMENT_KEYS, where, problems)
         rows = entry.get("rows")
         if not (isinstance(rows, list) and len(rows) == 2 and all(type(row) is int for row in rows)):
             problems.append(f"{where}: rows is {shorten(rows)}: give its first and last row, rows = [0, 2] for example")
-        fields: dict[str, Any] = {"rows": rows}
-        for key, field in (("decentre", OFFSET), ("tilt_deg", TILT)):
-            if key in entry and (pair := _pair(entry[key], f"{where}: {key}", field, problems)) is not None:
-                fields[key] = pair
+        moved = _moved(entry, where, problems)
         if len(problems) == before:
-            found.append(Element(**fields))
+            found.append(Element(rows=rows, **moved))
     return tuple(found)
 
 
 def read_positions(table: object, problems: list[str]) -> tuple[Position, ...]:
     """Check the `[[positions]]` of a lens file; what they make together the lens itself checks."""
-    if not isinstance(table, list):
-        problems.append(f"positions is {shorten(table)}: write [[positions]] with name and gaps below it")
-        return ()
     found = []
-    for number, entry in enumerate(table):
-        where = f"position {number}"
-        if not isinstance(entry, dict):
-            problems.append(f"{where} is {shorten(entry)}: a table with name and gaps was expected")
-            continue
+    for where, entry in _tables(table, "position", "name and gaps", problems):
         before = len(problems)
         _unknown(entry, ("name", "gaps", *POSITION_NUMBERS), where, problems)
         name, gaps = entry.get("name"), entry.get("gaps")
@@ -124,6 +106,27 @@ def read_positions(table: object, problems: list[str]) -> tuple[Position, ...]:
         if len(problems) == before:
             found.append(Position(name=str(name), gaps=tuple((row, gap or 0.0) for row, gap in read), **fields))
     return tuple(found)
+
+
+def _tables(table: object, one: str, holds: str, problems: list[str]) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Yield the tables of an array of tables, each with its name for messages."""
+    if not isinstance(table, list):
+        problems.append(f"{one}s is {shorten(table)}: write [[{one}s]] with {holds} below it")
+        return
+    for number, entry in enumerate(table):
+        if isinstance(entry, dict):
+            yield f"{one} {number}", entry
+        else:
+            problems.append(f"{one} {number} is {shorten(entry)}: a table with {holds} was expected")
+
+
+def _moved(entry: dict[str, Any], where: str, problems: list[str]) -> dict[str, tuple[float, ...]]:
+    """Check the decentre and tilt of a row or an element."""
+    found = {}
+    for key, field in (("decentre", OFFSET), ("tilt_deg", TILT)):
+        if key in entry and (pair := _pair(entry[key], f"{where}: {key}", field, problems)) is not None:
+            found[key] = pair
+    return found
 
 
 def positions_schema() -> dict[str, Any]:
