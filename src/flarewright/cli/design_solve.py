@@ -133,6 +133,10 @@ def search(
              "unsolved": "the wanted ghosts are not met; the report tells how far each is off"}  # fmt: skip
     print(f"{words[verdict(found[0] if found else None)]}: {len(found)} lenses in {folder}, report in "
           f"{folder / 'report.html'}")  # fmt: skip
+    for number, one in enumerate(found, 1):
+        if one.fitness_any_index is not None:
+            print(f"lens-{number}: fitness {one.fitness:.3g} mm^2 with {', '.join(one.glasses.values())} "
+                  f"({one.fitness_any_index:.3g} with any index)")  # fmt: skip
 
 
 def _check_fit(state: State, problem: Problem) -> None:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,7 @@ from ..render.prepare import complete_lens
 from .objective import fitness, fitness_thesis, misfits
 from .prescription import Structure
 from .rims import clear_radii
+from .rounding import rounded
 from .search import KEPT, Candidate, Problem, State, merge, polish
 
 Floats = NDArray[np.float64]
@@ -45,6 +47,10 @@ class Outcome:
         Place and size of each target's ghost, less the target's, mm.
     ghosts : tuple of (int, int)
         Mirrors of each target's ghost.
+    glasses : dict of int to str
+        Catalogue name of the glass behind each row, where the problem asks for glasses.
+    fitness_any_index : float or None
+        Fitness before the indices became those of glasses.
     """
 
     lens: Lens
@@ -55,11 +61,14 @@ class Outcome:
     fitness_algorithm1: float
     residuals: Floats
     ghosts: tuple[tuple[int, int], ...]
+    glasses: dict[int, str] = field(default_factory=dict)
+    fitness_any_index: float | None = None
 
 
 def lens_of(
-    structure: Structure, vector: Floats, radii: Floats, *, name: str, notes: str = "", iris: Iris | None = None
-) -> Lens:
+    structure: Structure, vector: Floats, radii: Floats, *, name: str, notes: str = "", iris: Iris | None = None,
+    media: Mapping[int, Medium | None] | None = None,
+) -> Lens:  # fmt: skip
     """Make a lens of a prescription's vector.
 
     Parameters
@@ -70,11 +79,14 @@ def lens_of(
         Semi-diameters, mm (`rims.clear_radii`).
     name, notes : str
     iris : Iris, optional
+    media : mapping of int to Medium or None, optional
+        What is known to be behind some rows.
 
     Returns
     -------
     Lens
-        With the dispersion of the nearest catalogue glasses; its f-number opens the stop to the vector's diameter.
+        With the dispersion of the nearest catalogue glasses where no medium is given; its f-number opens the stop to
+        the vector's diameter.
 
     Raises
     ------
@@ -90,7 +102,10 @@ def lens_of(
             rows.append(Stop(thickness=thickness))
             continue
         n_d = float(vector[1 + 2 * count + k])
-        medium = Medium(n_d=n_d, v_d=round(nearest(n_d)[0].v_d, 2)) if structure.glass[k] else None
+        if media is not None and k in media:
+            medium = media[k]
+        else:
+            medium = Medium(n_d=n_d, v_d=round(nearest(n_d)[0].v_d, 2)) if structure.glass[k] else None
         curvature = float(vector[1 + count + k])
         rows.append(Surface(curvature=curvature, thickness=thickness, medium=medium, semi_diameter=float(radii[k])))
     rough = Lens(
@@ -124,10 +139,12 @@ def outcomes(state: State, problem: Problem, *, count: int = 5, name: str = "Des
     for run in state.runs:
         pool = list(merge(pool, run.members, KEPT))
     pool.sort(key=lambda one: one.cost)
+    # the best lens with any index need not be the best with glasses
+    tried = count if problem.glasses is None else 2 * count
     chosen: list[Candidate] = []
     found: list[Outcome] = []
     for one in pool:
-        if len(found) == count:
+        if len(found) == tried:
             break
         if any(_same(one, other) for other in chosen):
             continue
@@ -135,11 +152,14 @@ def outcomes(state: State, problem: Problem, *, count: int = 5, name: str = "Des
         fine = min(fine, one, key=lambda each: each.cost)
         if any(_same(fine, other) for other in chosen):
             continue
-        outcome = _outcome(fine, problem, f"{name} {len(found) + 1}", iris)
+        outcome = _outcome(fine, problem, name, iris)
         if outcome is not None:
             chosen.append(fine)
             found.append(outcome)
-    return tuple(found)
+    found.sort(key=lambda one: one.cost)
+    return tuple(
+        replace(one, lens=one.lens.replace(name=f"{name} {number}")) for number, one in enumerate(found[:count], 1)
+    )
 
 
 def _same(one: Candidate, other: Candidate) -> bool:
@@ -150,17 +170,25 @@ def _same(one: Candidate, other: Candidate) -> bool:
 
 
 def _outcome(one: Candidate, problem: Problem, name: str, iris: Iris | None) -> Outcome | None:
-    vector = problem.variables(one.structure).prescription(one.x)
-    residuals, _, ghosts = misfits(problem.objective, one.structure, vector)
+    aim, known = problem.objective, problem.variables(one.structure)
+    media: dict[int, Medium | None] = {row: problem.fixed_media[row] for row in problem.fixed_rows}
+    names: dict[int, str] = {}
+    any_index = None
+    if problem.glasses is not None:
+        any_index = fitness(aim, one.structure, known.prescription(one.x))
+        one, numbers = rounded(problem, one)
+        media = {**{row: problem.glasses.medium(number) for row, number in numbers.items()}, **media}
+        names = {row: medium.glass for row, medium in sorted(media.items()) if medium is not None and medium.glass}
+    vector = known.prescription(one.x)
+    residuals, _, ghosts = misfits(aim, one.structure, vector)
     if residuals is None:
         return None
-    aim = problem.objective
     try:
         radii = clear_radii(one.structure, vector, aim.slopes, aim.entrance)
-        lens = lens_of(one.structure, vector, radii, name=name, iris=iris)
+        lens = lens_of(one.structure, vector, radii, name=name, iris=iris, media=media)
     except FlarewrightError:
         return None
     return Outcome(
-        lens, one.structure, vector, one.cost, fitness(problem.objective, one.structure, vector),
-        fitness_thesis(problem.objective, one.structure, vector), residuals, ghosts,
+        lens, one.structure, vector, one.cost, fitness(aim, one.structure, vector),
+        fitness_thesis(aim, one.structure, vector), residuals, ghosts, names, any_index,
     )  # fmt: skip

@@ -64,6 +64,14 @@ def summary(state: State, found: tuple[Outcome, ...], problem: Problem) -> dict[
                 "fitness_algorithm1": one.fitness_algorithm1,
                 "f_number": one.lens.f_number,
                 "stop_row": one.structure.stop,
+                **(
+                    {}
+                    if one.fitness_any_index is None
+                    else {
+                        "fitness_any_index": one.fitness_any_index,
+                        "glasses": {str(row): glass for row, glass in one.glasses.items()},
+                    }
+                ),
                 "ghosts": [
                     {
                         "target": name,
@@ -178,12 +186,20 @@ def _section(number: int, one: Outcome, problem: Problem, target: bytes, found: 
     return (
         f"<h2>Lens {number}</h2><p>fitness {one.fitness:.3g} mm² (best matching), {one.fitness_algorithm1:.3g} "
         f"(Algorithm 1), f/{one.lens.f_number:.3g}, stop at row {one.structure.stop}: "
-        f"<code>lens-{number}.toml</code></p>"
+        f"<code>lens-{number}.toml</code>{html.escape(_glasses(one))}</p>"
         f'<figure><img src="{_inline(target)}"><figcaption>wanted</figcaption></figure>'
         f'<figure><img src="{_inline(found)}"><figcaption>found</figcaption></figure>{rendered}'
         "<details><summary>every ghost</summary><table><tr><th>wanted</th><th>ghost</th><th>place off, mm</th>"
         f"<th>radius off, mm</th></tr>{rows}</table></details>"
     )
+
+
+def _glasses(one: Outcome) -> str:
+    """Tell what a lens is made of and what that cost; nothing where any index was allowed."""
+    if one.fitness_any_index is None:
+        return ""
+    listed = ", ".join(f"{row}: {glass}" for row, glass in one.glasses.items())
+    return f"; with any index {one.fitness_any_index:.3g} mm²; glass behind row {listed}"
 
 
 def _page(data: dict[str, Any], sections: str, target: bytes) -> str:

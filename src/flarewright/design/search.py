@@ -22,7 +22,9 @@ from numpy.typing import NDArray
 
 from ..errors import ProjectError
 from ..kernels.design_search import polish_many
+from ..model import Medium
 from ..model.design import Bounds
+from .glass_list import GlassList
 from .objective import Objective
 from .prescription import Structure
 from .variables import Variables, variables
@@ -63,6 +65,10 @@ class Problem:
     fixed_rows : tuple of int
     begin_with : tuple of (Structure, ndarray)
         Prescriptions that join the first run.
+    glasses : GlassList or None
+        Every lens is made of these; the bounds of n_d are theirs.
+    fixed_media : tuple of Medium or None
+        Behind each row of the prescription whose `fixed_rows` are kept.
     """
 
     objective: Objective
@@ -72,6 +78,8 @@ class Problem:
     fixed: Floats | None = None
     fixed_rows: tuple[int, ...] = ()
     begin_with: tuple[tuple[Structure, Floats], ...] = ()
+    glasses: GlassList | None = None
+    fixed_media: tuple[Medium | None, ...] = ()
 
     def variables(self, structure: Structure) -> Variables:
         """Return the variables of a structure."""
@@ -367,17 +375,38 @@ def polish(
         groups.setdefault(structure, []).append(k)
     found: dict[int, Candidate] = {}
     for structure, which in groups.items():
-        known = problem.variables(structure)
         points = np.array([starts[k][1] for k in which])
-        ends, costs = np.empty_like(points), np.empty(len(which))
-        matches = np.empty((len(which), len(aim.targets)), np.int64)
-        polish_many(
-            points, structure.stop, structure.mirrors, aim.entrance, known.low, known.high, known.free, known.longest,
-            aim.slopes, aim.spans, aim.targets, aim.weights, aim.signed, aim.extra * aim.extra_part, aim.wishes, steps,
-            4, ENOUGH, ends, costs, matches,
-        )  # fmt: skip
+        ends, costs = polish_within(problem.variables(structure), points, aim, steps)
         found.update((k, Candidate(float(costs[m]), structure, ends[m])) for m, k in enumerate(which))
     return [found[k] for k in range(len(starts))]
+
+
+def polish_within(known: Variables, points: Floats, aim: Objective, steps: int = STEPS) -> tuple[Floats, Floats]:
+    """Run a local search from each of several points of one structure.
+
+    Parameters
+    ----------
+    known : Variables
+        Variables whose bounds are equal stay there.
+    points : ndarray, shape (B, 1 + 3 K)
+    aim : Objective
+    steps : int
+        0: only the cost is wanted.
+
+    Returns
+    -------
+    ends : ndarray, shape (B, 1 + 3 K)
+    costs : ndarray, shape (B,)
+    """
+    structure = known.structure
+    ends, costs = np.empty_like(points), np.empty(len(points))
+    matches = np.empty((len(points), len(aim.targets)), np.int64)
+    polish_many(
+        points, structure.stop, structure.mirrors, aim.entrance, known.low, known.high, known.free, known.longest,
+        aim.slopes, aim.spans, aim.targets, aim.weights, aim.signed, aim.extra * aim.extra_part, aim.wishes, steps,
+        4, ENOUGH, ends, costs, matches,
+    )  # fmt: skip
+    return ends, costs
 
 
 def merge(members: Sequence[Candidate], found: Sequence[Candidate], most: int) -> tuple[Candidate, ...]:

@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ProjectError
-from ..model import Project
+from ..model import Project, Stop
 from ..model.design import Design, GhostWish
 from ..render.prepare import Settled, settle
+from .glass_list import glass_list
 from .objective import Objective, own_objective, relative_weights
 from .prescription import Structure, structure_of, structures, surfaces_for, vector_of
 from .search import Problem
@@ -54,11 +55,16 @@ def problem_of(project: Project) -> tuple[Problem, Settled]:
         raise ProjectError("no ghost is wanted; leave some of the lens' own, or wish for new ones")
     found = _structures(design, structure, objective)
     changed = bool(design.wishes) and design.own_ghosts
+    bounds, glasses = design.bounds, None
+    if design.glasses:
+        glasses = glass_list(design.glasses, bounds.n_d)
+        bounds = bounds.replace(n_d=(float(glasses.n_d[0]), float(glasses.n_d[-1])))
     return Problem(
-        objective, found, design.bounds,
+        objective, found, bounds,
         stop_diameter=float(vector[0]) if design.brightness == "stop" else None,
         fixed=vector if design.fixed_rows else None, fixed_rows=_checked(design.fixed_rows, structure),
-        begin_with=((structure, vector),) if changed and structure in found else (),
+        begin_with=((structure, vector),) if changed and structure in found else (), glasses=glasses,
+        fixed_media=tuple(None if isinstance(row, Stop) else row.medium for row in settled.lens.rows),
     ), settled  # fmt: skip
 
 

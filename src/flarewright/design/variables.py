@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,6 +54,14 @@ class Variables:
         with np.errstate(divide="ignore"):
             x = np.concatenate([np.log(np.maximum(vector[..., :logs], 1e-12)), vector[..., logs:]], axis=-1)
         return np.asarray(np.clip(x, self.low, self.high), dtype=np.float64)
+
+    def with_indices(self, held: dict[int, float]) -> Variables:
+        """Hold the index behind some rows, given as n_d by row."""
+        low, high = self.low.copy(), self.high.copy()
+        for row, n_d in held.items():
+            low[1 + 2 * self.structure.rows + row] = high[1 + 2 * self.structure.rows + row] = n_d
+        stays = high[self.free] > low[self.free]
+        return replace(self, low=low, high=high, free=self.free[stays], longest=self.longest[stays])
 
     def random_points(self, random: np.random.Generator, count: int) -> Floats:
         """Draw starting points, shape (count, 1 + 3 K): lengths evenly by their logarithm, curvatures mostly weak."""

@@ -26,7 +26,7 @@ N_D_TOLERANCE = 0.002
 V_D_TOLERANCE = 0.02
 """... and its V_d differs by no more than this part."""
 
-_MAKERS = ("SCHOTT", "OHARA", "HOYA", "HIKARI", "CDGM", "SUMITA")
+MAKERS = ("SCHOTT", "OHARA", "HOYA", "HIKARI", "CDGM", "SUMITA")
 
 # Minerals that prescriptions call by their own names.
 _ALIASES = {
@@ -169,6 +169,21 @@ def all_names() -> tuple[str, ...]:
     return tuple(f"{row[0]} {row[1]}" for row in _catalogue().rows)
 
 
+def glasses_of(maker: str) -> tuple[CatalogueGlass, ...]:
+    """Return all glasses of one maker, in the catalogue's order; none for a name that is no maker's.
+
+    Parameters
+    ----------
+    maker : str
+        One of `MAKERS`, in capitals.
+
+    Returns
+    -------
+    tuple of CatalogueGlass
+    """
+    return tuple(_glass(k) for k, row in enumerate(_catalogue().rows) if row[0] == maker)
+
+
 def same_name(a: str, b: str) -> bool:
     """Tell whether two spellings mean the same catalogue name, a maker in front or not."""
     return _split_maker(a)[0] == _split_maker(b)[0]
@@ -183,9 +198,9 @@ def _catalogue() -> _Catalogue:
         key = _key(row[1])
         by_key[key] = (*by_key.get(key, ()), k)
 
-    # Where makers share a name the order of _MAKERS decides.
+    # Where makers share a name the order of MAKERS decides.
     for key, found in by_key.items():
-        by_key[key] = tuple(sorted(found, key=lambda k: _MAKERS.index(rows[k][0])))
+        by_key[key] = tuple(sorted(found, key=lambda k: MAKERS.index(rows[k][0])))
     n_d = np.array([row[2] for row in rows])
     v_d = np.array([row[3] for row in rows])
     return _Catalogue(rows, n_d, v_d, by_key)
@@ -206,7 +221,7 @@ def _key(name: str) -> str:
 
 def _split_maker(name: str) -> tuple[str, str | None]:
     key = _key(name)
-    for maker in _MAKERS:
+    for maker in MAKERS:
         if key.startswith(maker) and len(key) > len(maker):
             return key[len(maker) :], maker
     return key, None

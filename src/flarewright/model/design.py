@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from .base import Frozen
 
@@ -133,6 +133,9 @@ class Design(Frozen):
         A ghost that nobody wants costs this over its radius in mm.
     entrance : float
         Diameter of the entrance while searching, mm.
+    glasses : tuple of str
+        Makers ("SCHOTT"), glasses ("N-BK7", "OHARA S-BSL7") or "all": every glass of a designed lens is one of these.
+        Empty: any index within the bounds. A single name may stand without a list.
     bounds : Bounds
     """
 
@@ -146,7 +149,13 @@ class Design(Frozen):
     brightness: Literal["none", "stop", "fresnel"] = "none"
     extra: float = Field(500.0, ge=0.0, le=1e9)
     entrance: float = Field(100.0, gt=0.0, le=10000.0)
+    glasses: tuple[str, ...] = ()
     bounds: Bounds = Bounds()
+
+    @field_validator("glasses", mode="before")
+    @classmethod
+    def _one_name_is_a_list(cls, value: object) -> object:
+        return (value,) if isinstance(value, str) else value
 
     @model_validator(mode="after")
     def _rows_can_stay(self) -> Design:
