@@ -10,6 +10,7 @@ from pydantic import ValidationError
 
 from ..errors import FlarewrightError
 from ..model.base import Frozen
+from ..model.corrections import Corrections
 from ..model.ghost_model import GhostModel
 from ..model.replay_camera import ReplayCamera
 from .atomic import write_atomically
@@ -64,6 +65,11 @@ def read_ghost_model(path: str | Path) -> GhostModel:
 def read_replay_camera(path: str | Path) -> ReplayCamera:
     """Read the camera of `measure replay --camera`; raises as `read_ghost_model`."""
     return _read(path, "a replay camera", ReplayCamera)
+
+
+def read_corrections(path: str | Path) -> Corrections:
+    """Read what a person tells the search for ghosts; raises as `read_ghost_model`."""
+    return _read(path, "corrections of found ghosts", Corrections)
 
 
 def write_ghost_model(path: str | Path, model: GhostModel) -> None:

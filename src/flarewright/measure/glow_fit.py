@@ -1,4 +1,4 @@
-"""Find the light around the light: what stays beside it at every constellation is halo and star, and no ghost."""
+"""Find the light around the light: what stays beside it at every constellation is halo, and no ghost."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from ..model.ghost_model import Halo, Rgb3, Star
-from .glow import halo_radiance, offsets, star_radiance
+from ..model.ghost_model import Halo, Rgb3
+from .glow import halo_radiance, offsets
 from .numbers import Floats
 from .views import Pixels, View, halved
 
@@ -18,8 +18,6 @@ LOW = 0.2
 # pictures are halved so often: noise would pull a low quantile down
 _HALVINGS = 2
 _RINGS = 20
-# spikes stand out when their angular harmonic carries this part of the ring's light
-_SPIKY = 0.05
 
 
 def registered(views: Sequence[View], pixels: Sequence[Pixels], low: float = LOW) -> tuple[Floats, tuple[int, int]]:
@@ -97,74 +95,9 @@ def fit_halo(views: Sequence[View], pixels: Sequence[Pixels], low: float = LOW) 
     return Halo(radius_px=tuple(middles), radiance=tuple(radiance))
 
 
-def fit_star(views: Sequence[View], pixels: Sequence[Pixels], halo: Halo) -> Star | None:
-    """Return the star: spikes that stand at the same angles at every constellation.
-
-    Parameters
-    ----------
-    views, pixels
-        As in `registered`.
-    halo : Halo
-
-    Returns
-    -------
-    Star or None
-        None when no number of spikes stands out.
-    """
-    picture, (x0, y0) = registered(views, pixels, 0.5)
-    side = 2**_HALVINGS
-    y, x = np.mgrid[: picture.shape[0], : picture.shape[1]]
-    right, up = side * (x + 0.5 - x0), side * (y0 - y - 0.5)
-    radius, angle = np.hypot(right, up), np.arctan2(up, right)
-    rest = picture - halo_radiance(halo, right, up)
-    near = (radius > 6.0 * side) & (radius < 40.0 * side) & np.isfinite(rest[..., 1])
-    if near.sum() < 500:
-        return None
-    light = np.maximum(picture[near][:, 1].mean(), 1e-30)
-    strengths = {n: np.mean(rest[near][:, 1] * np.exp(-1j * n * angle[near])) for n in range(2, 37)}
-    # a comb of spikes has its first harmonic at their number; the lowest strong one is it
-    strong = [n for n, value in strengths.items() if abs(value) > _SPIKY * light]
-    if not strong:
-        return None
-    spikes = max(strong, key=lambda n: abs(strengths[n]))
-    spikes = next((n for n in strong if spikes % n == 0 and abs(strengths[n]) > 0.7 * abs(strengths[spikes])), spikes)
-    first = float(np.degrees(-np.angle(strengths[spikes]) / -spikes)) % (360.0 / spikes)
-    return _spikes(spikes, first, rest, right, up, radius)
-
-
-def _spikes(spikes: int, first_deg: float, rest: Floats, right: Floats, up: Floats, radius: Floats) -> Star:
-    """Measure a star's width and its law along the spikes."""
-    side = 2**_HALVINGS
-    apart = 360.0 / spikes
-    off = (np.degrees(np.arctan2(up, right)) - first_deg + 0.5 * apart) % apart - 0.5 * apart
-    beside = radius * np.sin(np.radians(off))
-    knots, levels, widths = [], [], []
-    for inner in np.geomspace(3.0 * side, 60.0 * side, 8):
-        ring = (radius >= inner) & (radius < 1.45 * inner) & np.isfinite(rest).all(axis=2)
-        core = ring & (np.abs(beside) < 0.7 * side)
-        if core.sum() < spikes:
-            continue
-        level = np.maximum(np.median(rest[core], axis=0), 0.0)
-        knots.append(1.2 * inner)
-        levels.append((float(level[0]), float(level[1]), float(level[2])))
-        close = ring & (np.abs(beside) < 4.0 * side)
-        weight = np.maximum(rest[close][:, 1], 0.0)
-        if weight.sum() > 0.0:
-            widths.append(float(np.sqrt((weight * beside[close] ** 2).sum() / weight.sum())))
-    if len(knots) < 2:
-        knots, levels = [3.0 * side, 60.0 * side], [(0.0, 0.0, 0.0)] * 2
-    width = max(float(np.median(widths)) if widths else float(side), 0.5)
-    return Star(
-        spikes=spikes, first_deg=first_deg, width_px=width, radius_px=tuple(map(float, knots)), radiance=tuple(levels)
-    )
-
-
-def glow(view: View, halo: Halo | None, star: Star | None) -> NDArray[np.float32]:
-    """Return halo and star as a view sees them, shape (H, W, 3)."""
+def glow(view: View, halo: Halo | None) -> NDArray[np.float32]:
+    """Return a halo as a view sees it, shape (H, W, 3)."""
     x, y = offsets(view.light_px, view.size_px, 1.0)
-    total = np.zeros((*x.shape, 3))
-    if halo is not None:
-        total += halo_radiance(halo, x, y)
-    if star is not None:
-        total += star_radiance(star, x, y)
-    return total.astype(np.float32)
+    if halo is None:
+        return np.zeros((*x.shape, 3), np.float32)
+    return halo_radiance(halo, x, y).astype(np.float32)

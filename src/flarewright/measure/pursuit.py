@@ -53,6 +53,7 @@ def pursue(
     masks: Sequence[NDArray[np.bool_]],
     *,
     most: int = 60,
+    first: Sequence[Candidate] = (),
     pool: ThreadPoolExecutor | None = None,
     tell: Callable[[str], None] = lambda _: None,
 ) -> list[Found]:
@@ -65,6 +66,8 @@ def pursue(
     masks : sequence of ndarray of bool, shape (H, W)
         Where to look.
     most : int
+    first : sequence of Candidate
+        Tried before all others.
     pool : executor, optional
     tell : callable
         Gets a line for each ghost.
@@ -81,6 +84,7 @@ def pursue(
     rest = [view.pixels[..., 1].copy() for view in shown]
     found: list[Found] = []
     refused: list[Candidate] = []
+    waiting = list(first)
     while len(found) < most:
         slopes = slopes_of(_doubted(shown, rest), rest, masks, pool=pool)
         trials = [
@@ -88,6 +92,7 @@ def pursue(
             if each.score > SCORE and not any(_same(each, other) for other in refused)
         ]  # fmt: skip
         taken = 0
+        trials, waiting = [*waiting[:4], *trials], waiting[4:]
         for trial in trials[:4]:
             if taken and trial.score < 0.6 * trials[0].score:
                 break

@@ -1,0 +1,219 @@
+"""The stages after merging: find ghosts in a run's frames, and fit them."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import FlarewrightError
+from ..io.merged import read_frame
+from ..kernels.measure_pupil import FIRST_DISC, FIRST_I
+from ..model.capture import MergedRun
+from ..model.corrections import Corrections, Pointed
+from ..model.ghost_model import AberrationGhost, GhostModel, Halo, Reference
+from .find import Candidate
+from .fit import Shape
+from .found import Found
+from .glow import offsets
+from .glow_fit import fit_halo, glow
+from .numbers import channel_numbers
+from .pursuit import pursue
+from .settle import Settling, settle, to_model
+from .views import View, halved, views_of
+
+Tell = Callable[[str], None]
+
+# nothing is looked for nearer to the light than this, in pixels of a picture 720 wide
+AROUND_LIGHT = 40.0 / 720.0
+# ghosts are looked for in pictures halved until they are no wider
+SEARCH_WIDTH = 400
+
+
+def read_views(folder: Path, run: MergedRun, every: int = 1) -> tuple[View, ...]:
+    """Read every n-th frame of a run, by rising constellation; the others are never opened.
+
+    Raises
+    ------
+    FlarewrightError
+        When frames cannot be read or are too few.
+    """
+    frames = sorted(run.frames, key=lambda each: (each.constellation_deg, each.roll_deg))
+    largest = max((abs(each.constellation_deg) for each in frames), default=0.0)
+    return views_of([read_frame(folder, info) for info in frames[::every]], largest)
+
+
+def masks_of(views: Sequence[View]) -> list[NDArray[np.bool_]]:
+    """Return where ghosts are looked for: where all colours were measured, away from the light."""
+    out = []
+    for view in views:
+        x, y = offsets(view.light_px, view.size_px, 1.0)
+        far = np.hypot(x, y) > AROUND_LIGHT * view.size_px[0]
+        out.append(far & np.isfinite(view.variance).all(axis=2))
+    return out
+
+
+def coarse(view: View, times: int) -> View:
+    """Return a view at a lower resolution, with its own pixels as the unit."""
+    factor = 0.5**times
+    x, y, cosine, sine, _ = view.frame
+    return replace(
+        view, frame=np.array([x * factor, y * factor, cosine, sine, 1.0]),
+        light_px=(view.light_px[0] * factor, view.light_px[1] * factor), pixels=halved(view.pixels, times),
+        variance=halved(view.variance, times, variance=True),
+    )  # fmt: skip
+
+
+def enlarged(shape: Shape, factor: float) -> Shape:
+    """Return a shape in pixels that are smaller by a factor."""
+    numbers = shape.numbers.copy()
+    numbers[:FIRST_I] *= factor
+    numbers[FIRST_I:FIRST_DISC] *= factor**2
+    return replace(shape, numbers=numbers)
+
+
+def dimmed(views: Sequence[View]) -> tuple[list[View], Halo | None]:
+    """Return the views without the light around the light, masked pixels without weight, and that light."""
+    shown = [np.where(np.isfinite(view.variance), view.pixels, np.nan).astype(np.float32) for view in views]
+    halo = fit_halo(views, shown)
+    out = []
+    for view, mask in zip(views, masks_of(views), strict=True):
+        variance = np.where(mask[..., None], view.variance, np.inf).astype(np.float32)
+        out.append(replace(view, pixels=view.pixels - glow(view, halo), variance=variance))
+    return out, halo
+
+
+def find_ghosts(
+    folder: Path,
+    run: MergedRun,
+    *,
+    every: int = 1,
+    corrections: Corrections | None = None,
+    most: int = 60,
+    threads: int | None = None,
+    tell: Tell = lambda _: None,
+) -> GhostModel:
+    """Find the ghosts of a merged run.
+
+    Parameters
+    ----------
+    folder : Path
+    run : MergedRun
+    every : int
+        Only every n-th constellation is looked at; the others never enter.
+    corrections : Corrections, optional
+        What a person knows better.
+    most : int
+        Ghosts.
+    threads : int, optional
+    tell : callable
+        Gets a line for each ghost.
+
+    Returns
+    -------
+    GhostModel
+        Rough: all colours of a ghost have green's shape.
+
+    Raises
+    ------
+    FlarewrightError
+        When frames cannot be read or are too few.
+    """
+    views = read_views(folder, run, every)
+    shown, halo = dimmed(views)
+    times = max(0, int(np.ceil(np.log2(run.size_px[0] / SEARCH_WIDTH))))
+    small = [coarse(view, times) for view in shown]
+    pointed = [_pointed(each, small, 2.0**times, run) for each in (corrections.add if corrections else ())]
+    measured = [np.asarray(np.isfinite(view.variance).all(axis=2)) for view in small]
+    with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
+        found = pursue(small, measured, most=most, first=pointed, pool=pool, tell=tell)
+    back = []
+    for ghost in found:
+        red, green, blue = (enlarged(shape, 2.0**times) for shape in ghost.shapes)
+        back.append(replace(ghost, shapes=(red, green, blue)))
+    ghosts = to_model(back, views)
+    if corrections:
+        ghosts = tuple(ghost for ghost in ghosts if ghost.name not in corrections.remove)
+    return _model(run, ghosts, halo, views)
+
+
+def _pointed(pointed: Pointed, views: Sequence[View], factor: float, run: MergedRun) -> Candidate:
+    """Turn a ghost that a person pointed at, in one frame, into a candidate."""
+    angles = np.array([view.constellation_deg for view in views])
+    at = int(np.argmin(np.abs(angles - pointed.constellation_deg)))
+    if not views[at].sigma > 0.0:
+        raise FlarewrightError("a ghost pointed at with the light on the axis tells no speed; point at it elsewhere")
+    x, y, cosine, sine, _ = views[at].frame
+    along = (pointed.centre_px[0] / factor - x) * cosine - (pointed.centre_px[1] / factor - y) * sine
+    if max(run.size_px) < pointed.radius_px:
+        raise FlarewrightError(f"a ghost of radius {pointed.radius_px:g} pixels is larger than the picture")
+    return Candidate(float(along / views[at].sigma), pointed.radius_px / factor, 0, len(views) - 1, 1e9)
+
+
+def fit_ghosts(
+    folder: Path,
+    run: MergedRun,
+    rough: GhostModel,
+    *,
+    every: int = 1,
+    how: Settling | None = None,
+    threads: int | None = None,
+    tell: Tell = lambda _: None,
+) -> GhostModel:
+    """Fit the ghosts that were found, all colours and all constellations.
+
+    Parameters
+    ----------
+    folder : Path
+    run : MergedRun
+    rough : GhostModel
+        From `find_ghosts`, perhaps changed by hand.
+    every : int
+        As for `find_ghosts`.
+    how : Settling, optional
+    threads : int, optional
+    tell : callable
+
+    Returns
+    -------
+    GhostModel
+
+    Raises
+    ------
+    FlarewrightError
+        When frames cannot be read, or a ghost is none that is fitted here.
+    """
+    views = read_views(folder, run, every)
+    shown, halo = dimmed(views)
+    found = [_found(ghost, views) for ghost in rough.ghosts if isinstance(ghost, AberrationGhost)]
+    if len(found) < len(rough.ghosts):
+        raise FlarewrightError("a Bezier ghost cannot be fitted over all constellations; take it out of the model")
+    with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
+        settled = settle(found, shown, how=how or Settling(), pool=pool, tell=tell)
+    return _model(run, to_model(settled, views), halo, views)
+
+
+def _found(ghost: AberrationGhost, views: Sequence[View]) -> Found:
+    """Return a model's ghost as the fitter takes it."""
+    shapes = [Shape(channel_numbers(each), len(each.discs)) for each in (ghost.red, ghost.green, ghost.blue)]
+    there = [
+        k for k, view in enumerate(views) if ghost.visible_deg[0] <= view.constellation_deg <= ghost.visible_deg[1]
+    ]
+    first, last = (there[0], there[-1]) if there else (0, len(views) - 1)
+    return Found((shapes[0], shapes[1], shapes[2]), first, last)
+
+
+def _model(run: MergedRun, ghosts: tuple[AberrationGhost, ...], halo: Halo | None, views: Sequence[View]) -> GhostModel:
+    angles = [each.constellation_deg for each in run.frames]
+    used = [view.constellation_deg for view in views]
+    return GhostModel(
+        size_px=run.size_px, axis_px=run.axis_px, focal_px=run.px_per_rad,
+        largest_deg=max(abs(angle) for angle in angles), constellation_deg=(min(used), max(used)), ghosts=ghosts,
+        halo=halo,
+        reference=Reference(iso=run.reference_iso, f_number=run.reference_f_number, exposure_s=1.0),
+    )  # fmt: skip

@@ -1,0 +1,68 @@
+"""Find and fit as stages of a run's folder, from the command line too."""
+
+import json
+
+import numpy as np
+import pytest
+from planted_run import GHOSTS, LARGEST, SIZE, views
+
+from flarewright.cli.app import run as command
+from flarewright.io.ghost_model_file import read_ghost_model
+from flarewright.io.merged import write_frame, write_run
+from flarewright.measure.fit import render
+from flarewright.measure.replay import replay
+from flarewright.model.capture import FrameInfo, MergedFrame, MergedRun
+
+ANGLES = np.linspace(2.0, LARGEST, 12)
+FOCAL = 900.0
+
+
+def write(folder, ghosts) -> None:
+    """Write a merged run of planted ghosts."""
+    infos = []
+    (folder / "frames").mkdir()
+    for k, view in enumerate(views(ghosts, angles=ANGLES)):
+        x, y = float(view.frame[0]), float(view.frame[1])
+        info = FrameInfo(
+            file=f"frames/{k:03d}.exr", constellation_deg=float(ANGLES[k]), nominal_deg=float(ANGLES[k]),
+            light_px=(x + FOCAL * float(np.tan(np.radians(ANGLES[k]))), y), axis_px=(x, y),
+        )  # fmt: skip
+        write_frame(folder, MergedFrame(info, view.pixels, view.variance))
+        infos.append(info)
+    write_run(folder, MergedRun(size_px=SIZE, frames=tuple(infos), axis_px=(x, y), px_per_rad=FOCAL))
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    place = tmp_path_factory.mktemp("run")
+    write(place, GHOSTS[1:2])
+    return place
+
+
+def test_found_and_fitted_from_even_angles_replays_the_odd_ones(folder, capsys):
+    assert command(["measure", "find", str(folder), "--every", "2", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["find"]["ghosts"] == 1
+    assert command(["measure", "fit", str(folder), "--every", "2"]) == 0
+    model = read_ghost_model(folder / "model.json")
+    assert len(model.ghosts) == 1
+    for angle, view in zip(ANGLES[1:-1:2], views((), angles=ANGLES[1:-1:2]), strict=True):
+        truth = render(GHOSTS[1], view)
+        error = replay(model, float(angle))[0].pixels[..., 1] - truth
+        assert np.sqrt((error**2).mean()) < 0.03 * np.sqrt((truth**2).mean())
+
+
+def test_a_person_can_take_a_ghost_away_and_point_at_one(folder, tmp_path, capsys):
+    path = tmp_path / "corrections.json"
+    x = 0.5 * SIZE[0] + 2.3 + 55.0 * np.tan(np.radians(ANGLES[8])) / np.tan(np.radians(LARGEST))
+    pointed = {"constellation_deg": ANGLES[8], "centre_px": [x, 0.5 * SIZE[1] - 1.6], "radius_px": 14.0}
+    path.write_text(json.dumps({"add": [pointed], "remove": ["1"]}))
+    assert command(["measure", "find", str(folder), "--corrections", str(path), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["find"]["ghosts"] == 0
+
+
+def test_fitting_needs_finding_first(tmp_path, capsys):
+    write(tmp_path, ())
+    assert command(["measure", "fit", str(tmp_path)]) == 2
+    assert "measure find" in capsys.readouterr().err
+    assert command(["measure", "find", str(tmp_path), "--every", "9"]) == 2
+    assert "too few" in capsys.readouterr().err
