@@ -247,8 +247,16 @@ def test_a_hand_is_followed_and_let_go(project):
     assert screen.wait(60.0)
     assert screen.picture.grade == "final"
     assert screen.picture.project.lights[0].field_deg == (3.0, 1.0)
-    # the exposure is held, so that brightness can be compared
+    # the exposure is held, so that brightness can be compared, also of another coating
     assert screen.exposure_stops == exposure
+    session.do("set_coating", {"text": "none"})
+    assert screen.wait(60.0)
+    assert screen.exposure_stops == exposure
+    session.do("choose_lens", {"lens": "tessar-brendel"})
+    assert screen.wait(60.0)
+    assert screen.exposure_stops != exposure
+    session.undo()
+    assert screen.wait(60.0)
     names = picked(screen, *screen.seen.ghosts[0].centre)
     assert screen.seen.ghosts[0].name in names
     assert outline_png(screen, names[0])[:4] == b"\x89PNG"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import hashlib
 import io
 import shlex
 from collections.abc import Callable
@@ -17,6 +18,7 @@ from ..io.exr import write_exr
 from ..io.lens_writer import format_lens
 from ..io.library import lens_path, shipped
 from ..io.project_file import project_from_data, project_text, read_project
+from ..io.project_text import LENS_SUFFIXES
 from ..io.text_file import read_toml
 from ..model import Camera, Iris, Lens, Light, Preset, Project
 from ..render.prepare import complete_lens, first_order, load_lens, settle
@@ -121,11 +123,13 @@ def imported(name: str, data: bytes, folder: Path, project: Project) -> tuple[Pr
     del project
     suffix = Path(name).suffix.lower()
     plain = Path(name).name or "dropped"
-    if suffix not in (".toml", ".lens", *PICTURES):
+    if suffix not in (*LENS_SUFFIXES, *PICTURES):
         raise LensError(
             f"{plain} cannot be opened here: drop a lens (.lens or .toml), a project (.toml), or a background picture "
             "(.exr, .png, .jpg)"
         )
+    # a name of its own for other contents: what undo leads back to must stay as it was
+    folder = folder / hashlib.sha256(data).hexdigest()[:12]
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / plain
     write_atomically(path, lambda temporary: _write_bytes(temporary, data))

@@ -90,16 +90,18 @@ class Screen:
 
     def _draw(self, project: Project, view: View, check: Check) -> None:
         shown = self.picture
-        fresh = shown is None or not studio.same_scene(shown.project, project)
+        # another lens has an exposure of its own; while one is worked on it is held, so that brightness can be compared
+        fresh = shown is None or studio.lens_name(shown.project) != studio.lens_name(project)
+        changed = shown is None or not studio.same_scene(shown.project, project)
         working = view.grey or view.unclipped
         draft: Picture | None = None
-        if fresh or working or self._final_s > SOON_S:
-            if fresh:
-                self.match = Match()
-            draft = studio.take(project, "draft", view, levels=self.match.levels)
+        if changed or working or self._final_s > SOON_S:
+            draft = studio.take(project, "draft", view, levels=() if changed else self.match.levels)
             check()
             if fresh:
                 self.match = Match(exposure_stops=studio.exposure_of(draft))
+            elif changed:
+                self.match = replace(self.match, levels=())
             self._show(draft)
         if not working:
             final = studio.take(project, "final", view, progress=self._progress("final picture", check))

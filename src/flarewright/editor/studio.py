@@ -171,7 +171,7 @@ class Match:
     gain : tuple of float
         Of a draft's ghosts, R, G, B.
     exposure_stops : float
-        Found for the lens, and held while the light moves.
+        Found for the lens, and held while the light moves or the lens is edited.
     """
 
     gain: tuple[float, float, float] = (1.0, 1.0, 1.0)
@@ -249,7 +249,15 @@ def ghosts_of(picture: Picture, match: Match) -> Floats:
     return np.asarray(picture.ghosts * np.array(match.gain, dtype=np.float32))
 
 
+def lens_name(project: Project) -> str:
+    """Return the name of a project's lens, which stays while it is edited."""
+    lens = project.lens
+    if isinstance(lens, str):
+        lens = _loaded(lens, lens_path(lens).stat().st_mtime_ns)
+    return lens.name
+
+
 def same_scene(one: Project, other: Project) -> bool:
-    """Tell whether two projects differ by their lights, art and design alone, so that one exposure is fair to both."""
+    """Tell whether two projects differ by their lights, art and design alone, so that they have the same ghosts."""
     kept = other.replace(lights=one.lights, art=one.art, design=one.design, quality=one.quality)
     return bool(kept == one)

@@ -17,7 +17,7 @@ class View(Frozen):
     Attributes
     ----------
     exposure_stops : float or None
-        None: found for each lens, and held while the light moves.
+        None: found for each lens, and held while the light moves or the lens is edited.
     look : {"srgb", "filmic", "aces", "false-colour"}
     grey : bool
         Every ghost reflects alike, so that those which coatings hide are seen; drawn by matrices.

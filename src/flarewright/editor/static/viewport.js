@@ -29,7 +29,8 @@ export function viewport(canvas, app) {
     const fh = height * fit;
     return { x: room / 2 - fw / 2 + self.panX, y: h / 2 - fh / 2 + self.panY, w: fw, h: fh, mm: fw / app.state.frame.sensor[0], shift: w / 2 };
   }
-  const efl = () => app.state.lens.facts.efl || self.efl || 50;
+  // a lens without an image keeps the handles where they were
+  const efl = () => { self.efl = app.state.lens.facts.efl || self.efl || 50; return self.efl; };
   // millimetres in the upright picture to pixels of the page, and back
   const toPage = (x, y, f = frame()) => [f.x + f.w / 2 + x * f.mm, f.y + f.h / 2 - y * f.mm * stretch(f)];
   const stretch = (f) => (f.h / app.state.frame.sensor[1]) / f.mm;
