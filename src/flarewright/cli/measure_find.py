@@ -47,7 +47,7 @@ def fit(folder: Folder, every: Every = 1, threads: Threads = None, as_json: Json
 def run_stages(
     folder: Path, stages: Sequence[str], every: int, corrections: Path | None, threads: int | None, talk: bool
 ) -> dict[str, Any]:
-    """Run finding and fitting in a run's folder; finding is not repeated while it is newer than the merge.
+    """Run finding and fitting in a run's folder; a stage is not repeated while what it is made from is the same.
 
     Returns
     -------
@@ -61,6 +61,7 @@ def run_stages(
     """
     from ..io.ghost_model_file import read_corrections, read_ghost_model, write_ghost_model
     from ..io.merged import read_run
+    from ..measure.notes import is_current, note, run_digest
     from ..measure.stages import find_ghosts, fit_ghosts
 
     run = read_run(folder)
@@ -70,20 +71,31 @@ def run_stages(
         if talk:
             tell([line])
 
+    def done(stage: str, made: Path, kept: bool, **more: int) -> None:
+        ghosts = len(read_ghost_model(made).ghosts)
+        facts[stage] = {"ghosts": ghosts, **more, "file": str(made), "kept": kept}
+        if talk:
+            print(f"{made}: {ghosts} ghosts" + (", as before" if kept else ""))
+
     if "find" in stages:
         known = None if corrections is None else read_corrections(corrections)
-        found = find_ghosts(folder, run, every=every, corrections=known, threads=threads, tell=told)
-        write_ghost_model(folder / FOUND, found)
-        facts["find"] = {"ghosts": len(found.ghosts), "file": str(folder / FOUND)}
-        if talk:
-            print(f"{folder / FOUND}: {len(found.ghosts)} ghosts")
+        given = {"every": every, "corrections": None if known is None else known.model_dump_json()}
+        digest = run_digest(folder, run, given)
+        kept = is_current(folder, "find", digest, folder / FOUND)
+        if not kept:
+            found = find_ghosts(folder, run, every=every, corrections=known, threads=threads, tell=told)
+            write_ghost_model(folder / FOUND, found)
+            note(folder, "find", digest)
+        done("find", folder / FOUND, kept)
     if "fit" in stages:
         if not (folder / FOUND).is_file():
             raise FlarewrightError(f"{folder / FOUND} does not exist: run flarewright measure find {folder} first")
         rough = read_ghost_model(folder / FOUND)
-        model = fit_ghosts(folder, run, rough, every=every, threads=threads, tell=told)
-        write_ghost_model(folder / MODEL, model)
-        facts["fit"] = {"ghosts": len(model.ghosts), "found": len(rough.ghosts), "file": str(folder / MODEL)}
-        if talk:
-            print(f"{folder / MODEL}: {len(model.ghosts)} ghosts")
+        digest = run_digest(folder, run, {"every": every, "found": rough.model_dump_json()})
+        kept = is_current(folder, "fit", digest, folder / MODEL)
+        if not kept:
+            model = fit_ghosts(folder, run, rough, every=every, threads=threads, tell=told)
+            write_ghost_model(folder / MODEL, model)
+            note(folder, "fit", digest)
+        done("fit", folder / MODEL, kept, found=len(rough.ghosts))
     return facts

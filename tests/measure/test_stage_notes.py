@@ -1,0 +1,70 @@
+"""A run that is taken up again repeats the stages whose makings have changed, and no others."""
+
+import json
+import os
+
+import pytest
+from planted_run import SIZE
+from test_stages import FOCAL, write
+
+from flarewright.cli.app import run as command
+from flarewright.errors import OutputError
+from flarewright.io.ghost_model_file import read_ghost_model, write_ghost_model
+from flarewright.measure import stages
+from flarewright.measure.notes import note
+from flarewright.model.ghost_model import GhostModel
+
+
+def test_only_what_has_changed_is_done_again(tmp_path, capsys, monkeypatch):
+    write(tmp_path, ())
+    done: list[str] = []
+    model = GhostModel(
+        size_px=SIZE, axis_px=(9.0, 9.0), focal_px=FOCAL, largest_deg=20.0, constellation_deg=(0.0, 20.0)
+    )
+    for stage in ("find", "fit"):
+        monkeypatch.setattr(stages, f"{stage}_ghosts", lambda *_, stage=stage, **__: done.append(stage) or model)
+
+    def kept(*arguments: str) -> dict[str, bool]:
+        facts = {}
+        for stage in ("find", "fit"):
+            extra = arguments if stage == "find" else ()
+            assert command(["measure", stage, str(tmp_path), *extra, "--json"]) == 0
+            facts[stage] = json.loads(capsys.readouterr().out)[stage]["kept"]
+        assert done == [stage for stage, was_kept in facts.items() if not was_kept]
+        done.clear()
+        return facts
+
+    fresh, same = {"find": False, "fit": False}, {"find": True, "fit": True}
+    assert kept() == fresh
+    assert kept() == same
+    # a person edits what was found: it is kept, and fitted anew
+    found = read_ghost_model(tmp_path / "found.json")
+    write_ghost_model(tmp_path / "found.json", found.replace(remarks=("by hand",)))
+    assert kept() == {"find": True, "fit": False}
+    # other frames, and files that went away
+    frame = tmp_path / "frames" / "003.exr"
+    os.utime(frame, ns=(1, 1))
+    assert kept() == fresh
+    (tmp_path / "model.json").unlink()
+    assert kept() == {"find": True, "fit": False}
+    (tmp_path / "stages.json").write_text("{")
+    assert kept() == fresh
+    corrections = tmp_path / "corrections.json"
+    corrections.write_text('{"remove": ["7"]}')
+    assert kept("--corrections", str(corrections))["find"] is False
+    # a stage that is interrupted is not noted as done
+
+    def broken(*_args, **_kwargs):
+        raise KeyboardInterrupt
+
+    os.utime(frame, ns=(2, 2))
+    with monkeypatch.context() as patch:
+        patch.setattr(stages, "find_ghosts", broken)
+        assert command(["measure", "find", str(tmp_path)]) == 130
+    capsys.readouterr()
+    assert kept() == fresh
+
+
+def test_the_note_is_written_whole_or_not_at_all(tmp_path):
+    with pytest.raises(OutputError, match="does not exist"):
+        note(tmp_path / "nowhere", "find", "x")
