@@ -13,7 +13,7 @@ from ..kernels.measure_edges import sum_along_rows, sum_changes_along_rows
 from ..kernels.measure_mesh import draw_ghosts, draw_with_changes, window_of
 from ..kernels.measure_pupil import DISC_NUMBERS, FIRST_DISC, FIRST_G, FIRST_I
 from .numbers import NUMBERS, Floats
-from .views import Pixels, View, halved
+from .views import View, halved
 
 Indices = NDArray[np.int64]
 
@@ -359,14 +359,3 @@ def presence(shape: Shape, view: View, channel: int, error: float = MODEL_ERROR)
     even = model - (weight * model).sum() / total
     power = float((weight * even**2).sum())
     return Presence(float((weight * even * patch.pixels).sum()) / max(power, 1e-300), max(power, 1e-300) ** -0.5)
-
-
-def without(views: Sequence[View], shapes: Sequence[Shape], channel: int) -> list[Pixels]:
-    """Return one channel of the views with some shapes taken off, each of shape (H, W)."""
-    out = []
-    for view in views:
-        left = view.pixels[..., channel].astype(float)
-        for shape in shapes:
-            left = left - render(shape, view)
-        out.append(left.astype(np.float32))
-    return out

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -16,21 +16,23 @@ from ..io.merged import read_frame
 from ..kernels.measure_pupil import FIRST_DISC, FIRST_I
 from ..model.capture import MergedRun
 from ..model.corrections import Corrections, Pointed
-from ..model.ghost_model import AberrationGhost, GhostModel, Halo, Reference
+from ..model.ghost_model import AberrationGhost, GhostModel, Halo, Reference, Star
 from .find import Candidate
-from .fit import Shape
+from .fit import Shape, render
 from .found import Found
 from .glow import offsets
-from .glow_fit import fit_halo, glow
+from .glow_fit import fit_halo, fit_star, glow, register
 from .numbers import channel_numbers
 from .pursuit import pursue
 from .settle import Settling, settle, to_model
-from .views import View, halved, views_of
+from .views import Pixels, View, halved, views_of
 
 Tell = Callable[[str], None]
 
 # nothing is looked for nearer to the light than this, in pixels of a picture 720 wide
 AROUND_LIGHT = 40.0 / 720.0
+# part of the glow that may stay behind where it was taken off
+LEFT_BEHIND = 0.1
 # ghosts are looked for in pictures halved until they are no wider
 SEARCH_WIDTH = 400
 
@@ -77,15 +79,33 @@ def enlarged(shape: Shape, factor: float) -> Shape:
     return replace(shape, numbers=numbers)
 
 
-def dimmed(views: Sequence[View]) -> tuple[list[View], Halo | None]:
-    """Return the views without the light around the light, masked pixels without weight, and that light."""
+@dataclass(frozen=True)
+class Dimmed:
+    """Views without the light around the light, and that light.
+
+    Attributes
+    ----------
+    views : list of View
+        What shall not count has infinite variance; where glow was taken off they are less certain.
+    halo : Halo or None
+    star : Star or None
+    """
+
+    views: list[View]
+    halo: Halo | None
+    star: Star | None
+
+
+def dimmed(views: Sequence[View]) -> Dimmed:
+    """Take the light around the light off: what the views show beside it at every constellation."""
     shown = [np.where(np.isfinite(view.variance), view.pixels, np.nan).astype(np.float32) for view in views]
-    halo = fit_halo(views, shown)
+    halo, known = fit_halo(views, shown), register(views, shown)
     out = []
     for view, mask in zip(views, masks_of(views), strict=True):
-        variance = np.where(mask[..., None], view.variance, np.inf).astype(np.float32)
-        out.append(replace(view, pixels=view.pixels - glow(view, halo), variance=variance))
-    return out, halo
+        light = glow(view, known)
+        variance = np.where(mask[..., None], view.variance + (LEFT_BEHIND * light) ** 2, np.inf).astype(np.float32)
+        out.append(replace(view, pixels=view.pixels - light, variance=variance))
+    return Dimmed(out, halo, fit_star(known))
 
 
 def find_ghosts(
@@ -125,9 +145,9 @@ def find_ghosts(
         When frames cannot be read or are too few.
     """
     views = read_views(folder, run, every)
-    shown, halo = dimmed(views)
+    dim = dimmed(views)
     times = max(0, int(np.ceil(np.log2(run.size_px[0] / SEARCH_WIDTH))))
-    small = [coarse(view, times) for view in shown]
+    small = [coarse(view, times) for view in dim.views]
     pointed = [_pointed(each, small, 2.0**times, run) for each in (corrections.add if corrections else ())]
     measured = [np.asarray(np.isfinite(view.variance).all(axis=2)) for view in small]
     with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
@@ -139,7 +159,7 @@ def find_ghosts(
     ghosts = to_model(back, views)
     if corrections:
         ghosts = tuple(ghost for ghost in ghosts if ghost.name not in corrections.remove)
-    return _model(run, ghosts, halo, views)
+    return _model(run, ghosts, dim, views)
 
 
 def _pointed(pointed: Pointed, views: Sequence[View], factor: float, run: MergedRun) -> Candidate:
@@ -189,13 +209,26 @@ def fit_ghosts(
         When frames cannot be read, or a ghost is none that is fitted here.
     """
     views = read_views(folder, run, every)
-    shown, halo = dimmed(views)
+    dim = dimmed(views)
     found = [_found(ghost, views) for ghost in rough.ghosts if isinstance(ghost, AberrationGhost)]
     if len(found) < len(rough.ghosts):
         raise FlarewrightError("a Bezier ghost cannot be fitted over all constellations; take it out of the model")
     with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
-        settled = settle(found, shown, how=how or Settling(), pool=pool, tell=tell)
-    return _model(run, to_model(settled, views), halo, views)
+        settled = settle(found, dim.views, how=how or Settling(), pool=pool, tell=tell)
+    # what ghosts lie about the light at every constellation was in the quantile: without them it is the halo alone
+    bare = [without(settled, view, k) for k, view in enumerate(views)]
+    dim = replace(dim, halo=fit_halo(views, bare))
+    return _model(run, to_model(settled, views), dim, views)
+
+
+def without(ghosts: Sequence[Found], view: View, number: int) -> Pixels:
+    """Return a view's pixels without the ghosts that it shows, shape (H, W, 3); not a number where not measured."""
+    left = np.where(np.isfinite(view.variance), view.pixels, np.nan).astype(np.float64)
+    for ghost in ghosts:
+        if ghost.first <= number <= ghost.last:
+            for m in range(3):
+                left[..., m] -= render(ghost.shapes[m], view)
+    return left.astype(np.float32)
 
 
 def _found(ghost: AberrationGhost, views: Sequence[View]) -> Found:
@@ -208,12 +241,12 @@ def _found(ghost: AberrationGhost, views: Sequence[View]) -> Found:
     return Found((shapes[0], shapes[1], shapes[2]), first, last)
 
 
-def _model(run: MergedRun, ghosts: tuple[AberrationGhost, ...], halo: Halo | None, views: Sequence[View]) -> GhostModel:
+def _model(run: MergedRun, ghosts: tuple[AberrationGhost, ...], dim: Dimmed, views: Sequence[View]) -> GhostModel:
     angles = [each.constellation_deg for each in run.frames]
     used = [view.constellation_deg for view in views]
     return GhostModel(
         size_px=run.size_px, axis_px=run.axis_px, focal_px=run.px_per_rad,
         largest_deg=max(abs(angle) for angle in angles), constellation_deg=(min(used), max(used)), ghosts=ghosts,
-        halo=halo,
+        halo=dim.halo, star=dim.star,
         reference=Reference(iso=run.reference_iso, f_number=run.reference_f_number, exposure_s=1.0),
     )  # fmt: skip

@@ -1,0 +1,70 @@
+"""Halo and star by what stays beside the light while the camera turns."""
+
+import numpy as np
+import pytest
+from planted_run import GHOSTS, SIZE, views
+
+from flarewright.measure.fit import render
+from flarewright.measure.glow import halo_radiance, offsets, star_radiance
+from flarewright.measure.glow_fit import fit_halo, fit_star, glow, register
+from flarewright.model.ghost_model import Halo, Star
+
+HALO = Halo(
+    radius_px=(2.0, 10.0, 50.0, 600.0), radiance=((3.0, 2.0, 1.0), (1.0, 0.8, 0.5), (0.2, 0.2, 0.2), (0.05, 0.05, 0.05))
+)
+STAR = Star(
+    spikes=14, first_deg=11.0, width_px=1.3, radius_px=(2.0, 500.0), radiance=((40.0, 40.0, 30.0), (0.1, 0.1, 0.1))
+)
+
+
+def shown(star):
+    out = []
+    for k, view in enumerate(views(GHOSTS[:2], noise=0.005, angles=np.linspace(2.0, 24.0, 14))):
+        light = (20.5 + 15.3 * k, 79.5)
+        x, y = offsets(light, SIZE, 1.0)
+        pixels = view.pixels + halo_radiance(HALO, x, y) + (star_radiance(STAR, x, y) if star else 0.0)
+        seen = type(view)(
+            view.constellation_deg, view.sigma, view.frame, light, pixels.astype(np.float32), view.variance
+        )
+        out.append(seen)
+    return out
+
+
+def test_halo_is_what_stays_and_ghosts_are_not_in_it():
+    some = shown(star=False)
+    found = fit_halo(some, [view.pixels for view in some])
+    radius = np.array([12.0, 25.0, 60.0, 110.0])
+    expected, got = (halo_radiance(each, radius, 0.0 * radius) for each in (HALO, found))
+    assert np.abs(got / expected - 1.0).max() < 0.15
+
+
+def test_star_has_its_spikes_direction_width_and_law():
+    some = shown(star=True)
+    found = fit_star(register(some, [view.pixels for view in some], 0.5))
+    assert found.spikes == 14
+    apart = 360.0 / 14
+    assert abs((found.first_deg - 11.0 + 0.5 * apart) % apart - 0.5 * apart) < 0.6
+    assert found.width_px == pytest.approx(1.3, rel=0.35)
+    radius = np.array([20.0, 40.0, 70.0])
+    expected, got = (
+        star_radiance(each, radius * np.cos(np.radians(each.first_deg)), radius * np.sin(np.radians(each.first_deg)))
+        for each in (STAR, found)
+    )
+    assert np.abs(got / expected - 1.0).max() < 0.4
+
+
+def test_no_star_where_there_is_none():
+    some = shown(star=False)
+    assert fit_star(register(some, [view.pixels for view in some], 0.5)) is None
+
+
+def test_glow_taken_off_leaves_the_ghosts():
+    some = shown(star=True)
+    known = register(some, [view.pixels for view in some])
+    view = some[6]
+    ghosts = sum(render(ghost, view) for ghost in GHOSTS[:2])
+    x, y = offsets(view.light_px, SIZE, 1.0)
+    far = np.hypot(x, y) > 30.0
+    left = (view.pixels - glow(view, known))[..., 1]
+    raw = view.pixels[..., 1]
+    assert np.abs(left - ghosts)[far].mean() < 0.3 * np.abs(raw - ghosts)[far].mean()
