@@ -62,7 +62,10 @@ class Screen:
         if event["type"] != "changed":
             return
         project, view = self.session.project, self.session.view
-        wanted = (project, view.replace(exposure_stops=None, look="srgb", plate=None, plate_stops=0.0))
+        wanted = (
+            project,
+            view.replace(exposure_stops=None, found_stops=None, look="srgb", plate=None, plate_stops=0.0),
+        )
         if wanted == self._busy and not self.problem:
             # only the way it is shown has changed
             self._publish()
@@ -91,7 +94,11 @@ class Screen:
     def _draw(self, project: Project, view: View, check: Check) -> None:
         shown = self.picture
         # another lens has an exposure of its own; while one is worked on it is held, so that brightness can be compared
-        fresh = shown is None or studio.lens_name(shown.project) != studio.lens_name(project)
+        if shown is None and view.found_stops is not None:
+            self.match = Match(exposure_stops=view.found_stops)
+        fresh = (
+            view.found_stops is None if shown is None else studio.lens_name(shown.project) != studio.lens_name(project)
+        )
         changed = shown is None or not studio.same_scene(shown.project, project)
         working = view.grey or view.unclipped
         draft: Picture | None = None
@@ -112,6 +119,7 @@ class Screen:
             self.match = studio.matched(draft, final, self.match)
             if fresh:
                 self.match = replace(self.match, exposure_stops=studio.exposure_of(final))
+                self.session.remember(self.match.exposure_stops)
             self._show(final)
         grade: studio.Grade = "draft" if working else "final"
         self.seen = see(project, grade, self._progress("ghosts", check))
@@ -161,6 +169,7 @@ class Screen:
         """Find the exposure anew, by what is shown now."""
         if self.picture is not None:
             self.match = replace(self.match, exposure_stops=studio.exposure_of(self.picture, self.match))
+            self.session.remember(self.match.exposure_stops)
         self.session.set_view({"exposure_stops": None})
 
     def moving(self, light: int, x: float, y: float, revision: int) -> tuple[bytes, float] | None:

@@ -81,6 +81,12 @@ class Session:
                 raise ProjectError(sentence(error)) from None
             self._changed()
 
+    def remember(self, stops: float) -> None:
+        """Keep the exposure that was found for the lens; nobody needs to be told."""
+        with self.lock:
+            self.view = self.view.replace(found_stops=stops)
+            self._keep_it()
+
     def save(self, text: str) -> Path:
         """Write the project file and go on with it."""
         with self.lock:
@@ -108,9 +114,12 @@ class Session:
 
     def _changed(self) -> None:
         self.revision += 1
+        self._keep_it()
+        self.tell({"type": "changed"})
+
+    def _keep_it(self) -> None:
         saved = Saved(self.history, self.view, self.file, self.clean)
         self._saver.submit(lambda _: self._autosave(saved))
-        self.tell({"type": "changed"})
 
     def _autosave(self, saved: Saved) -> None:
         try:
@@ -146,5 +155,6 @@ def begin(what: str | None) -> tuple[Session, str]:
         told = "Went on where the last session ended; undo leads back." if len(saved.history.moments) > 1 else ""
         return Session(saved, keep), told
     project, file = (sample_project(), None) if given is None else given
-    fresh = Saved(past.begun(project), saved.view if saved is not None else View(), file, clean=file is not None)
+    view = View() if saved is None else saved.view.replace(found_stops=None)
+    fresh = Saved(past.begun(project), view, file, clean=file is not None)
     return Session(fresh, keep), ""

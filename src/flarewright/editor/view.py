@@ -18,6 +18,8 @@ class View(Frozen):
     ----------
     exposure_stops : float or None
         None: found for each lens, and held while the light moves or the lens is edited.
+    found_stops : float or None
+        What was found, so that a session that goes on looks as it did.
     look : {"srgb", "filmic", "aces", "false-colour"}
     grey : bool
         Every ghost reflects alike, so that those which coatings hide are seen; drawn by matrices.
@@ -31,6 +33,7 @@ class View(Frozen):
     """
 
     exposure_stops: float | None = Field(None, ge=-60.0, le=60.0)
+    found_stops: float | None = None
     look: Look = "srgb"
     grey: bool = False
     unclipped: bool = False
