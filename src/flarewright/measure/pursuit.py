@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..kernels.measure_pupil import FIRST_G, FIRST_I
 from .find import Candidate, candidates, slopes_of
 from .fit import Shape, cost_of, patches_of, presence, render
-from .found import Found, darkened
+from .found import Found, darkened, rest_of
 from .grow import Growth, grow
 from .numbers import NUMBERS
 from .settle import touch_up
@@ -54,6 +54,7 @@ def pursue(
     *,
     most: int = 60,
     first: Sequence[Candidate] = (),
+    known: Sequence[Found] = (),
     pool: ThreadPoolExecutor | None = None,
     tell: Callable[[str], None] = lambda _: None,
 ) -> list[Found]:
@@ -68,6 +69,8 @@ def pursue(
     most : int
     first : sequence of Candidate
         Tried before all others.
+    known : sequence of Found
+        Ghosts that are taken off first and stay as they are.
     pool : executor, optional
     tell : callable
         Gets a line for each ghost.
@@ -75,13 +78,14 @@ def pursue(
     Returns
     -------
     list of Found
+        The new ones.
     """
     # masked pixels weigh nothing, in all fits
     shown = [
         replace(view, variance=np.where(mask[..., None], view.variance, np.inf).astype(np.float32))
         for view, mask in zip(views, masks, strict=True)
     ]
-    rest = [view.pixels[..., 1].copy() for view in shown]
+    rest = rest_of(known, shown, 1)
     found: list[Found] = []
     refused: list[Candidate] = []
     waiting = list(first)

@@ -68,7 +68,7 @@ def settle(
     rest = [rest_of(ghosts, views, m) for m in range(CHANNELS)]
     for turn in range(how.rounds):
         for k in by_light(ghosts):
-            ghosts[k] = _again(ghosts[k], views, rest, how, turn, pool)
+            ghosts[k] = _again(ghosts[k], views, rest, how, pool)
         before = len(ghosts)
         ghosts = needed(ghosts, views, rest)
         tell(f"round {turn + 1}: {len(ghosts)} of {before} ghosts are needed")
@@ -80,7 +80,6 @@ def _again(
     views: Sequence[View],
     rest: list[list[Pixels]],
     how: Settling,
-    turn: int,
     pool: ThreadPoolExecutor | None,
 ) -> Found:
     """Fit one ghost anew in all colours and put its new light in the place of the old."""
@@ -88,10 +87,10 @@ def _again(
     shapes = list(ghost.shapes)
     for m in (1, 0, 2):
         shown = alone(ghost, m, views, rest[m], how.views)
-        if m == 1 and turn == 0:
+        if m == 1 and ghost.fits[1] is None:
             fits[m] = grow(shapes[1], shown, m, most=how.most, pool=pool) or fits[m]
         else:
-            start = shapes[m] if turn else _like(shapes[1], shapes[m], shown, m)
+            start = shapes[m] if ghost.fits[m] is not None or m == 1 else _like(shapes[1], shapes[m], shown, m)
             fits[m] = _refined(start, shown, m, fits[1], pool) or fits[m]
         fit = fits[m]
         if fit is not None:

@@ -20,7 +20,7 @@ from ..model.ghost_model import AberrationGhost, GhostModel, Halo, Reference, St
 from .find import Candidate
 from .fit import Shape, render
 from .found import Found
-from .glow import offsets
+from .glow import halo_radiance, offsets, star_radiance
 from .glow_fit import fit_halo, fit_star, glow, register
 from .numbers import channel_numbers
 from .pursuit import pursue
@@ -152,11 +152,7 @@ def find_ghosts(
     measured = [np.asarray(np.isfinite(view.variance).all(axis=2)) for view in small]
     with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
         found = pursue(small, measured, most=most, first=pointed, pool=pool, tell=tell)
-    back = []
-    for ghost in found:
-        red, green, blue = (enlarged(shape, 2.0**times) for shape in ghost.shapes)
-        back.append(replace(ghost, shapes=(red, green, blue)))
-    ghosts = to_model(back, views)
+    ghosts = to_model([_sized(ghost, 2.0**times) for ghost in found], views)
     if corrections:
         ghosts = tuple(ghost for ghost in ghosts if ghost.name not in corrections.remove)
     return _model(run, ghosts, dim, views)
@@ -182,6 +178,8 @@ def fit_ghosts(
     *,
     every: int = 1,
     how: Settling | None = None,
+    again: int = 1,
+    most: int = 60,
     threads: int | None = None,
     tell: Tell = lambda _: None,
 ) -> GhostModel:
@@ -196,6 +194,10 @@ def fit_ghosts(
     every : int
         As for `find_ghosts`.
     how : Settling, optional
+    again : int
+        How often more ghosts are looked for in what is left.
+    most : int
+        Ghosts.
     threads : int, optional
     tell : callable
 
@@ -213,12 +215,51 @@ def fit_ghosts(
     found = [_found(ghost, views) for ghost in rough.ghosts if isinstance(ghost, AberrationGhost)]
     if len(found) < len(rough.ghosts):
         raise FlarewrightError("a Bezier ghost cannot be fitted over all constellations; take it out of the model")
+    settling = how or Settling(rounds=1)
     with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
-        settled = settle(found, dim.views, how=how or Settling(), pool=pool, tell=tell)
-    # what ghosts lie about the light at every constellation was in the quantile: without them it is the halo alone
-    bare = [without(settled, view, k) for k, view in enumerate(views)]
-    dim = replace(dim, halo=fit_halo(views, bare))
+        settled = settle(found, dim.views, how=settling, pool=pool, tell=tell)
+        for _ in range(again):
+            # the quantile held ghosts too; with them known, the glow is better known and leaves more to be found
+            bare = fit_halo(views, [without(settled, view, k) for k, view in enumerate(views)])
+            dim = replace(dim, halo=bare, views=_beside(views, bare, dim.star))
+            settled += _more(settled, dim.views, most - len(settled), pool, tell)
+            settled = settle(settled, dim.views, how=settling, pool=pool, tell=tell)
+    dim = replace(dim, halo=fit_halo(views, [without(settled, view, k) for k, view in enumerate(views)]))
     return _model(run, to_model(settled, views), dim, views)
+
+
+def _beside(views: Sequence[View], halo: Halo | None, star: Star | None) -> list[View]:
+    """Return what views show beside halo and star, less certain where those are bright."""
+    out = []
+    for view, mask in zip(views, masks_of(views), strict=True):
+        x, y = offsets(view.light_px, view.size_px, 1.0)
+        light = np.zeros(view.pixels.shape, np.float32)
+        if halo is not None:
+            light += halo_radiance(halo, x, y).astype(np.float32)
+        if star is not None:
+            light += star_radiance(star, x, y).astype(np.float32)
+        variance = np.where(mask[..., None], view.variance + (LEFT_BEHIND * light) ** 2, np.inf).astype(np.float32)
+        out.append(replace(view, pixels=view.pixels - light, variance=variance))
+    return out
+
+
+def _more(
+    known: Sequence[Found], views: Sequence[View], most: int, pool: ThreadPoolExecutor, tell: Tell
+) -> list[Found]:
+    """Look for more ghosts beside the known ones, at the search's resolution."""
+    times = max(0, int(np.ceil(np.log2(views[0].size_px[0] / SEARCH_WIDTH))))
+    small = [coarse(view, times) for view in views]
+    measured = [np.asarray(np.isfinite(view.variance).all(axis=2)) for view in small]
+    found = pursue(
+        small, measured, most=max(most, 0), known=[_sized(ghost, 0.5**times) for ghost in known], pool=pool, tell=tell
+    )
+    return [_sized(ghost, 2.0**times) for ghost in found]
+
+
+def _sized(ghost: Found, factor: float) -> Found:
+    """Return a ghost in pixels that are smaller by a factor."""
+    red, green, blue = (enlarged(shape, factor) for shape in ghost.shapes)
+    return replace(ghost, shapes=(red, green, blue))
 
 
 def without(ghosts: Sequence[Found], view: View, number: int) -> Pixels:
