@@ -11,6 +11,7 @@ import pytest
 from painted import painted
 
 from flarewright.cli.app import run
+from flarewright.cli.common import remembered
 from flarewright.errors import ProjectError
 from flarewright.io.flare_cache import read_cache, write_cache
 from flarewright.io.scene_file import EXAMPLE, scene_from_data
@@ -270,6 +271,15 @@ def test_pictures_come_back_from_a_file(tmp_path):
     assert np.array_equal(back["ab"][1.5, 0.0], memory["ab"][1.5, 0.0])
 
 
+def test_what_was_drawn_is_kept_when_someone_presses_ctrl_c(tmp_path):
+    file = tmp_path / "kept.npz"
+    with pytest.raises(KeyboardInterrupt), remembered(file) as memory:
+        memory["ab"] = {(1.0, 0.0): np.ones((2, 2), "f4")}
+        raise KeyboardInterrupt
+    with remembered(file) as memory:
+        assert memory["ab"][1.0, 0.0].tolist() == [[1.0, 1.0], [1.0, 1.0]]
+
+
 def changed(**places):
     """The example with values replaced, by dotted place; None takes it away."""
     data = tomllib.loads(EXAMPLE)
@@ -414,6 +424,7 @@ def test_command_plans_a_scene_and_its_veil_is_that_of_a_final_render(tmp_path, 
     assert {one["camera"] for one in data["ranking"]} == {"A", "B"}
     for one in data["ranking"]:
         assert one["worst_veil_cd_m2"] == pytest.approx(one["rendered_veil_cd_m2"], rel=0.08)
+        assert 0.0 <= one["washed_share"] <= 1.0
     distance = np.sqrt(3.0**2 + 30.0**2 + 2.0**2)
     lux = data["cameras"][0]["lights"][0]["illuminance_lx"][0]
     assert lux == pytest.approx(np.pi * 1e7 * 0.04 / (0.04 + distance**2))

@@ -11,17 +11,14 @@ from ..errors import FlarewrightError, ProjectError
 from .common import console, print_json, progress_bar, remembered, tell
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
 
     from ..model.scene import Scene
     from ..predict.plan import Plan, Ranked
-    from ..predict.scene_page import Worst
     from ..predict.search import Found
     from ..predict.switching import Shot
+    from ..predict.worst import Worst
     from ..render.glare import VeilingGlare
-
-# pairs of camera and light whose worst moment is rendered for the report
-PICTURES = 6
 
 
 @dataclass(frozen=True)
@@ -66,6 +63,7 @@ def predict_scene(path: Path, wishes: SceneWishes) -> None:
     from ..predict.plan import plan_scene, ranking
     from ..predict.scene_data import scene_data
     from ..predict.search import best_position
+    from ..predict.worst import render_worst
 
     scene = read_scene(path)
     camera = None if wishes.near is None else _camera_number(scene, wishes.near)
@@ -79,7 +77,7 @@ def predict_scene(path: Path, wishes: SceneWishes) -> None:
             found = best_position(plan, camera, wishes.radius_m, wishes.height_m, told("position"))
         worst: list[Worst] = []
         if wishes.output is not None:
-            worst = _worst(plan, ranked, partial(maker, shown=True), told("pictures"))
+            worst = render_worst(plan, ranked, partial(maker, shown=True), told("pictures"))
     shots = _shots(plan, wishes.shortest_shot_s)
     glare = [_glare(plan, c, wishes.threads) if wishes.glare else None for c in range(len(scene.cameras))]
     tell(plan.remarks)
@@ -89,7 +87,7 @@ def predict_scene(path: Path, wishes: SceneWishes) -> None:
 
         write_text(wishes.output, scene_page(plan, ranked, shots, found, worst))
     if wishes.as_json:
-        data = scene_data(plan, ranked, shots, found, [(one, mean) for one, _, mean in worst], glare)
+        data = scene_data(plan, ranked, shots, found, worst, glare)
         print_json({**data, **({} if wishes.output is None else {"report": str(wishes.output)})})
         return
     _print(plan, ranked, shots, found)
@@ -140,27 +138,6 @@ def _shots(plan: Plan, shortest_s: float) -> Sequence[Shot]:
     from ..predict.switching import shots_of
 
     return shots_of(np.stack([plan.veil(c) for c in range(len(plan.tracks))]), plan.times_s, shortest_s)
-
-
-def _worst(plan: Plan, ranked: Sequence[Ranked], maker: Callable[..., Any], progress: Any) -> list[Worst]:
-    """Render the worst moments by themselves, in final quality, as luminance of the scene."""
-    import numpy as np
-
-    from ..predict.flare import luminance
-    from ..predict.plan import rounded_diameter
-
-    chosen = [one for one in ranked if one.worst_veil_cd_m2 > 0.0][:PICTURES]
-    out: list[Worst] = []
-    for k, one in enumerate(chosen):
-        seen = plan.pairs[one.camera][one.light].sighting
-        camera, light = plan.scene.cameras[one.camera], plan.scene.lights[one.light]
-        flare, _ = maker(camera, light, rounded_diameter(seen))
-        factor = float(seen.illuminance_lx[one.worst]) / flare.scene_scale
-        picture = flare.picture(float(seen.constellation_deg[one.worst]), float(seen.roll_deg[one.worst]))
-        shown = (picture * factor).astype(np.float32)
-        out.append((one, shown, float(luminance(shown).mean())))
-        progress((k + 1) / len(chosen), f"{light.name} in {camera.name}")
-    return out
 
 
 def _glare(plan: Plan, c: int, threads: int | None) -> VeilingGlare | None:

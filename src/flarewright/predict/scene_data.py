@@ -12,6 +12,7 @@ from .plan import Plan, Ranked
 from .search import WORTH, Found
 from .statistics import NAMES
 from .switching import Shot
+from .worst import Worst
 
 __all__ = ["found_words", "scene_data", "time_words"]
 
@@ -49,7 +50,7 @@ def scene_data(
     ranked: Sequence[Ranked],
     shots: Sequence[Shot],
     found: Found | None,
-    checks: Sequence[tuple[Ranked, float]] = (),
+    worst: Sequence[Worst] = (),
     glare: Sequence[VeilingGlare | None] = (),
 ) -> dict[str, Any]:
     """Return a planned scene as JSON holds it.
@@ -61,13 +62,13 @@ def scene_data(
     shots : sequence of Shot
         Which camera when; empty for one camera.
     found : Found or None
-    checks : sequence of (Ranked, float)
-        Veils of final renders of their own, cd/m^2, at the worst times.
+    worst : sequence of Worst
+        Final renders of their own at the worst times.
     glare : sequence of VeilingGlare or None
         By camera.
     """
     cameras, lights = plan.scene.cameras, plan.scene.lights
-    rendered = {(one.camera, one.light): veil for one, veil in checks}
+    rendered = {(one.ranked.camera, one.ranked.light): one for one in worst}
     data: dict[str, Any] = {
         "scene": plan.scene.name,
         "times_s": plan.times_s.tolist(),
@@ -83,7 +84,7 @@ def scene_data(
                 "contrast_left": one.contrast_left,
                 "seen_share": one.seen_share,
                 "brightest_stops_from_clipping": one.brightest_stops,
-                "rendered_veil_cd_m2": rendered.get((one.camera, one.light)),
+                **_rendered(rendered.get((one.camera, one.light))),
             }
             for one in ranked
         ],
@@ -114,6 +115,14 @@ def scene_data(
             "words": found_words(plan, found),
         }
     return data
+
+
+def _rendered(worst: Worst | None) -> dict[str, Any]:
+    """Return what a render of its own says of a worst time."""
+    return {
+        "rendered_veil_cd_m2": None if worst is None else worst.veil_cd_m2,
+        "washed_share": None if worst is None else worst.washed,
+    }
 
 
 def _camera(plan: Plan, c: int, glare: VeilingGlare | None) -> dict[str, Any]:

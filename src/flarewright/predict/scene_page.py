@@ -17,6 +17,7 @@ from .plan import Plan, Ranked
 from .scene_data import found_words, time_words
 from .search import Found
 from .switching import Shot
+from .worst import Worst
 
 Floats = NDArray[np.float64]
 
@@ -25,10 +26,7 @@ LINES, ROWS = 8, 40
 # of 255, and values: a picture with fewer as bright as this shows nothing
 DARKEST_SHOWN, FEWEST_SHOWN = 6, 60
 
-__all__ = ["Worst", "scene_page"]
-
-Worst = tuple[Ranked, NDArray[np.float32], float]
-"""A row of the ranking, its picture at the worst time in cd/m^2, and that picture's mean."""
+__all__ = ["scene_page"]
 
 
 def scene_page(
@@ -258,7 +256,7 @@ def _tried(plan: Plan, found: Found, place: Callable[[Floats], tuple[float, floa
 
 def _worst(plan: Plan, worst: Sequence[Worst]) -> str:
     scene = plan.scene
-    pictures = [picture for _, picture, _ in worst]
+    pictures = [one.picture for one in worst]
     if scene.luminance_cd_m2 is not None:
         # the scene's brightest is white
         stops = -float(np.log2(scene.luminance_cd_m2[1]))
@@ -269,14 +267,31 @@ def _worst(plan: Plan, worst: Sequence[Worst]) -> str:
         how = "all at one exposure"
     images = ""
     rows = []
-    for (one, _, mean), pixels in zip(worst, shown, strict=True):
+    for found, pixels in zip(worst, shown, strict=True):
+        one, mean = found.ranked, found.veil_cd_m2
         camera, light = scene.cameras[one.camera].name, scene.lights[one.light].name
         words = f"{light} in {camera}, {time_words(plan, one.worst)}, {one.worst_constellation_deg:.1f} degrees"
         if np.count_nonzero(pixels >= DARKEST_SHOWN) >= FEWEST_SHOWN:
             images += image(pixels, words, 232)
         ratio = one.worst_veil_cd_m2 / mean if mean > 0.0 else float("nan")
-        rows.append((camera, light, number(one.worst_veil_cd_m2), number(mean), number(ratio)))
-    head = ("camera", "light", "predicted veil, cd/m²", "of this picture", "ratio")
+        rows.append(
+            (
+                camera,
+                light,
+                number(one.worst_veil_cd_m2),
+                number(mean),
+                number(ratio),
+                "-" if found.washed is None else f"{found.washed:.0%}",
+            )
+        )
+    head = (
+        "camera",
+        "light",
+        "predicted veil, cd/m²",
+        "of this picture",
+        "ratio",
+        "of the picture under 90 % contrast",
+    )
     return (
         images
         + paragraph(f"Final renders, flare alone, {how}. Those with nothing to be seen are left out.")

@@ -46,10 +46,6 @@ class Statistics:
         """All of them in order, shape (5,)."""
         return np.array(astuple(self))
 
-    def scaled(self, factor: float) -> Statistics:
-        """Return them for a light so many times as bright."""
-        return Statistics(*(float(value) * factor for value in self.values))
-
 
 NAMES = tuple(field.name for field in fields(Statistics))
 

@@ -1,0 +1,75 @@
+"""The worst moments of a plan, rendered by themselves: what they look like, and whether the prediction holds there."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .contrast import washed_share
+from .curves import Progress
+from .flare import luminance
+from .plan import FlareMaker, Plan, Ranked, rounded_diameter
+
+# pairs of camera and light
+PICTURES = 6
+
+__all__ = ["Worst", "render_worst"]
+
+
+@dataclass(frozen=True)
+class Worst:
+    """A light in a camera at its worst time.
+
+    Attributes
+    ----------
+    ranked : Ranked
+    picture : ndarray, shape (H, W, 3)
+        The flare as luminance of the scene, cd/m^2.
+    veil_cd_m2 : float
+        Its mean.
+    washed : float or None
+        Part of the picture where less than nine tenths of the scene's contrast are left; None: no scene.
+    """
+
+    ranked: Ranked
+    picture: NDArray[np.float32]
+    veil_cd_m2: float
+    washed: float | None
+
+
+def render_worst(plan: Plan, ranked: Sequence[Ranked], maker: FlareMaker, progress: Progress) -> list[Worst]:
+    """Render the worst times of the first few of a ranking.
+
+    Parameters
+    ----------
+    plan : Plan
+    ranked : sequence of Ranked
+    maker : callable
+        (camera, light, diameter_deg) to a flare to be looked at, over the camera's frame.
+    progress : callable
+
+    Returns
+    -------
+    list of Worst
+    """
+    scene = plan.scene
+    chosen = [one for one in ranked if one.worst_veil_cd_m2 > 0.0][:PICTURES]
+    out = []
+    for k, one in enumerate(chosen):
+        seen = plan.pairs[one.camera][one.light].sighting
+        camera, light = scene.cameras[one.camera], scene.lights[one.light]
+        flare, _ = maker(camera, light, rounded_diameter(seen))
+        factor = float(seen.illuminance_lx[one.worst]) / flare.scene_scale
+        drawn = flare.picture(float(seen.constellation_deg[one.worst]), float(seen.roll_deg[one.worst]))
+        picture = (drawn * factor).astype(np.float32)
+        bright = luminance(picture)
+        washed = None
+        if scene.luminance_cd_m2 is not None:
+            low, high = scene.luminance_cd_m2
+            washed = washed_share(bright, np.ones_like(bright), high, low)
+        out.append(Worst(one, picture, float(bright.mean()), washed))
+        progress((k + 1) / len(chosen), f"{light.name} in {camera.name}")
+    return out
