@@ -13,7 +13,7 @@ def disc_light(constellation_deg):
     return 1e-3 * 0.5 ** (constellation_deg / 10.0)
 
 
-def painted(side_px=200, *, turns=True, peak_deg=None, size=(SIDE_MM, SIDE_MM)):
+def painted(side_px=200, *, turns_by_deg=0.0, peak_deg=None, size=(SIDE_MM, SIDE_MM)):
     """Return a flare: a disc of 6 mm radius opposite to the light, and at one constellation a bright middle."""
     width, height = side_px, max(1, round(side_px * size[1] / size[0]))
     x = ((np.arange(width) + 0.5) / width - 0.5) * size[0]
@@ -31,5 +31,5 @@ def painted(side_px=200, *, turns=True, peak_deg=None, size=(SIDE_MM, SIDE_MM)):
 
     return Flare(
         name="painted", draw=draw, size_px=(width, height), sensor=Frame(*size), f_number=4.0, scene_scale=0.05,
-        turns=turns, reach_deg=60.0,
+        turns_by_deg=turns_by_deg, reach_deg=60.0,
     )  # fmt: skip

@@ -273,9 +273,14 @@ def test_pictures_come_back_from_a_file(tmp_path):
 
 def test_what_was_drawn_is_kept_when_someone_presses_ctrl_c(tmp_path):
     file = tmp_path / "kept.npz"
-    with pytest.raises(KeyboardInterrupt), remembered(file) as memory:
-        memory["ab"] = {(1.0, 0.0): np.ones((2, 2), "f4")}
-        raise KeyboardInterrupt
+
+    def interrupted():
+        with remembered(file) as memory:
+            memory["ab"] = {(1.0, 0.0): np.ones((2, 2), "f4")}
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        interrupted()
     with remembered(file) as memory:
         assert memory["ab"][1.0, 0.0].tolist() == [[1.0, 1.0], [1.0, 1.0]]
 

@@ -50,7 +50,9 @@ def lens_flares(project: Project, quality: str, threads: int | None) -> Flares:
     final = project.replace(quality={"mode": "final"})
     compile_for_render(final, threads)
     sampled, frame = square_flare(project, statistics_quality(quality), threads=threads)
-    judge, _ = square_flare(project, final.quality, threads=threads)
+    size = tuple(max(1, round(side / sampled.pitch_mm)) for side in (frame.width, frame.height))
+    camera = final.camera.replace(size_px=size, sensor_mm=(frame.width, frame.height))
+    judge = lens_flare(final.replace(camera=camera), threads=threads)
     return Flares(sampled, frame, quality, judge, lens_flare(final, threads=threads))
 
 
@@ -117,7 +119,7 @@ def model_flare(
         f_number=reference.f_number if reference.f_number is not None else math.nan,
         scene_scale=math.nan if unit_per_cd_m2 is None else unit_per_cd_m2,
         # its frame turns, but what lies beyond the captures' border was not measured
-        turns=False,
+        turns_by_deg=None,
         least_deg=max(low - BEYOND_DEG, 0.0),
         reach_deg=high + BEYOND_DEG,
         dark_beyond=False,

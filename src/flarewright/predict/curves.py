@@ -9,7 +9,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from .statistics import NAMES, Statistics
+from .flare import Flare, luminance
+from .statistics import NAMES, Statistics, measure
 from .table import FlareTable
 
 Floats = NDArray[np.float64]
@@ -148,14 +149,14 @@ def sample_curves(
 _FOLLOWED = [NAMES.index(name) for name in ("sum_mm2", "mean", "maximum", "log_average")]
 
 
-def check_curves(curves: Curves, judge: FlareTable, count: int, progress: Progress | None = None) -> Check:
+def check_curves(curves: Curves, judge: Flare, count: int, progress: Progress | None = None) -> Check:
     """Draw the flare at constellations where the curves have no sample and compare.
 
     Parameters
     ----------
     curves : Curves
-    judge : FlareTable
-        Of a flare of better quality, over the same frame.
+    judge : Flare
+        Of better quality, over the frame itself, with pixels of the same size.
     count : int
     progress : callable, optional
 
@@ -170,7 +171,8 @@ def check_curves(curves: Curves, judge: FlareTable, count: int, progress: Progre
     chosen = sorted({float(middles[int(np.argmin(np.abs(middles - angle)))]) for angle in wanted})
     rendered = []
     for k, angle in enumerate(chosen):
-        rendered.append(judge.at(angle, curves.roll_deg).values)
+        light = luminance(judge.picture(angle, curves.roll_deg))
+        rendered.append(measure(light, np.ones_like(light), judge.sensor.area).values)
         if progress is not None:
             progress((k + 1) / len(chosen), f"check at {angle:.2f} degrees")
     predicted = [curves.at(angle).values for angle in chosen]

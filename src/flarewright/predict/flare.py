@@ -59,8 +59,8 @@ class Flare:
         Focal length, mm; None: not known.
     scene_scale : float
         Irradiance on the sensor per radiance of an extended scene.
-    turns : bool
-        Whether the roll only turns the picture.
+    turns_by_deg : float or None
+        The roll that only turns the picture, and its multiples: 0 any, a blade's angle, or None: no roll does.
     least_deg, reach_deg : float
         The smallest and the largest constellation that it knows.
     dark_beyond : bool
@@ -78,7 +78,7 @@ class Flare:
     f_number: float
     scene_scale: float
     efl: float | None = None
-    turns: bool = True
+    turns_by_deg: float | None = 0.0
     least_deg: float = 0.0
     reach_deg: float = 85.0
     dark_beyond: bool = True

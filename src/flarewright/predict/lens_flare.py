@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Sequence
 
-from ..model import Camera, Layer, Output, Project, Quality
+from ..model import Camera, Dirt, Layer, Output, Project, Quality
 from ..optics.constellation import field_angles
 from ..render.prepare import Settled, as_lens, settle
 from ..render.render import render
@@ -69,7 +69,7 @@ def lens_flare(project: Project, *, threads: int | None = None) -> Flare:
         f_number=settled.order.f_number,
         efl=settled.order.efl,
         scene_scale=float(summary["scene_irradiance_per_radiance"]),
-        turns=_turns(settled),
+        turns_by_deg=_turns_by(settled),
         reach_deg=REACH_DEG,
         fingerprint=hashlib.sha256(prepared.model_dump_json().encode()).hexdigest(),
         remarks=settled.remarks,
@@ -88,13 +88,13 @@ def square_flare(project: Project, quality: Quality, *, threads: int | None = No
     Returns
     -------
     flare : Flare
-        Over a square as wide as the sensor's diagonal, or over the sensor when the roll does more than turn the flare.
+        Over a square as wide as the sensor's diagonal, or over the sensor when no roll only turns the flare.
     frame : Frame
     """
     frame = Frame(*project.camera.sensor)
     quality = quality.replace(paths=project.quality.paths)
     turned = project.replace(quality=quality, camera=_square(project, frame))
-    if _turns(settle(turned)):
+    if _turns_by(settle(turned)) is not None:
         return lens_flare(turned, threads=threads), frame
     high = max(1, round(SIDE_PX * frame.height / frame.width))
     camera = project.camera.replace(size_px=(SIDE_PX, high), sensor_mm=(frame.width, frame.height))
@@ -106,6 +106,11 @@ def _square(project: Project, frame: Frame) -> Camera:
     return square
 
 
-def _turns(settled: Settled) -> bool:
-    """Whether roll only turns the flare: blades turn with the light then, which moves corners and no light."""
-    return all(shot.packed.symmetric for shot in make_shots(settled, make_opening(settled, None)))
+def _turns_by(settled: Settled) -> float | None:
+    """Return the roll that only turns the flare, as `Flare.turns_by_deg`."""
+    iris, dirt = settled.iris, settled.project.dirt
+    if iris.mask is not None or (dirt.in_ghosts and dirt != Dirt()):
+        return None
+    if not all(shot.packed.symmetric for shot in make_shots(settled, make_opening(settled, None))):
+        return None
+    return 0.0 if iris.blades == 0 or iris.rounding == 1.0 else 360.0 / iris.blades

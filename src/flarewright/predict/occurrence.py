@@ -37,7 +37,7 @@ class Flares:
     quality : str
         Of `sampled`: "draft", "final" or "measured".
     judge : Flare or None
-        As `sampled` at full quality; None: there is nothing better.
+        At full quality over the frame, with pixels as wide as those of `sampled`; None: there is nothing better.
     shown : Flare
         Over the frame, to be looked at.
     """
@@ -157,8 +157,7 @@ def predict_occurrence(
     )  # fmt: skip
     check = None
     if flares.judge is not None and wanted.checks > 0:
-        judge = FlareTable(flares.judge, flares.frame, drawn=known.setdefault(flares.judge.fingerprint, {}))
-        check = check_curves(curves, judge, wanted.checks, told("checks"))
+        check = check_curves(curves, flares.judge, wanted.checks, told("checks"))
     pictures = []
     if wanted.pictures:
         progress = told("pictures")

@@ -232,8 +232,8 @@ def draw_ahead(tables: Sequence[Sequence[FlareTable]], seen: Sequence[Sequence[S
                 sighting.constellation_deg, sighting.roll_deg, sighting.illuminance_lx, strict=True
             ):
                 if lux > 0.0 and table.flare.least_deg <= c <= table.flare.reach_deg:
-                    for node, at_roll, _ in table.nodes(float(c), float(roll)):
-                        wanted[id(table), node, 0.0 if table.flare.turns else at_roll] = table
+                    for node, at_roll, _, _ in table.nodes(float(c), float(roll)):
+                        wanted[id(table), node, at_roll] = table
     for k, ((_, node, roll), table) in enumerate(wanted.items()):
         table.light(node, roll)
         progress((k + 1) / len(wanted), f"{table.flare.name}, {node:.4g} degrees")
