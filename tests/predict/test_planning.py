@@ -400,12 +400,12 @@ duration_s = 20.0
 step_s = 10.0
 [[cameras]]
 name = "A"
-lens = "heliar-tronnier"
+lens = "triplet-pestrecov"
 position_m = [0.0, -20.0, 2.0]
 aim_m = [0.0, 0.0, 2.0]
 [[cameras]]
 name = "B"
-lens = "heliar-tronnier"
+lens = "triplet-pestrecov"
 position_m = [5.0, -20.0, 2.0]
 aim_m = [0.0, 0.0, 2.0]
 [[lights]]
@@ -422,7 +422,19 @@ position_m = [4.0, 10.0, 4.0]
 def test_command_plans_a_scene_and_its_veil_is_that_of_a_final_render(tmp_path, capsys):
     file, page, cache = tmp_path / "s.toml", tmp_path / "s.html", tmp_path / "s.npz"
     file.write_text(SCENE)
-    arguments = ["predict", str(file), "-o", str(page), "--near", "A", "--radius", "2", "--cache", str(cache), "--json"]
+    arguments = [
+        "predict",
+        str(file),
+        "-o",
+        str(page),
+        "--near",
+        "A",
+        "--radius",
+        "0.5",
+        "--cache",
+        str(cache),
+        "--json",
+    ]
     assert run(arguments) == 0
     first = capsys.readouterr().out
     data = json.loads(first)
@@ -480,7 +492,7 @@ def test_a_damaged_cache_and_a_lens_that_is_not_there_are_told(tmp_path, capsys)
     cache.write_bytes(b"PK nothing")
     assert run(["predict", str(file), "--cache", str(cache)]) == 2
     assert "is damaged" in capsys.readouterr().err
-    file.write_text(SCENE.replace("heliar-tronnier", "no-such-lens"))
+    file.write_text(SCENE.replace("triplet-pestrecov", "no-such-lens"))
     assert run(["predict", str(file)]) == 2
     assert "camera A: " in capsys.readouterr().err
     assert run(["predict", "heliar-tronnier", "--near", "A"]) == 2

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 # pixels across a measured flare that is drawn for statistics, or to be looked at
 SIDE_PX, SHOWN_PX = 192, 240
+# wavelengths of pictures to be looked at, evenly spread, and of those that judge, by Gauss
+SHOWN_NM, JUDGED_NM = 15, 9
 
 
 def is_model(subject: str) -> bool:
@@ -43,16 +45,18 @@ def lens_flares(project: Project, quality: str, threads: int | None) -> Flares:
     quality : {"draft", "final"}
     threads : int or None
     """
-    from ..predict.lens_flare import lens_flare, square_flare, statistics_quality
+    from ..model import Quality
+    from ..predict.lens_flare import lens_flare, luminous, square_flare, statistics_quality
     from ..predict.occurrence import Flares
     from ..render.first_run import compile_for_render
 
-    final = project.replace(quality={"mode": "final"})
+    final = project.replace(quality={"mode": "final", "wavelengths": SHOWN_NM})
     compile_for_render(final, threads)
     sampled, frame = square_flare(project, statistics_quality(quality), threads=threads)
     size = tuple(max(1, round(side / sampled.pitch_mm)) for side in (frame.width, frame.height))
     camera = final.camera.replace(size_px=size, sensor_mm=(frame.width, frame.height))
-    judge = lens_flare(final.replace(camera=camera), threads=threads)
+    judged = luminous(project.replace(camera=camera), Quality(wavelengths=JUDGED_NM, bridge=False))
+    judge = lens_flare(judged, threads=threads)
     return Flares(sampled, frame, quality, judge, lens_flare(final, threads=threads))
 
 
@@ -152,7 +156,7 @@ def scene_flare(
 
     project = camera_project(camera, light, diameter_deg)
     if shown:
-        flare = lens_flare(project.replace(quality={"mode": "final"}), threads=threads)
+        flare = lens_flare(project.replace(quality={"mode": "final", "wavelengths": SHOWN_NM}), threads=threads)
         return flare, flare.sensor
     return square_flare(project, statistics_quality(quality), threads=threads)
 

@@ -11,13 +11,14 @@ from ..render.prepare import Settled, as_lens, settle
 from ..render.render import render
 from ..render.shot import make_opening, make_shots
 from .flare import Flare, Frame
+from .wavelengths import luminous_lines
 
 # field angles are below 90 degrees, and grazing light carries nothing
 REACH_DEG = 85.0
 # pixels across what is drawn for statistics; a flare is smooth but for its brightest spots
 SIDE_PX = 192
 
-__all__ = ["lens_flare", "square_flare", "statistics_quality"]
+__all__ = ["lens_flare", "luminous", "square_flare", "statistics_quality"]
 
 
 def statistics_quality(mode: str) -> Quality:
@@ -27,7 +28,22 @@ def statistics_quality(mode: str) -> Quality:
     ----------
     mode : {"draft", "final"}
     """
-    return Quality.model_validate({"mode": mode, "wavelengths": 3, "bridge": False, "tolerance_px": 2.0})
+    return Quality.model_validate({"mode": mode, "wavelengths": 5, "bridge": False, "tolerance_px": 2.0})
+
+
+def luminous(project: Project, quality: Quality) -> Project:
+    """Return a project whose luminance is right with few wavelengths; its colours are not.
+
+    Parameters
+    ----------
+    project : Project
+    quality : Quality
+        Its wavelengths are placed for the first light's luminance.
+    """
+    light = project.lights[0]
+    lines = luminous_lines(light.spectrum, quality.wavelengths)
+    same: Project = project.replace(lights=(light.replace(spectrum=lines),), quality=quality)
+    return same
 
 
 def lens_flare(project: Project, *, threads: int | None = None) -> Flare:
@@ -88,17 +104,18 @@ def square_flare(project: Project, quality: Quality, *, threads: int | None = No
     Returns
     -------
     flare : Flare
-        Over a square as wide as the sensor's diagonal, or over the sensor when no roll only turns the flare.
+        Its luminance is right, its colours are not. Over a square as wide as the sensor's diagonal, or over the sensor
+        when no roll only turns the flare.
     frame : Frame
     """
     frame = Frame(*project.camera.sensor)
-    quality = quality.replace(paths=project.quality.paths)
-    turned = project.replace(quality=quality, camera=_square(project, frame))
+    project = luminous(project, quality.replace(paths=project.quality.paths))
+    turned = project.replace(camera=_square(project, frame))
     if _turns_by(settle(turned)) is not None:
         return lens_flare(turned, threads=threads), frame
     high = max(1, round(SIDE_PX * frame.height / frame.width))
     camera = project.camera.replace(size_px=(SIDE_PX, high), sensor_mm=(frame.width, frame.height))
-    return lens_flare(project.replace(quality=quality, camera=camera), threads=threads), frame
+    return lens_flare(project.replace(camera=camera), threads=threads), frame
 
 
 def _square(project: Project, frame: Frame) -> Camera:
