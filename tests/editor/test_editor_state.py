@@ -118,6 +118,20 @@ def test_saving_makes_the_autosave_clean_and_the_file_wins(project, tmp_path):
     assert third.file == str(path)
 
 
+def test_without_a_name_the_last_file_is_opened_again(tmp_path):
+    session, _ = begin(None)
+    session.do("move_light", {"light": 0, "x": 4.0, "y": 2.0})
+    path = session.save(str(tmp_path / "shot.toml"))
+    session.flush()
+    again, _ = begin(None)
+    assert (again.file, again.project, again.history.undo_label) == (str(path), session.project, "Move the light")
+    path.write_text(path.read_text().replace("f_number = 16.0", "f_number = 11.0"))
+    changed, _ = begin(None)
+    assert changed.project.f_number == 11.0
+    changed.undo()
+    assert changed.project.f_number == 16.0
+
+
 def test_a_refused_deed_leaves_everything_as_it_was(project):
     session, _ = begin(None)
     before = session.history

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -154,6 +155,10 @@ def begin(what: str | None) -> tuple[Session, str]:
     if saved is not None and not saved.clean and (given is None or given[0] != saved.history.present):
         told = "Went on where the last session ended; undo leads back." if len(saved.history.moments) > 1 else ""
         return Session(saved, keep), told
+    if given is None and saved is not None and saved.file is not None and Path(saved.file).is_file():
+        # what was saved may have been changed by other programs since
+        project, file = open_any(saved.file)
+        return Session(replace(saved, history=past.committed(saved.history, project, "Open")), keep), ""
     project, file = (sample_project(), None) if given is None else given
     view = View() if saved is None else saved.view.replace(found_stops=None)
     fresh = Saved(past.begun(project), view, file, clean=file is not None)
