@@ -118,6 +118,7 @@ def test_scratch_and_colors_write_lenses(folder, capsys):
         (["solve", "axis.toml", "-o", "x"], "light on the axis"),
         (["solve", "wish.toml", "-o", "x"], "place_mm"),
         (["solve", "bounds.toml", "-o", "x"], "design.bounds"),
+        (["solve", "hard.toml", "-o", "x"], "no length is given"),
         (["solve", "glass.toml", "-o", "x"], "near names: SCHOTT N-BK7"),
         (["solve", "misspelt.toml", "-o", "x"], "did you mean"),
         (["scratch", "-o", "x"], "--random N"),
@@ -145,6 +146,7 @@ def test_a_mistake_is_one_sentence(words, told, folder, capsys):
     (folder / "axis.toml").write_text(head.replace("7, 3", "0, 0"))
     (folder / "wish.toml").write_text(head + "[[design.wishes]]\nradius_mm = 1.0\n")
     (folder / "bounds.toml").write_text(head + "[design.bounds]\nn_d = [1.9, 1.6]\n")
+    (folder / "hard.toml").write_text(head + '[design.bounds]\nhard = ["length"]\n')
     (folder / "glass.toml").write_text(head + '[design]\nglasses = ["N-BK77"]\n')
     (folder / "misspelt.toml").write_text(head + "[design]\nsurface = 4\n")
     before = sorted(path.name for path in folder.iterdir())

@@ -131,6 +131,9 @@ def search(
         return
     words = {"met": "the wanted ghosts are met", "nearly": "the wanted ghosts are nearly met",
              "unsolved": "the wanted ghosts are not met; the report tells how far each is off"}  # fmt: skip
+    if not found and problem.bounds.hard:
+        print(f"no lens was found that keeps {', '.join(problem.bounds.hard)}; search longer, or widen the bounds")
+        return
     print(f"{words[verdict(found[0] if found else None)]}: {len(found)} lenses in {folder}, report in "
           f"{folder / 'report.html'}")  # fmt: skip
     for number, one in enumerate(found, 1):

@@ -14,10 +14,11 @@ from ..io.media import complete as complete_media
 from ..model import Iris, Lens, Medium, Stop, Surface
 from ..optics.paraxial import first_order
 from ..render.prepare import complete_lens
+from .constraints import kept, stiff
 from .objective import fitness, fitness_thesis, misfits
 from .prescription import Structure
 from .rims import clear_radii
-from .rounding import rounded
+from .rounding import held_indices, rounded
 from .search import KEPT, Candidate, Problem, State, merge, polish
 
 Floats = NDArray[np.float64]
@@ -25,6 +26,8 @@ Floats = NDArray[np.float64]
 # lenses whose variables differ by less than this on average are one: log lengths, curvatures (1/mm), indices
 APART = (0.15, 0.004, 0.05)
 POLISHING_STEPS = 200
+# a search all of whose minima break hard constraints is not gone through to the end
+MOST_FAILURES = 40
 
 
 @dataclass(frozen=True)
@@ -140,11 +143,12 @@ def outcomes(state: State, problem: Problem, *, count: int = 5, name: str = "Des
         pool = list(merge(pool, run.members, KEPT))
     pool.sort(key=lambda one: one.cost)
     # the best lens with any index need not be the best with glasses
-    tried = count if problem.glasses is None else 2 * count
+    enough = count if problem.glasses is None else 2 * count
     chosen: list[Candidate] = []
     found: list[Outcome] = []
+    failures = 0
     for one in pool:
-        if len(found) == tried:
+        if len(found) == enough or failures > MOST_FAILURES:
             break
         if any(_same(one, other) for other in chosen):
             continue
@@ -156,6 +160,8 @@ def outcomes(state: State, problem: Problem, *, count: int = 5, name: str = "Des
         if outcome is not None:
             chosen.append(fine)
             found.append(outcome)
+        else:
+            failures += 1
     found.sort(key=lambda one: one.cost)
     return tuple(
         replace(one, lens=one.lens.replace(name=f"{name} {number}")) for number, one in enumerate(found[:count], 1)
@@ -174,21 +180,26 @@ def _outcome(one: Candidate, problem: Problem, name: str, iris: Iris | None) -> 
     media: dict[int, Medium | None] = {row: problem.fixed_media[row] for row in problem.fixed_rows}
     names: dict[int, str] = {}
     any_index = None
-    if problem.glasses is not None:
-        any_index = fitness(aim, one.structure, known.prescription(one.x))
-        one, numbers = rounded(problem, one)
+    inside = kept(problem, one)
+    if inside is not None and problem.glasses is not None:
+        any_index = fitness(aim, one.structure, known.prescription(inside.x))
+        near, numbers = rounded(stiff(problem), inside)
+        known = known.with_indices(held_indices(problem, numbers))
+        inside = kept(problem, near, known)
         media = {**{row: problem.glasses.medium(number) for row, number in numbers.items()}, **media}
         names = {row: medium.glass for row, medium in sorted(media.items()) if medium is not None and medium.glass}
-    vector = known.prescription(one.x)
+    if inside is None:
+        return None
+    vector = known.prescription(inside.x)
     residuals, _, ghosts = misfits(aim, one.structure, vector)
     if residuals is None:
         return None
     try:
-        radii = clear_radii(one.structure, vector, aim.slopes, aim.entrance)
+        radii = clear_radii(one.structure, vector, aim.slopes, aim.entrance, edge=problem.bounds.edge)
         lens = lens_of(one.structure, vector, radii, name=name, iris=iris, media=media)
     except FlarewrightError:
         return None
     return Outcome(
-        lens, one.structure, vector, one.cost, fitness(aim, one.structure, vector),
+        lens, one.structure, vector, inside.cost, fitness(aim, one.structure, vector),
         fitness_thesis(aim, one.structure, vector), residuals, ghosts, names, any_index,
     )  # fmt: skip

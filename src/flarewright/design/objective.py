@@ -13,6 +13,7 @@ from ..kernels.design_match import match
 from ..model.design import Bounds
 from .ghosts import differentiate, evaluate
 from .prescription import Structure
+from .rims import STEEPEST
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -46,8 +47,8 @@ class Objective:
         A ghost without a target costs this over its radius.
     entrance : float
         mm.
-    wishes : ndarray, shape (3, 3)
-        Least, largest and weight of 1/efl, 1/f-number and length.
+    wishes : ndarray, shape (4, 3)
+        Least, largest and weight of 1/efl, 1/f-number and length; least edge, steepest surface and their weight.
     names : tuple of str
         What each target is, for reports.
     extra_part : float
@@ -80,8 +81,9 @@ def wishes_of(bounds: Bounds) -> Floats:
 
     Returns
     -------
-    ndarray, shape (3, 3)
-        The weights make an offence of one per cent of the limit worth a millimetre of misfit.
+    ndarray, shape (4, 3)
+        The weights make an offence of one per cent of the limit worth a millimetre of misfit, and so an edge that is
+        0.2 mm too thin.
     """
     focal, speed = bounds.focal_length, bounds.f_number
     longest = 1e9 if bounds.length is None else bounds.length
@@ -89,6 +91,7 @@ def wishes_of(bounds: Bounds) -> Floats:
         [1.0 / focal[1], 1.0 / focal[0], 100.0 * focal[0]],
         [1.0 / speed[1], 1.0 / speed[0], 100.0 * speed[0]],
         [0.0, longest, 0.0 if bounds.length is None else 100.0 / longest],
+        [bounds.edge, STEEPEST, 5.0 if "edges" in bounds.hard else 0.0],
     ])  # fmt: skip
 
 

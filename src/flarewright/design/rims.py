@@ -2,26 +2,30 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from math import sqrt
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..kernels import design_ghosts as columns
+from ..kernels.design_edges import beam_of
+from ..kernels.design_ghosts import WORK_ROWS
 from .ghosts import evaluate
 from .prescription import Structure
 
 Floats = NDArray[np.float64]
 
-# part of its radius of curvature to which a surface may reach, and the thinnest edge, mm
+# part of its radius of curvature to which a surface may reach
 STEEPEST = 0.9
-EDGE = 0.1
 # narrowest rim, mm
 LEAST = 0.5
 
 
-def clear_radii(structure: Structure, vector: Floats, slopes: Floats, entrance: float) -> Floats:
-    """Choose semi-diameters that pass the ghosts as far as surfaces neither close up nor cross.
+def clear_radii(
+    structure: Structure, vector: Floats, slopes: Floats, entrance: float, *, edge: float = 0.1
+) -> Floats:  # fmt: skip
+    """Choose semi-diameters that pass the axial beam and the ghosts as far as surfaces neither close up nor cross.
 
     Parameters
     ----------
@@ -31,6 +35,8 @@ def clear_radii(structure: Structure, vector: Floats, slopes: Floats, entrance: 
         Of the lights.
     entrance : float
         Largest diameter, mm.
+    edge : float
+        Thinnest edge, mm; where the gap is less than twice that, half the gap.
 
     Returns
     -------
@@ -43,7 +49,7 @@ def clear_radii(structure: Structure, vector: Floats, slopes: Floats, entrance: 
     """
     rows = structure.rows
     c = vector[1 + rows : 1 + 2 * rows]
-    wanted = np.full(rows, LEAST)
+    wanted = np.maximum(beam_heights(structure, vector, entrance), LEAST)
     values = evaluate(structure, vector[None], entrance)[0]
     for slope in slopes:
         for pair, value in zip(structure.pairs, values, strict=True):
@@ -52,14 +58,41 @@ def clear_radii(structure: Structure, vector: Floats, slopes: Floats, entrance: 
     with np.errstate(divide="ignore"):
         closes = np.where(c == 0.0, np.inf, STEEPEST / np.abs(c))
     radii = np.minimum(np.minimum(wanted, 0.5 * entrance), closes)
-    for k in range(rows - 1):
-        if structure.stop in (k, k + 1):
-            continue
-        common = min(radii[k], radii[k + 1])
-        limit = _apart(c[k], c[k + 1], float(vector[1 + k]), common)
+    d = vector[1 : 1 + rows]
+    for k, m in _neighbours(structure):
+        common = min(radii[k], radii[m])
+        gap = float(d[k:m].sum())
+        limit = _apart(c[k], c[m], gap, common, min(edge, 0.5 * gap))
         if limit < common:
-            radii[k], radii[k + 1] = min(radii[k], limit), min(radii[k + 1], limit)
+            radii[k], radii[m] = min(radii[k], limit), min(radii[m], limit)
     return np.asarray(radii, dtype=np.float64)
+
+
+def beam_heights(structure: Structure, vector: Floats, entrance: float) -> Floats:
+    """Return the height of the axial beam's edge on every row.
+
+    Parameters
+    ----------
+    structure : Structure
+    vector : ndarray, shape (1 + 3 K,)
+    entrance : float
+        Largest diameter of the beam in front of the lens, mm.
+
+    Returns
+    -------
+    ndarray, shape (K,)
+        mm; to first order.
+    """
+    rows = structure.rows
+    work, beam = np.empty((WORK_ROWS, rows)), np.empty(rows + 2)
+    beam_of(vector, structure.stop, float(entrance), work, beam)
+    return np.asarray(np.abs(beam[:rows] * beam[rows]), dtype=np.float64)
+
+
+def _neighbours(structure: Structure) -> list[tuple[int, int]]:
+    """List the rows whose surfaces face each other, the stop left out."""
+    surfaces = [k for k in range(structure.rows) if k != structure.stop]
+    return list(pairwise(surfaces))
 
 
 def _heights(structure: Structure, vector: Floats, pair: tuple[int, int], slope: float, entrance: float) -> Floats:
@@ -98,17 +131,23 @@ def _heights(structure: Structure, vector: Floats, pair: tuple[int, int], slope:
     return out
 
 
-def _apart(front: float, back: float, gap: float, common: float) -> float:
+def _apart(front: float, back: float, gap: float, common: float, least: float) -> float:
     """Largest radius, up to a common one, at which two surfaces stay apart."""
 
     def edge(r: float) -> float:
         return gap + _sag(back, r) - _sag(front, r)
 
-    least = min(EDGE, 0.5 * gap)
-    limit = common
-    while limit > LEAST and edge(limit) < least:
-        limit *= 0.97
-    return limit
+    if edge(common) >= least:
+        return common
+    # the gap falls with the radius throughout, and in the middle it is wide enough
+    inside, outside = 0.0, common
+    for _ in range(60):
+        middle = 0.5 * (inside + outside)
+        if edge(middle) >= least:
+            inside = middle
+        else:
+            outside = middle
+    return inside
 
 
 def _sag(c: float, r: float) -> float:

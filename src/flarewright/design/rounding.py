@@ -33,9 +33,7 @@ class _Branch:
     cost: float
 
 
-def rounded(
-    problem: Problem, one: Candidate, *, objective: Objective | None = None
-) -> tuple[Candidate, dict[int, int]]:
+def rounded(problem: Problem, one: Candidate) -> tuple[Candidate, dict[int, int]]:
     """Give a lens glasses from the problem's list so that its cost grows little.
 
     Parameters
@@ -43,8 +41,6 @@ def rounded(
     problem : Problem
         With `glasses`.
     one : Candidate
-    objective : Objective, optional
-        None: the problem's.
 
     Returns
     -------
@@ -60,7 +56,7 @@ def rounded(
     is exchanged for its neighbours in the list as long as that helps.
     """
     assert problem.glasses is not None
-    known, aim, glasses = problem.variables(one.structure), objective or problem.objective, problem.glasses
+    known, aim, glasses = problem.variables(one.structure), problem.objective, problem.glasses
     first = _Branch({}, one.x, one.cost)
     gaps = _hardest_first(known, aim, glasses, first)
     if not gaps:

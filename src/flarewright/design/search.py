@@ -436,7 +436,7 @@ def compile_kernels() -> None:
     structure = Structure(2, (True, False, False, True, False))
     aim = Objective(
         np.array([0.1]), np.array([0, 1]), np.zeros((1, 3)), np.ones((1, 3)), True, 0.0, 100.0,
-        np.array([[0.0, 1.0, 1.0], [0.0, 9.0, 1.0], [0.0, 1e9, 0.0]]), ("",),
+        np.array([[0.0, 1.0, 1.0], [0.0, 9.0, 1.0], [0.0, 1e9, 0.0], [0.1, 0.9, 5.0]]), ("",),
     )  # fmt: skip
     problem = Problem(aim, (structure,), Bounds())
     start = problem.variables(structure).random_points(np.random.default_rng(0), 1)[0]

@@ -7,6 +7,7 @@ The variables of a search are log stop diameter, log thicknesses, curvatures and
 import numpy as np
 
 from ._jit import compiled, inner
+from .design_edges import edge_row, edge_values, fill_beam
 from .design_ghosts import (
     COLUMNS,
     PLACE,
@@ -20,12 +21,14 @@ from .design_ghosts import (
     differentiate_ghosts,
     fill_suffix,
     list_ghosts,
+    reduce_rows,
 )
 from .design_match import assign
 
 # columns of targets and of weights: place on the line (mm), signed radius (mm), log irradiance
 T_PLACE, T_RADIUS, T_LIGHT = 0, 1, 2
-# wishes: least and largest 1/efl (1/mm), f-number, length from the first vertex to the last (mm), and their weights
+# wishes: least and largest 1/efl (1/mm), 1/f-number, length from the first vertex to the last (mm), and their weights;
+# then least edge (mm), steepest surface and the weight of both, for every row (`design_edges`)
 WISHES = 3
 # an extra ghost is not pushed out of sight any more beyond this radius, mm
 _TINY = 1e-3
@@ -108,7 +111,7 @@ def system_matrix(rows, stop, work):
 
 
 @inner
-def wish_values(q, rows, stop, work, wishes, out):
+def wish_values(q, rows, stop, entrance, work, wishes, beam, out):
     """Fill how far the prescription is off its wishes, weighted; 0 inside their limits."""
     _, power, a = system_matrix(rows, stop, work)
     # 1 / f-number is stop diameter over |Ma00| efl
@@ -120,13 +123,38 @@ def wish_values(q, rows, stop, work, wishes, out):
         value = -power if m == 0 else (speed if m == 1 else length)
         over = max(value - wishes[m, 1], 0.0) - max(wishes[m, 0] - value, 0.0)
         out[m] = wishes[m, 2] * over
+    if wishes[WISHES, 2] == 0.0:
+        for m in range(WISHES, out.size):
+            out[m] = 0.0
+        return
+    fill_beam(q, rows, stop, entrance, work, beam)
+    edge_values(q, rows, stop, wishes[WISHES], beam, out[WISHES:])
+    for m in range(WISHES, out.size):
+        out[m] *= wishes[WISHES, 2]
+
+
+@compiled
+def wishes_missed(q, stop, entrance, wishes, out):
+    """Tell how far a prescription is off its wishes.
+
+    Parameters
+    ----------
+    q, stop, entrance, wishes
+        As in `polish_many`.
+    out : ndarray, shape (WISHES + 2 K,)
+        Filled, times the weights.
+    """
+    rows = (q.size - 1) // 3
+    work, beam = np.empty((WORK_ROWS, rows)), np.empty(rows + 2)
+    reduce_rows(q, rows, work)
+    wish_values(q, rows, stop, entrance, work, wishes, beam, out)
 
 
 @inner
 def total_cost(ghosts, spans, slopes, signed, targets, weights, values, light, extra, chosen, taken, wished):
     """Sum the squared residuals."""
     total = 0.0
-    for m in range(WISHES):
+    for m in range(wished.size):
         total += wished[m] * wished[m]
     for s in range(slopes.size):
         for g in range(ghosts):
@@ -153,8 +181,8 @@ def _row(system, residual, m, weight, by, free, scale):
 
 @inner
 def fill_system(
-    q, rows, stop, ghosts, spans, slopes, signed, targets, weights, values, jacobian, light, light_by, extra, chosen,
-    taken, wishes, wished, free, scale, work, trail, partial, row, system,
+    q, rows, stop, entrance, ghosts, spans, slopes, signed, targets, weights, values, jacobian, light, light_by, extra,
+    chosen, taken, wishes, wished, free, scale, work, beam, trail, partial, row, system,
 ):  # fmt: skip
     """Fill the residuals (last column) and their derivatives; return how many."""
     m = 0
@@ -186,11 +214,16 @@ def fill_system(
                     r = np.sqrt(extra / abs(radius))
                     _row(system, r, m, -0.5 * r / radius, jacobian[1, g], free, scale)
                     m += 1
-    wish_values(q, rows, stop, work, wishes, wished)
+    wish_values(q, rows, stop, entrance, work, wishes, beam, wished)
     for wish in range(WISHES):
         if wished[wish] != 0.0:
             _wish_row(q, rows, stop, wish, work, trail, partial, row)
             _row(system, wished[wish], m, wishes[wish, 2], row, free, scale)
+            m += 1
+    for number in range(wished.size - WISHES):
+        if wished[WISHES + number] != 0.0:
+            edge_row(q, rows, stop, number, wishes[WISHES], work, beam, trail, partial, row)
+            _row(system, wished[WISHES + number], m, wishes[WISHES, 2], row, free, scale)
             m += 1
     return m
 
@@ -299,8 +332,8 @@ def polish_many(
         Whether radii have a sign.
     extra : float
         An extra ghost costs this over its radius.
-    wishes : ndarray, shape (WISHES, 3)
-        Least, largest and weight of 1/efl, 1/f-number and length.
+    wishes : ndarray, shape (WISHES + 1, 3)
+        Least, largest and weight of 1/efl, 1/f-number and length; least edge, steepest surface and their weight.
     steps : int
         Most steps of a search.
     patience : int
@@ -327,12 +360,12 @@ def polish_many(
     common, jacobian = np.empty((6, size)), np.empty((3, most, size))
     values, light, light_by = np.empty((most, COLUMNS)), np.zeros(most), np.zeros((most, size))
     unknowns = free.size
-    system = np.empty((3 * count + lights * most + WISHES + 4, unknowns + 1))
+    system = np.empty((3 * count + lights * most + WISHES + 2 * rows + 4, unknowns + 1))
     normal, factor = np.empty((unknowns + 1, unknowns + 1)), np.empty((unknowns, unknowns))
     step, scale, held = np.empty(unknowns), np.empty(unknowns), np.empty(unknowns, np.bool_)
     cost_table, small = np.empty((count, most)), np.empty((3, max(most, count) + 1), np.int64)
     reals, flags, taken = np.empty((3, most + 1)), np.empty(most + 1, np.bool_), np.empty(most, np.bool_)
-    wished, row = np.empty(WISHES), np.empty(size)
+    wished, beam, row = np.empty(WISHES + 2 * rows), np.empty(rows + 2), np.empty(size)
     x, trial, q = np.empty(size), np.empty(size), np.empty(size)
     chosen = np.empty(count, np.int64)
     lit = False
@@ -349,7 +382,7 @@ def polish_many(
             light_values(q, rows, stop, mirrors, values, light)
         rematch(most, spans, slopes, signed, targets, weights, values, light, extra, chosen, cost_table, small, reals,
                 flags)  # fmt: skip
-        wish_values(q, rows, stop, work, wishes, wished)
+        wish_values(q, rows, stop, entrance, work, wishes, beam, wished)
         cost = total_cost(most, spans, slopes, signed, targets, weights, values, light, extra, chosen, taken, wished)
         damping, pause, since = 1e-2, patience, 0
         for _ in range(steps):
@@ -360,8 +393,8 @@ def polish_many(
             for v in range(unknowns):
                 scale[v] = q[free[v]] if free[v] < logs else 1.0
             filled = fill_system(
-                q, rows, stop, most, spans, slopes, signed, targets, weights, values, jacobian, light, light_by, extra,
-                chosen, taken, wishes, wished, free, scale, work, trail, partial, row, system,
+                q, rows, stop, entrance, most, spans, slopes, signed, targets, weights, values, jacobian, light,
+                light_by, extra, chosen, taken, wishes, wished, free, scale, work, beam, trail, partial, row, system,
             )  # fmt: skip
             normal_equations(system, filled, unknowns, normal)
             for v in range(unknowns):
@@ -380,7 +413,7 @@ def polish_many(
                     list_ghosts(q, rows, stop, mirrors, entrance, work, values)
                     if lit:
                         light_values(q, rows, stop, mirrors, values, light)
-                    wish_values(q, rows, stop, work, wishes, wished)
+                    wish_values(q, rows, stop, entrance, work, wishes, beam, wished)
                     better = total_cost(
                         most, spans, slopes, signed, targets, weights, values, light, extra, chosen, taken, wished
                     )
@@ -400,7 +433,7 @@ def polish_many(
                 list_ghosts(q, rows, stop, mirrors, entrance, work, values)
                 if lit:
                     light_values(q, rows, stop, mirrors, values, light)
-                wish_values(q, rows, stop, work, wishes, wished)
+                wish_values(q, rows, stop, entrance, work, wishes, beam, wished)
             if cost <= enough:
                 break
             if since >= pause or stalled:

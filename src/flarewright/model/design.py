@@ -30,6 +30,11 @@ class Bounds(Frozen):
         A lens that makes no image is none, so both have limits.
     length : float or None
         Longest distance from the first vertex to the last, mm.
+    edge : float
+        Neighbouring surfaces are so far apart where the axial beam passes them, mm (half the gap where it is thinner).
+    hard : tuple of str
+        Which of focal_length, f_number, length and edges are never broken (beyond 1e-4 of a limit, 0.001 mm of an
+        edge); the first three pull like springs otherwise, edges are left alone.
     center_wavelength_nm : tuple of float
         Of quarter-wave coatings.
     film_nm, film_index : tuple of float
@@ -45,6 +50,8 @@ class Bounds(Frozen):
     focal_length: tuple[float, float] = (5.0, 2000.0)
     f_number: tuple[float, float] = (0.5, 128.0)
     length: float | None = Field(None, gt=0.0)
+    edge: float = Field(0.1, ge=0.0, le=100.0)
+    hard: tuple[Literal["focal_length", "f_number", "length", "edges"], ...] = ("edges",)
     center_wavelength_nm: tuple[float, float] = (380.0, 750.0)
     film_nm: tuple[float, float] = (25.0, 750.0)
     film_index: tuple[float, float] = (1.38, 1.9)
@@ -53,10 +60,12 @@ class Bounds(Frozen):
     def _in_order(self) -> Bounds:
         for name in type(self).model_fields:
             value = getattr(self, name)
-            if isinstance(value, tuple) and not 0.0 < value[0] <= value[1]:
+            if name != "hard" and isinstance(value, tuple) and not 0.0 < value[0] <= value[1]:
                 raise ValueError(f"{name}: the least, {value[0]:g}, should be above 0 and not above {value[1]:g}")
         if self.f_number[0] <= 0.3 or self.f_number[1] > 256.0:
             raise ValueError("f_number: lenses here are between f/0.3 and f/256")
+        if "length" in self.hard and self.length is None:
+            raise ValueError('hard names "length", but no length is given')
         return self
 
 
