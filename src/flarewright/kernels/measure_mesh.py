@@ -137,26 +137,6 @@ def _grain(parameters, disc_count, sigma, scale):
 
 
 @compiled
-def grain(parameters, disc_count, sigma, scale):
-    """Return how many spokes and rings a ghost needs.
-
-    Parameters
-    ----------
-    parameters : ndarray, shape (N,)
-    disc_count : int
-    sigma : float
-    scale : float
-        Pixels drawn per pixel of the model.
-
-    Returns
-    -------
-    spokes, rings : int
-        0 when the pupil is shut.
-    """
-    return _grain(parameters, disc_count, sigma, scale)
-
-
-@compiled
 def draw_ghosts(parameters, disc_counts, visible, sigma, frame, plane):
     """Draw ghosts of one channel on one plane.
 

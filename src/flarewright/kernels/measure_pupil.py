@@ -9,7 +9,7 @@ from math import cos, pi, sin, sqrt
 
 import numpy as np
 
-from ._jit import compiled, inner
+from ._jit import inner
 
 # monomials of u = p.p, v = p.s, w = s.s up to second order: of f, of g and of the intensity
 TERMS = 10
@@ -181,46 +181,3 @@ def place(parameters, xi, eta, sigma):
     g_xi, g_eta = 2.0 * xi * gu + sigma * gv, 2.0 * eta * gu
     along, across = sigma * f + xi * g, eta * g
     return along, across, sigma * f_xi + g + xi * g_xi, sigma * f_eta + xi * g_eta, eta * g_xi, g + eta * g_eta
-
-
-@compiled
-def land(parameters, pupil, sigma, places):
-    """Fill where pupil points land.
-
-    Parameters
-    ----------
-    parameters : ndarray, shape (N,)
-    pupil : ndarray, shape (M, 2)
-        Along the field and across it, in radii of the first rim.
-    sigma : float
-        The field over the model's largest.
-    places : ndarray, shape (M, 2)
-        Filled: along the field and across it, pixels from the axis.
-    """
-    for k in range(pupil.shape[0]):
-        along, across, _, _, _, _ = place(parameters, pupil[k, 0], pupil[k, 1], sigma)
-        places[k, 0], places[k, 1] = along, across
-
-
-@compiled
-def outline(parameters, disc_count, sigma, spokes, points):
-    """Fill the pupil's border; see `border`.
-
-    Parameters
-    ----------
-    parameters : ndarray, shape (N,)
-    disc_count : int
-        Moving discs.
-    sigma : float
-    spokes : int
-    points : ndarray, shape (spokes + 1, 2)
-        Filled; the last one is the middle.
-
-    Returns
-    -------
-    bool
-        False when nothing is open.
-    """
-    discs = np.empty((disc_count + 1, 2))
-    rims(parameters, disc_count, sigma, discs)
-    return border(discs, disc_count + 1, spokes, points, np.empty((spokes + 1, 2, 2 * disc_count + 2)))

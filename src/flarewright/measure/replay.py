@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ..errors import FlarewrightError
 from ..kernels.measure_bezier import bezier_window, draw_bezier
 from ..kernels.measure_edges import sum_along_rows
-from ..kernels.measure_mesh import draw_ghosts, window_of
+from ..kernels.measure_mesh import draw_ghosts
 from ..model.ghost_model import AberrationGhost, BezierGhost, GhostModel
 from ..model.layer import Layer
 from ..render.compose import beauty
@@ -165,23 +165,6 @@ def draw_packed(
                 window = pixels[top : top + h, left : left + w]
                 draw_bezier(bezier_numbers(ghost, constellation_deg), placed, left, top, window, _NOTHING)
     return np.maximum(pixels, 0.0)
-
-
-def window(
-    ghost: AberrationGhost, model: GhostModel, constellation_deg: float, roll_deg: float, size_px: tuple[int, int]
-) -> tuple[int, int, int, int]:
-    """Return the pixels (x, y, width, height) that a ghost touches; width 0: none."""
-    placed = _frame(model, constellation_deg, roll_deg, size_px)
-    sigma = abs(field(constellation_deg, model.largest_deg))
-    boxes = [
-        window_of(channel_numbers(channel), len(channel.discs), sigma, placed, *size_px)
-        for channel in (ghost.red, ghost.green, ghost.blue)
-    ]
-    boxes = [box for box in boxes if box[2]]
-    if not boxes:
-        return 0, 0, 0, 0
-    x, y = min(box[0] for box in boxes), min(box[1] for box in boxes)
-    return x, y, max(box[0] + box[2] for box in boxes) - x, max(box[1] + box[3] for box in boxes) - y
 
 
 def _single(
