@@ -105,13 +105,16 @@ def search(
         Of the lenses; None: after the project's.
     """
     from ..design.candidate import outcomes
-    from ..design.report import summary, verdict, write_folder
+    from ..design.impossible import obstacles
+    from ..design.report import summary, write_folder
     from ..design.search import compile_kernels
     from ..design.search import solve as run
     from ..design.target import problem_of
 
     problem, settled = problem_of(project)
     _check_fit(state, problem)
+    proven = obstacles(problem, project)
+    tell([f"impossible: {one.reason}" for one in proven])
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -123,18 +126,19 @@ def search(
             progress=progress, cancelled=asked,
         )  # fmt: skip
     found = outcomes(state, problem, count=lenses, name=name or f"After {settled.lens.name}", iris=settled.iris)
-    remarks = write_folder(folder, project, problem, state, found)
-    data = summary(state, found, problem)
+    remarks = write_folder(folder, project, problem, state, found, proven)
+    data = summary(state, found, problem, proven)
     tell([*(settled.remarks if name is None else ()), *remarks])
     if as_json:
         print_json({"folder": str(folder), **data})
         return
     words = {"met": "the wanted ghosts are met", "nearly": "the wanted ghosts are nearly met",
+             "impossible": "no lens can meet all wanted ghosts, as told above; the nearest are written",
              "unsolved": "the wanted ghosts are not met; the report tells how far each is off"}  # fmt: skip
     if not found and problem.bounds.hard:
         print(f"no lens was found that keeps {', '.join(problem.bounds.hard)}; search longer, or widen the bounds")
         return
-    print(f"{words[verdict(found[0] if found else None)]}: {len(found)} lenses in {folder}, report in "
+    print(f"{words[data['verdict']]}: {len(found)} lenses in {folder}, report in "
           f"{folder / 'report.html'}")  # fmt: skip
     for number, one in enumerate(found, 1):
         if one.fitness_any_index is not None:

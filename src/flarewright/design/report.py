@@ -18,6 +18,7 @@ from ..io.project_file import project_text
 from ..model import Output, Project, Quality
 from .candidate import Outcome
 from .ghosts import evaluate
+from .impossible import Obstacle
 from .objective import seen
 from .picture import disc_picture, png_bytes
 from .search import Problem, State
@@ -29,15 +30,19 @@ Floats = NDArray[np.float64]
 MET, NEARLY = 0.005, 0.3
 
 
-def verdict(outcome: Outcome | None) -> str:
-    """Say in a word how well the ghosts are met: "met", "nearly", "unsolved"."""
+def verdict(outcome: Outcome | None, proven: tuple[Obstacle, ...] = ()) -> str:
+    """Say in a word how well the ghosts are met: "met", "nearly", "unsolved", or "impossible" where that is proven."""
+    if proven:
+        return "impossible"
     if outcome is None:
         return "unsolved"
     worst = float(np.abs(outcome.residuals).max())
     return "met" if worst < MET else ("nearly" if worst < NEARLY else "unsolved")
 
 
-def summary(state: State, found: tuple[Outcome, ...], problem: Problem) -> dict[str, Any]:
+def summary(
+    state: State, found: tuple[Outcome, ...], problem: Problem, proven: tuple[Obstacle, ...] = ()
+) -> dict[str, Any]:
     """Return the facts of a search, ready for JSON.
 
     Parameters
@@ -45,13 +50,18 @@ def summary(state: State, found: tuple[Outcome, ...], problem: Problem) -> dict[
     state : State
     found : tuple of Outcome
     problem : Problem
+    proven : tuple of Obstacle
+        What is known to be impossible.
 
     Returns
     -------
     dict
     """
     return {
-        "verdict": verdict(found[0] if found else None),
+        "verdict": verdict(found[0] if found else None, proven),
+        "impossible": [
+            {"target": one.target, "reason": one.reason, "least_error_mm": one.least_error_mm} for one in proven
+        ],
         "seconds": state.seconds,
         "searches": state.searches,
         "seed": state.seed,
@@ -90,8 +100,9 @@ def summary(state: State, found: tuple[Outcome, ...], problem: Problem) -> dict[
 
 
 def write_folder(
-    folder: Path, project: Project, problem: Problem, state: State, found: tuple[Outcome, ...]
-) -> list[str]:
+    folder: Path, project: Project, problem: Problem, state: State, found: tuple[Outcome, ...],
+    proven: tuple[Obstacle, ...] = (),
+) -> list[str]:  # fmt: skip
     """Write project, search, lenses, pictures and report.
 
     Parameters
@@ -102,6 +113,8 @@ def write_folder(
     problem : Problem
     state : State
     found : tuple of Outcome
+    proven : tuple of Obstacle
+        What is known to be impossible.
 
     Returns
     -------
@@ -124,7 +137,7 @@ def write_folder(
         pictures = found_pictures(one, problem, project)
         draft = _draft(folder / f"lens-{number}.png", one, project, remarks)
         sections.append(_section(number, one, problem, wanted, png_bytes(pictures[0]), draft))
-    data = summary(state, found, problem)
+    data = summary(state, found, problem, proven)
     _write_text(folder / "report.html", _page(data, "".join(sections), wanted))
     return remarks
 
@@ -206,9 +219,11 @@ def _page(data: dict[str, Any], sections: str, target: bytes) -> str:
     words = {
         "met": "The wanted ghosts are met.",
         "nearly": "The wanted ghosts are nearly met.",
+        "impossible": "No lens can meet all wanted ghosts. The nearest are below; a table tells how far each is off.",
         "unsolved": "The wanted ghosts are not met: a longer search, more surfaces or wider bounds may help; the table "
         "of a lens tells which ghosts are far off.",
     }
+    told = "".join(f"<p>{html.escape(one['reason'])}.</p>" for one in data["impossible"])
     nothing = "" if sections else f'<p>No lens was found.</p><img src="{_inline(target)}">'
     return (
         '<!doctype html><html lang="en"><meta charset="utf-8"><title>Flarewright design</title><style>'
@@ -216,7 +231,7 @@ def _page(data: dict[str, Any], sections: str, target: bytes) -> str:
         "figure{display:inline-block;margin:0 .5em .5em 0}img{max-height:256px}table{border-collapse:collapse}"
         "td,th{padding:.1em .8em;text-align:right}figcaption{color:#999}</style>"
         f"<h1>Flarewright design</h1><p>{words[data['verdict']]} {data['searches']} local searches in "
-        f"{data['seconds']:.1f} s, seed {data['seed']}.</p>{nothing}{sections}</html>\n"
+        f"{data['seconds']:.1f} s, seed {data['seed']}.</p>{told}{nothing}{sections}</html>\n"
     )
 
 

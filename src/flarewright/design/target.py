@@ -13,6 +13,7 @@ from ..model import Project, Stop
 from ..model.design import Design, GhostWish
 from ..render.prepare import Settled, settle
 from .glass_list import glass_list
+from .impossible import on_the_line
 from .objective import Objective, own_objective, relative_weights
 from .prescription import Structure, structure_of, structures, surfaces_for, vector_of
 from .search import Problem
@@ -40,6 +41,7 @@ def problem_of(project: Project) -> tuple[Problem, Settled]:
         When the project's lens cannot be designed with, a wish names no ghost of it, or no lens has so many ghosts.
     """
     design = project.design or Design()
+    design = design.replace(wishes=tuple(on_the_line(wish, k, project) for k, wish in enumerate(design.wishes)))
     settled = settle(project)
     structure = structure_of(settled.lens)
     vector = vector_of(settled.lens, 2.0 * settled.order.stop_semi_diameter, settled.order.sensor_distance)

@@ -9,6 +9,7 @@ from pydantic import Field, field_validator, model_validator
 from .base import Frozen
 
 Length = Annotated[float, Field(gt=0.0, le=1000.0)]
+Place = Annotated[float, Field(ge=-10000.0, le=10000.0)]
 Index = Annotated[float, Field(gt=1.0, lt=4.0)]
 
 
@@ -82,6 +83,8 @@ class GhostWish(Frozen):
         ignore: whatever it does is fine; remove: it shall not be seen.
     place_mm : float or None
         Centre on the line from the picture's middle towards the light, mm; a ghost cannot leave that line.
+    at_mm : tuple of float or None
+        Instead of place_mm: a place in the picture, right and up of its middle, mm. The nearest one on the line counts.
     move_mm : float
         Along that line, towards the light.
     radius_mm : float or None
@@ -99,6 +102,7 @@ class GhostWish(Frozen):
     light: int | None = Field(None, ge=0)
     action: Literal["want", "ignore", "remove"] = "want"
     place_mm: float | None = Field(None, ge=-10000.0, le=10000.0)
+    at_mm: tuple[Place, Place] | None = None
     move_mm: float = Field(0.0, ge=-10000.0, le=10000.0)
     radius_mm: float | None = Field(None, ge=-10000.0, le=10000.0)
     height: float = Field(1.0, gt=0.0, le=1000.0)
@@ -108,8 +112,13 @@ class GhostWish(Frozen):
 
     @model_validator(mode="after")
     def _is_complete(self) -> GhostWish:
-        if self.ghost is None and (self.action == "remove" or self.place_mm is None or self.radius_mm is None):
-            raise ValueError('a new ghost has place_mm and radius_mm, or names the lens\' own with ghost = "j-i"')
+        nowhere = self.place_mm is None and self.at_mm is None
+        if self.ghost is None and (self.action == "remove" or nowhere or self.radius_mm is None):
+            raise ValueError(
+                'a new ghost has place_mm (or at_mm) and radius_mm, or names the lens\' own with ghost = "j-i"'
+            )
+        if self.place_mm is not None and self.at_mm is not None:
+            raise ValueError("place_mm and at_mm say the same thing twice; keep one")
         if self.radius_mm == 0.0:
             raise ValueError("radius_mm is 0: give the ghost a size")
         if self.color is not None and (min(self.color) < 0.0 or max(self.color) <= 0.0):

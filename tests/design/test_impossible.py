@@ -1,0 +1,117 @@
+"""What cannot be: nothing possible is called impossible, and what is called so misses by as much as is told."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from planted import planted
+
+from flarewright.design.candidate import outcomes
+from flarewright.design.ghosts import evaluate
+from flarewright.design.impossible import obstacles
+from flarewright.design.objective import own_objective
+from flarewright.design.reach import least_distances
+from flarewright.design.report import summary, verdict
+from flarewright.design.search import solve
+from flarewright.design.target import problem_of
+from flarewright.errors import ProjectError
+from flarewright.model import Design, GhostWish, Light, Project
+from flarewright.model.design import Bounds
+
+
+def project(*wishes, lights=((6.0, 3.0),), **design):
+    return Project(
+        lens="heliar-tronnier", f_number=16.0, lights=tuple(Light(field_deg=one) for one in lights),
+        design=Design(wishes=wishes, **design),
+    )  # fmt: skip
+
+
+@given(st.integers(0, 2**32 - 1))
+@settings(max_examples=20, deadline=None)
+def test_what_a_lens_within_the_bounds_does_is_never_impossible(seed):
+    problem, _, _ = planted()
+    random = np.random.default_rng(seed)
+    structure = problem.structures[int(random.integers(len(problem.structures)))]
+    known = problem.variables(structure)
+    vector = known.prescription(known.random_points(random, 1)[0])
+    # tight bounds around it, so that the enclosure means something
+    low, high = vector * 0.98, vector * 1.02
+    rows, air = structure.rows, ~np.array(structure.glass)
+    held = np.concatenate([np.zeros(1 + 2 * rows, bool), air])
+    low[held] = high[held] = vector[held]
+    tight = replace(
+        known, shortest=np.minimum(low, high)[: 1 + rows], largest=np.maximum(low, high)[: 1 + rows],
+        low=np.concatenate([np.log(low[: 1 + rows]), np.minimum(low, high)[1 + rows :]]),
+        high=np.concatenate([np.log(high[: 1 + rows]), np.maximum(low, high)[1 + rows :]]),
+    )  # fmt: skip
+    aim = own_objective(structure, vector, np.array([0.1, 0.2]), bounds=Bounds())
+    here = replace(problem, objective=aim, structures=(structure,))
+    object.__setattr__(here, "variables", lambda _: tight)
+    assert not least_distances(here).any()
+    assert obstacles(here) == ()
+
+
+@pytest.mark.parametrize(("free", "move_mm"), [(8, -6.0), (8, 30.0), (7, 4.0), (4, 10.0)])
+def test_few_free_variables_are_enclosed_sharply(free, move_mm):
+    # one row is free: sampling all lenses tells how near a ghost can come
+    bounds = Bounds(
+        glass=(4.0, 8.0), air=(2.0, 12.0), back_focus=(80.0, 84.0), n_d=(1.6, 1.75), least_radius=25.0, hard=()
+    )
+    wish = GhostWish(ghost="4-1", move_mm=move_mm)
+    fixed = tuple(k for k in range(9) if k != free)
+    problem, _ = problem_of(project(wish, structure="lens", fixed_rows=fixed, brightness="stop", bounds=bounds))
+    known = problem.variables(problem.structures[0])
+    obstacle = next(one for one in obstacles(problem) if one.target == "4-1")
+    many = known.prescription(known.random_points(np.random.default_rng(0), 4000))
+    values = evaluate(problem.structures[0], many, problem.objective.entrance)
+    target = problem.objective.targets[problem.objective.names.index("4-1")]
+    place = np.abs(values[..., 0] * problem.objective.slopes[0] - target[0])
+    best = np.maximum(place, np.abs(values[..., 1] - target[1])).min()
+    assert 0.7 * best < obstacle.least_error_mm <= best
+    assert "nearer than" in obstacle.reason
+
+
+def test_far_places_are_out_of_reach_of_few_surfaces():
+    far = GhostWish(place_mm=9000.0, radius_mm=0.01)
+    problem, _ = problem_of(project(far, own_ghosts=False, surfaces=2, bounds=Bounds(least_radius=200.0)))
+    (obstacle,) = obstacles(problem)
+    assert obstacle.target == "wish 0"
+    assert obstacle.least_error_mm > 100.0
+    near, _ = problem_of(project(far.replace(place_mm=1.0), own_ghosts=False, surfaces=2))
+    assert obstacles(near) == ()
+
+
+def test_places_off_the_line_are_told_with_the_nearest_on_it():
+    given = project(GhostWish(at_mm=(0.0, 5.0), radius_mm=1.0), own_ghosts=False, lights=((5.0, 0.0),))
+    problem, _ = problem_of(given)
+    (obstacle,) = obstacles(problem, given)
+    assert obstacle.least_error_mm == pytest.approx(5.0)
+    assert problem.objective.targets[0, 0] == pytest.approx(0.0, abs=1e-12)
+    on = project(GhostWish(at_mm=(3.0, 4.0), radius_mm=1.0), own_ghosts=False, lights=((0.0001 * 3, 0.0001 * 4),))
+    problem, _ = problem_of(on)
+    assert obstacles(problem, on) == ()
+    assert problem.objective.targets[0, 0] == pytest.approx(5.0)
+    with pytest.raises(ProjectError, match="say which"):
+        problem_of(project(GhostWish(at_mm=(0.0, 5.0), radius_mm=1.0), lights=((5.0, 0.0), (2.0, 0.0))))
+
+
+def test_wishes_at_two_lights_that_no_ghost_can_serve():
+    lights = ((6.0, 3.0), (3.0, 1.5))
+    assert obstacles(problem_of(project(lights=lights, structure="lens"))[0]) == ()
+    wish = GhostWish(ghost="4-1", light=0, height=2.0)
+    problem, _ = problem_of(project(wish, lights=lights, structure="lens"))
+    (obstacle,) = obstacles(problem)
+    assert "4-1" in obstacle.target
+    assert "lights 0 and 1" in obstacle.reason
+    # what is found misses by no less, is called impossible, and every ghost's error is told
+    found = outcomes(solve(problem, time_limit=None, most_searches=60), problem, count=1)
+    assert np.abs(found[0].residuals).max() >= obstacle.least_error_mm
+    told = summary(solve(problem, time_limit=None, most_searches=60), found, problem, (obstacle,))
+    assert told["verdict"] == "impossible"
+    assert len(told["lenses"][0]["ghosts"]) == len(problem.objective.targets)
+    assert verdict(found[0]) != "impossible"
+    # both lights alike: one ghost serves both
+    both, _ = problem_of(project(GhostWish(ghost="4-1", height=2.0), lights=lights, structure="lens"))
+    assert obstacles(both) == ()
