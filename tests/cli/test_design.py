@@ -129,6 +129,7 @@ def test_scratch_and_colors_write_lenses(folder, capsys):
         (["scratch", "-o", "x", "--random", "20", "--surfaces", "4"], "surfaces ="),
         (["colors", "shot.toml", "-o", "x.exr"], "must be named"),
         (["colors", "shot.toml", "-o", "x.toml", "--films", "gold"], "choose quarter-wave or free"),
+        (["colors", "shot.toml", "-o", "x.toml", "--judge", "lab"], "choose linear or oklab"),
         (["colors", "shot.toml", "-o", "x.toml", "--map", "9-9"], "is no ghost"),
         (["resume", "nothing"], "design solve has written"),
         (["benchmark", "tessar"], "choose heliar or canon"),

@@ -15,6 +15,7 @@ from flarewright.design.colors import (
     mirrors_of,
     own_colors,
     pair_map,
+    perceived_differences,
     reflectances,
     solve_colors,
     uses,
@@ -126,3 +127,20 @@ def test_the_map_shows_the_colours_of_its_two_mirrors():
     one = reflectances("quarter-wave", n_d[4], n_d[5], np.array([[400.0]]))[0]
     both = one * reflectances("quarter-wave", n_d[1], n_d[2], np.array([[480.0]]))[0]
     assert np.allclose(picture[10, 50], both / np.linalg.norm(both))
+
+
+def test_judged_by_the_eye_colours_come_nearer_to_the_eye():
+    # colours that three quarter waves cannot all have
+    wishes = tuple(
+        GhostWish(ghost=ghost, color=color)
+        for ghost, color in (("4-1", (1.0, 0.1, 0.05)), ("8-6", (0.1, 0.2, 1.0)), ("1-0", (0.2, 1.0, 0.2)))
+    )
+    project = Project(lens="heliar-tronnier", lights=(Light(field_deg=(5.0, 5.0)),), design=Design(wishes=wishes))
+    sums = []
+    for perceptual in (False, True):
+        problem, _ = color_problem(project, "quarter-wave", perceptual=perceptual)
+        found = solve_colors(problem, starts=8)
+        sums.append((perceived_differences(problem, found.colors) ** 2).sum())
+        if perceptual:
+            assert found.cost == pytest.approx(sums[-1], rel=1e-6)
+    assert sums[1] < sums[0]

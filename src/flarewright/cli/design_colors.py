@@ -22,6 +22,9 @@ def colors(
     films: Annotated[
         str, typer.Option(help="quarter-wave: one of a centre wavelength; free: one of any index and thickness.")
     ] = "quarter-wave",
+    judge: Annotated[
+        str, typer.Option(help="linear: parts of red, green and blue; oklab: as the eye sees differences.")
+    ] = "linear",
     pair_map: Annotated[
         str | None, typer.Option("--map", metavar="J-I", help="Also draw what colours the ghost J-I can have.")
     ] = None,
@@ -33,10 +36,12 @@ def colors(
     """Choose a coating for every surface so that the ghosts have the wished colours, and the others their own."""
     if films not in ("quarter-wave", "free"):
         raise ProjectError(f"--films {films!r} is unknown; choose quarter-wave or free")
+    if judge not in ("linear", "oklab"):
+        raise ProjectError(f"--judge {judge!r} is unknown; choose linear or oklab")
     check_place(output, ".toml")
     import numpy as np
 
-    from ..design.colors import coated, color_problem, mirrors_of, solve_colors
+    from ..design.colors import coated, color_problem, mirrors_of, perceived_differences, solve_colors
     from ..design.colors import pair_map as draw_map
     from ..design.objective import algorithm_2
     from ..design.picture import png_bytes
@@ -45,7 +50,7 @@ def colors(
     from ..io.project_file import read_project
 
     kind: Literal["quarter-wave", "film"] = "film" if films == "free" else "quarter-wave"
-    problem, lens = color_problem(read_project(project), kind)
+    problem, lens = color_problem(read_project(project), kind, perceptual=judge == "oklab")
     names = [f"{j}-{i}" for j, i in problem.structure.pairs]
     if pair_map is not None and pair_map not in names:
         raise ProjectError(f"--map {pair_map!r} is no ghost of this lens on one side of its stop, such as {names[0]}")
@@ -60,6 +65,7 @@ def colors(
         remarks.append(f"wrote {map_path}: first mirror upwards, second to the right, centre wavelengths in 2 nm steps")
     tell(remarks)
     fitness = algorithm_2(problem.targets, found.colors)
+    differences = perceived_differences(problem, found.colors)
     if as_json:
         print_json({
             "cost": found.cost,
@@ -70,8 +76,10 @@ def colors(
                 for k, value in zip(mirrors_of(problem.structure).tolist(), found.values.tolist(), strict=True)
             },
             "ghosts": [
-                {"ghost": name, "wanted": wanted, "found": got}
-                for name, wanted, got in zip(names, problem.targets.tolist(), found.colors.tolist(), strict=True)
+                {"ghost": name, "wanted": wanted, "found": got, "oklab_difference": seen}
+                for name, wanted, got, seen in zip(
+                    names, problem.targets.tolist(), found.colors.tolist(), differences.tolist(), strict=True
+                )
             ],
         })  # fmt: skip
         return

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import os
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Literal
 
@@ -21,6 +21,7 @@ from ..errors import ProjectError
 from ..model import Coating, Film, Lens, Project, QuarterWave, Surface
 from ..model.design import Bounds, Design
 from ..optics.coatings import MAGNESIUM_FLUORIDE, film_stack, stack_reflectance
+from ..optics.color import oklab
 from ..optics.pack import resolve_coatings
 from ..render.prepare import settle
 from .prescription import Structure, structure_of
@@ -54,6 +55,8 @@ class ColorProblem:
         Whether only the ratio of the three counts.
     kind : {"quarter-wave", "film"}
     bounds : Bounds
+    perceptual : bool
+        Differences are judged in Oklab instead of by parts of red, green and blue.
     """
 
     structure: Structure
@@ -63,6 +66,7 @@ class ColorProblem:
     hue_only: NDArray[np.bool_]
     kind: Kind
     bounds: Bounds
+    perceptual: bool = False
 
 
 @dataclass(frozen=True)
@@ -264,7 +268,26 @@ def _residuals(problem: ColorProblem, logs: Floats) -> Floats:
     own = found.sum(axis=2, keepdims=True)
     given = problem.targets.sum(axis=1)[:, None, None]
     scale = np.where(problem.hue_only[:, None, None], own, given)
-    return np.asarray(problem.weights[:, None, None] * (found / scale - target[:, None]), dtype=np.float64)
+    off = oklab(found / scale) - oklab(target)[:, None] if problem.perceptual else found / scale - target[:, None]
+    return np.asarray(problem.weights[:, None, None] * off, dtype=np.float64)
+
+
+def perceived_differences(problem: ColorProblem, colors: Floats) -> Floats:
+    """Distance in Oklab between found and wanted colours, both as bright as the wanted one has a sum of 1.
+
+    Parameters
+    ----------
+    problem : ColorProblem
+    colors : ndarray, shape (G, 3)
+
+    Returns
+    -------
+    ndarray, shape (G,)
+        About 0.02 is just seen side by side.
+    """
+    even = replace(problem, perceptual=True, weights=np.ones(len(colors)))
+    off = _residuals(even, np.log(np.maximum(colors, 1e-300))[:, None])[:, 0]
+    return np.asarray(np.linalg.norm(off, axis=1), dtype=np.float64)
 
 
 def _logs(problem: ColorProblem, values: Floats) -> Floats:
@@ -376,13 +399,15 @@ def pair_map(n_d: Floats, pair: tuple[int, int], bounds: Bounds) -> Floats:
     return np.asarray(both / np.maximum(np.linalg.norm(both, axis=2, keepdims=True), 1e-300), dtype=np.float64)
 
 
-def color_problem(project: Project, kind: Kind) -> tuple[ColorProblem, Lens]:
+def color_problem(project: Project, kind: Kind, *, perceptual: bool = False) -> tuple[ColorProblem, Lens]:
     """Read a project as a problem of colours: the lens' own, and those that its wishes change.
 
     Parameters
     ----------
     project : Project
     kind : {"quarter-wave", "film"}
+    perceptual : bool
+        Judge in Oklab.
 
     Returns
     -------
@@ -421,4 +446,5 @@ def color_problem(project: Project, kind: Kind) -> tuple[ColorProblem, Lens]:
             # black in a channel is asked for as a thousandth, for no coating reflects nothing
             hue = np.maximum(np.array(wish.color) / max(wish.color), 1e-3)
             targets[g], hue_only[g] = hue * targets[g].sum() / hue.sum(), True
-    return ColorProblem(structure, indices_of(lens), targets, weights, hue_only, kind, design.bounds), lens
+    found = ColorProblem(structure, indices_of(lens), targets, weights, hue_only, kind, design.bounds, perceptual)
+    return found, lens

@@ -23,7 +23,19 @@ _PRIMARIES = {
 }
 _BRADFORD = np.array([[0.8951, 0.2664, -0.1614], [-0.7502, 1.7135, 0.0367], [0.0389, -0.0685, 1.0296]])
 
-__all__ = ["ACES_WHITE", "D65_WHITE", "luminance_weights", "xyz_to_rgb_matrix"]
+# linear Rec.709 to the responses of cones, and their cube roots to lightness, green to red, blue to yellow
+_OKLAB_CONES = np.array([
+    [0.4122214708, 0.5363325363, 0.0514459929],
+    [0.2119034982, 0.6806995451, 0.1073969566],
+    [0.0883024619, 0.2817188376, 0.6299787005],
+])  # fmt: skip
+_OKLAB_AXES = np.array([
+    [0.2104542553, 0.7936177850, -0.0040720468],
+    [1.9779984951, -2.4285922050, 0.4505937099],
+    [0.0259040371, 0.7827717662, -0.8086757660],
+])  # fmt: skip
+
+__all__ = ["ACES_WHITE", "D65_WHITE", "luminance_weights", "oklab", "xyz_to_rgb_matrix"]
 
 
 @lru_cache
@@ -84,3 +96,24 @@ def luminance_weights(colorspace: Colorspace) -> NDArray[np.float64]:
     """
     weights: NDArray[np.float64] = np.linalg.inv(xyz_to_rgb_matrix(colorspace))[1]
     return weights
+
+
+def oklab(rgb: Floats) -> Floats:
+    """Turn linear Rec.709 into Oklab, in which equal distances look about equally large.
+
+    Parameters
+    ----------
+    rgb : ndarray, shape (..., 3)
+
+    Returns
+    -------
+    ndarray, shape (..., 3)
+        L, a, b; white is (1, 0, 0).
+
+    Notes
+    -----
+    B. Ottosson, "A perceptual color space for image processing", 2020. Tested against the pairs of XYZ and Lab printed
+    there.
+    """
+    cones = np.cbrt(rgb @ _OKLAB_CONES.T)
+    return np.asarray(cones @ _OKLAB_AXES.T, dtype=np.float64)
