@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from judge import blocks_of, deviations, judge, probabilities
+from path_rays import path_flux
 from scipy import stats
 
 from flarewright.kernels.montecarlo import IN_PICTURE
@@ -29,6 +30,8 @@ LENSES = {
 CHANCE = 1e-4
 # a path's flux, apart from chance; and of which paths: those above this part of all ghosts
 PATH, FAINTEST = 5e-3, 1e-3
+# and by rays of one path alone above this
+FAINT = 1e-4
 
 
 def scene(lens, field, f_number=None, *, size=(256, 160), light=None, wavelengths=1, **parts):
@@ -190,6 +193,60 @@ def test_what_is_left_out_of_four_reflections_is_told():
         assert facts["left_out"] > 0
     assert found[1e-3]["drawn"] < found[1e-4]["drawn"]
     assert found[1e-3]["left_out_share"] > found[1e-4]["left_out_share"] > 0.0
+
+
+def judged_paths(project, batches=8):
+    """Flux of every path: final quality's, the reference's by rays of that path alone, its standard error."""
+    settled = settle(project)
+    shot = make_shots(settled, make_opening(settled, None))[0]
+    final = {str(layer.about["path"]): float(layer.about["flux_mm2"]) for layer in render(project).layers
+             if layer.name.startswith("ghost.")}  # fmt: skip
+    rows = [k for k, row in enumerate(settled.lens.rows) if isinstance(row, Surface)]
+    pairs = [(j, i) for j in rows for i in rows if i < j]
+    return {f"{j}-{i}": (final.get(f"{j}-{i}", 0.0), *path_flux(shot, j, i, batches)) for j, i in pairs}
+
+
+def test_rays_of_one_path_are_the_references():
+    """All paths at once, and each by itself: by z-test."""
+    project = scene("triplet-pestrecov", (8.0, 4.0), 4.0, size=(96, 64), iris=Iris(blades=5))
+    judged = judge(project, batches=64, side=64)
+    alone = judged_paths(project)
+    z = []
+    for name, (_, mean, error) in judged.paths.items():
+        if mean > 0.0:
+            z.append((alone[name][1] - mean) / np.hypot(alone[name][2], error))
+    assert len(z) > 10
+    assert 2.0 * len(z) * stats.t.sf(np.abs(z).max(), 7) > CHANCE
+    # and each is known far better
+    assert all(error < 2e-3 * mean for _, mean, error in alone.values() if mean > 1e-6 * judged.total[1])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("stopped", [False, True])
+@pytest.mark.parametrize("lens", [lens for lens in LENSES if lens not in ("canon-28-80", "nikon-28-75")])
+def test_every_path_agrees(lens, stopped):
+    """Every path above 1e-4 of the ghost light in the picture: within half a percent, apart from chance.
+
+    Not the zooms: 351 paths and more take minutes.
+    """
+    widest = load_lens(lens).f_number
+    f_number = (4.0 if widest < 2.0 else 2.8) * widest if stopped else None
+    paths = judged_paths(scene(lens, LENSES[lens], f_number))
+    flux = sum(mean for _, mean, _ in paths.values())
+    # what one lucky ray tells is not known to be so bright
+    worth = {name: path for name, path in paths.items() if max(path[0], path[1] - 3.0 * path[2]) > FAINT * flux}
+    worst = max(worth, key=lambda name: abs(worth[name][0] / worth[name][1] - 1.0))
+    final, mean, error = worth[worst]
+    print(
+        f"{lens} {'stopped down' if stopped else 'open'}: {len(worth)} of {len(paths)} paths, the worst ({worst}, "
+        f"{mean / flux:.1e}) {final / mean - 1.0:+.2%} +- {error / mean:.2%}"
+    )
+    bound = stats.t.isf(CHANCE / (2 * len(worth)), 7)
+    for name, (final, mean, error) in worth.items():
+        assert abs(final - mean) < PATH * mean + bound * error, name
+        # so that chance hides nothing
+        assert error < PATH * mean, name
+    assert sum(final for final, _, _ in paths.values()) == pytest.approx(flux, rel=2e-3)
 
 
 @pytest.mark.slow

@@ -1,0 +1,120 @@
+"""The flux of one two-reflection path by the reference's own rays: that path only, and most points where it passes.
+
+The reference splits every ray at every surface and meets a faint path once in a million. Here a ray takes the path's
+two reflections for certain and no other, with the same weights, so its mean is the same. A pilot finds the cells of the
+front through which the path reaches the picture; they are divided finely, and all the rest gets some points a batch
+too, so nothing is left out, and the variance tells what was met there by chance.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from flarewright.kernels.montecarlo import _cross, _passes_stop
+from flarewright.optics.bundle import front_box
+from flarewright.render.montecarlo import spectrum_of
+from flarewright.render.shot import Shot
+
+# cells of the front a side; where fewer than so many are known, they are divided into so many a side
+CELLS, FEW, FINER = 128, 200, 4
+# points of a batch in cells that the path is known to pass; and a side, one in each, in all others
+POINTS, COARSE = 12_000, 64
+
+
+@njit(error_model="numpy")
+def follow(curvature, form, z_vertex, inv_semi, n_gap, reflectance, sensor_z, stop_row, j, i, direction, x0, y0,
+           blades, to_pixels, size, light):  # fmt: skip
+    """Fill `light` with what is left of each ray from x0, y0 that reflects at j, then at i: 0 beside the picture."""
+    samples = reflectance.shape[1]
+    for ray in range(x0.shape[0]):
+        x, y, z = x0[ray], y0[ray], 0.0
+        dx, dy, dz = direction[0], direction[1], direction[2]
+        weight, row, heading, order = 1.0, 0, 1, 0
+        while weight > 0.0 and row < curvature.shape[0]:
+            if row == stop_row:
+                t = (z_vertex[row] - z) / dz
+                x, y, z = x + t * dx, y + t * dy, z_vertex[row]
+                if not _passes_stop(blades, x, y):
+                    weight = 0.0
+                row += heading
+                continue
+            n_in = n_gap[row] if heading > 0 else n_gap[row + 1]
+            n_out = n_gap[row + 1] if heading > 0 else n_gap[row]
+            x, y, z, tx, ty, tz, rx, ry, rz, radius2, cos_in, cos_out, met, forth, back = _cross(
+                curvature, form, row, z_vertex[row], x, y, z, dx, dy, dz, float(heading), n_in / n_out
+            )
+            mirror = (order == 0 and row == j) or (order == 1 and row == i)
+            if not met or radius2 * inv_semi[row] * inv_semi[row] > 1.0 or not (back if mirror else forth):
+                weight = 0.0
+                break
+            R = 1.0
+            if cos_out > 0.0:
+                place = min(cos_in if n_in <= n_out else cos_out, 1.0) * (samples - 1)
+                cell = min(int(place), samples - 2)
+                R = reflectance[row, cell] + (place - cell) * (reflectance[row, cell + 1] - reflectance[row, cell])
+            if mirror:
+                weight *= R
+                dx, dy, dz = rx, ry, rz
+                order, heading = order + 1, -heading
+            else:
+                weight *= 1.0 - R
+                dx, dy, dz = tx, ty, tz
+            row += heading
+        t = (sensor_z - z) / dz
+        column, line = to_pixels[0] - to_pixels[2] * (x + t * dx), to_pixels[1] + to_pixels[3] * (y + t * dy)
+        inside = 0.0 <= column < size[0] and 0.0 <= line < size[1]
+        light[ray] = weight if inside else 0.0
+
+
+def path_flux(shot: Shot, j: int, i: int, batches: int, seed: int = 0) -> tuple[float, float]:
+    """Luminous flux in the picture of one path by a distant light at one wavelength, and its standard error."""
+    packed, opening = shot.packed, shot.opening
+    tilt, axes = shot.incidence.tilt, shot.incidence.axes
+    assert packed.nearness == 0.0
+    assert opening.mask is None
+    box = front_box(packed, tilt)
+    box[0] = -box[1] if packed.symmetric else box[0]
+    low, size = box[[0, 2]], box[[1, 3]] - box[[0, 2]]
+    direction = np.array([np.sin(tilt) * axes[1, 0], np.sin(tilt) * axes[1, 1], np.cos(tilt)])
+    form = packed.conic if packed.shapes is None else packed.shapes
+    stop_row = int(np.flatnonzero(packed.inv_semi == 0.0)[0])
+    rng = np.random.default_rng([seed, j, i])
+
+    def light_at(places):
+        x, y = np.ascontiguousarray((places @ axes).T)
+        light = np.empty(len(places))
+        follow(
+            packed.curvature, form, packed.z_vertex, packed.inv_semi, packed.n_gap[0], packed.reflectance[0],
+            packed.sensor_z, stop_row, j, i, direction, x, y, opening.blades, shot.to_pixels, shot.size_px, light,
+        )  # fmt: skip
+        return light
+
+    known = _passed(light_at, low, size, np.ones((CELLS, CELLS), dtype=bool), rng)
+    if not known.any():
+        known = _passed(light_at, low, size, np.ones((FINER * CELLS, FINER * CELLS), dtype=bool), rng)
+    elif known.sum() < FEW:
+        # so little of the front that smaller cells fit it better
+        known = _passed(light_at, low, size, np.kron(known, np.ones((FINER, FINER), dtype=bool)), rng)
+    side = len(known)
+    fine = int(np.clip(np.sqrt(POINTS / max(known.sum(), 1)), 1, 64))
+    within = np.stack(np.meshgrid(np.arange(fine), np.arange(fine), indexing="ij"), axis=-1).reshape(1, -1, 2)
+    dense, everywhere = np.argwhere(known)[:, None], np.argwhere(np.ones((COARSE, COARSE), dtype=bool))
+    found = np.zeros(batches)
+    for batch in range(batches):
+        inside = (dense + (within + rng.random((len(dense), fine**2, 2))) / fine).reshape(-1, 2) / side
+        outside = (everywhere + rng.random(everywhere.shape)) / COARSE
+        outside = outside[~known[tuple((outside * side).astype(int).T)]]
+        found[batch] = light_at(low + inside * size).sum() / (side * fine) ** 2
+        found[batch] += light_at(low + outside * size).sum() / COARSE**2
+    found *= np.prod(size) * spectrum_of(shot, shot.gain, 0)[1][0]
+    return float(found.mean()), float(found.std(ddof=1) / np.sqrt(batches))
+
+
+def _passed(light_at, low, size, where, rng):
+    """Find those of some cells of the front through which light comes, and their neighbours, shape (side, side)."""
+    cells, side = np.argwhere(where), len(where)
+    met = np.zeros((side + 2, side + 2), dtype=bool)
+    met[tuple(cells.T + 1)] = light_at(low + (cells + rng.random(cells.shape)) / side * size) > 0.0
+    near = [np.roll(met, (a, b), (0, 1)) for a in (-1, 0, 1) for b in (-1, 0, 1)]
+    return np.logical_or.reduce(near)[1:-1, 1:-1]
