@@ -268,15 +268,15 @@ def find_region(
             near, few = _around(found, box, cells), _cells(packed, COARSE if plenty else FINER)
         for other in others:
             elsewhere, more, _ = _scan(packed, other, near, few, finest)
-            found = _joined(found, elsewhere)
+            found = join_boxes(found, elsewhere)
             if not plenty:
                 sums = np.maximum(sums, more)
         if found[1] <= found[0] or sums[0] <= 0.0:
             return None
         if sums[4] > 0.0 and spots[1] > spots[0]:
             # the next scan need not see again what hid between the samples beside the main region
-            held = _joined(held, spots)
-        found = _joined(found, held)
+            held = join_boxes(held, spots)
+        found = join_boxes(found, held)
         area = float((found[1] - found[0]) * (found[3] - found[2]))
         shrunk = area < 0.3 * (box[1] - box[0]) * (box[3] - box[2])
         box, cells, whole = found, _cells(packed, FINER), False
@@ -286,8 +286,38 @@ def find_region(
     return Region(box, float(sums[0]), seen, float(sums[2] / sums[0]), float(np.clip(sums[5] / area, 1e-3, 1.0)))
 
 
-def _joined(a: Floats, b: Floats) -> Floats:
-    """Return the box around two."""
+def measure_region(
+    packed: PackedLens, path: LightPath, tilt: float, iris_radius: float, view_radius: float, box: Floats
+) -> Region | None:
+    """Estimate what a path carries through a part of the pupil that is known to hold all that it accepts.
+
+    Parameters
+    ----------
+    packed, path, tilt, iris_radius, view_radius
+        As in `find_region`.
+    box : ndarray, shape (4,)
+
+    Returns
+    -------
+    Region or None
+        None when nothing passes.
+    """
+    w, cells = _fitted(packed)[0], _cells(packed, FINER)
+    arguments = (*_arguments(packed, w, path, tilt), path.stop_crossings, iris_radius, view_radius)
+    found, sums, _ = _scan(packed, arguments, box, cells)
+    if found[1] <= found[0] or sums[0] <= 0.0:
+        return None
+    # other colours than the middle one may pass a little beside: one more cell of room
+    low = np.maximum(found[0::2] - (box[1::2] - box[0::2]) / cells, box[0::2])
+    high = np.minimum(found[1::2] + (box[1::2] - box[0::2]) / cells, box[1::2])
+    box = np.array([low[0], high[0], low[1], high[1]])
+    area = float((box[1] - box[0]) * (box[3] - box[2]))
+    seen = float(sums[1]) if sums[3] > 0.0 else 0.0
+    return Region(box, float(sums[0]), seen, float(sums[2] / sums[0]), float(np.clip(sums[5] / area, 1e-3, 1.0)))
+
+
+def join_boxes(a: Floats, b: Floats) -> Floats:
+    """Return the box around two boxes of the pupil, each shape (4,): x0, x1, y0, y1."""
     low, high = np.minimum(a[0::2], b[0::2]), np.maximum(a[1::2], b[1::2])
     return np.array([low[0], high[0], low[1], high[1]])
 
@@ -332,6 +362,7 @@ def trace_grid(
     scale: float,
     view_radius: float = float("inf"),
     flux_tolerance: float = 3e-4,
+    one_color: bool = False,
 ) -> Bundle:
     """Build the adaptive grid of a path.
 
@@ -351,12 +382,14 @@ def trace_grid(
         What lies farther from the axis on the sensor, mm, is not refined.
     flux_tolerance : float
         Largest relative error of the bundle's flux from its rim.
+    one_color : bool
+        Fit the middle wavelength alone.
 
     Returns
     -------
     Bundle
     """
-    fitted = sorted(_fitted(packed))
+    fitted = sorted(_fitted(packed)[: 1 if one_color else None])
     # the rim's error adds up along the rim of what passes, which may be little of the box
     rim_tolerance = flux_tolerance * sqrt(region.share)
     pupil, data, triangles = build_mesh(

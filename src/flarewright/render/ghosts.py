@@ -20,7 +20,8 @@ from ..optics.paths import LightPath
 from .art import PLAIN, PathArt
 from .canvas import DETAILS, Plane, blank, merge, to_layer
 from .ghosts_draft import draft_alone, draw_draft, draw_draft_by_hand
-from .ghosts_final import FinalPass, contrast, detail_of, draw_alone, draw_final, find_entry, find_final
+from .ghosts_final import FinalPass, contrast, detail_of, draw_alone, draw_final
+from .looking import looking
 from .shot import Shot
 from .sources import halvings, motion, spread_border
 
@@ -28,9 +29,11 @@ Progress = Callable[[float, str], None]
 
 # pictures drawn side by side before they are added: fixed by size, never by threads, so sums round alike everywhere
 _CHUNKS = ((1_100_000, 8), (2_500_000, 4))
-_PATHS_A_CHUNK = 16
+_GHOSTS_A_CHUNK = 16
 # and of ghosts that are spread together
 _MOST_CHUNKS = 8
+# of so many lights, the faintest ghosts are left out that carry together no more than this part of all ghost light
+MANY_LIGHTS, MANY_CULL = 8, 5e-4
 
 
 @dataclass(frozen=True)
@@ -55,6 +58,8 @@ class GhostPass:
         Paths left out by hand.
     names : tuple of str
         Of the paths drawn.
+    faint, faint_share : int, float
+        Ghosts of single lights among many that were left out as too faint, and their part of the flux.
     level : float
         Mean irradiance of the ghosts over the circle around the picture, by the pre-pass, per unit irradiance of the
         light; 0 in draft quality.
@@ -69,6 +74,8 @@ class GhostPass:
     muted: int
     names: tuple[str, ...] = ()
     level: float = 0.0
+    faint: int = 0
+    faint_share: float = 0.0
 
 
 class _Meter:
@@ -152,7 +159,7 @@ def _final(
     meter: _Meter,
 ) -> GhostPass:
     others, faintest = levels
-    look = _look(shots, paths, art)
+    look = looking(shots, paths, art)
 
     def find(path: LightPath) -> list[FinalPass]:
         if meter.cancelled.is_set():
@@ -172,6 +179,9 @@ def _final(
     order = [int(k) for k in np.argsort(-flux, kind="stable") if keep[k]]
 
     alone = set(order if singles is None else order[:singles])
+    named = [found[k][0].path for k in order]
+    called = {k: path.name for k, path in zip(order, named, strict=True)}
+    found, faint, faint_share = _without_faint(found, alone)
 
     def draw(group: list[int]) -> list[Plane | None]:
         canvas = blank(shots[0].size_px)
@@ -191,7 +201,7 @@ def _final(
                     # a layer of its own may be graded up, so it is drawn in full
                     visibility = float("inf") if k in alone else contrast(item, level)
                     draw_final(item, quality, canvas, visibility, meter.cancelled)
-            meter.step(f"ghost {found[k][0].path.name}")
+            meter.step(f"ghost {called[k]}")
         for together in alike.values():
             draw_alone(together, quality, canvas, meter.cancelled)
         return canvas.planes
@@ -203,13 +213,15 @@ def _final(
                 draw_alone(group, quality, canvas, meter.cancelled)
         return canvas.planes
 
-    named = [found[k][0].path for k in order]
     wide = _alike([item for k in order if k not in alone for item in found[k]], level)
     jobs = [partial(draw_spread, wide[k::_MOST_CHUNKS]) for k in range(min(len(wide), _MOST_CHUNKS))]
     total, layers = _collect(shots, order, named, singles, art, draw, pool, jobs)
     share = float(flux[~keep].sum() / flux.sum()) if flux.sum() > 0.0 else 0.0
     names = tuple(path.name for path in named)
-    return GhostPass(total, layers, len(order), len(paths) - len(found), int((~keep).sum()), share, 0, names, own)
+    culled = int((~keep).sum())
+    return GhostPass(
+        total, layers, len(order), len(paths) - len(found), culled, share, 0, names, own, faint, faint_share
+    )
 
 
 def _draft(
@@ -298,23 +310,6 @@ def _rank_draft(shots: Sequence[Shot], paths: Sequence[LightPath], art: Mapping[
     return [int(k) for k in np.argsort(-flux, kind="stable")]
 
 
-def _look(
-    shots: Sequence[Shot], paths: Sequence[LightPath], art: Mapping[str, PathArt]
-) -> Callable[[LightPath], list[FinalPass]]:
-    """Return what looks for the ghost of a path, one of `paths`, by every light."""
-    # what reaches the stop is common to all paths whose mirrors stand behind it
-    way_in = next((path.entry for path in paths if path.entry is not None), None)
-    entries = [None if way_in is None else find_entry(shot, way_in) for shot in shots]
-
-    def look(path: LightPath) -> list[FinalPass]:
-        changed = art.get(path.name, PLAIN)
-        inside = entries if path.entry is not None else [None] * len(shots)
-        looked = (find_final(shot, path, changed, entry) for shot, entry in zip(shots, inside, strict=True))
-        return [item for item in looked if item is not None]
-
-    return look
-
-
 def plain_level(shots: Sequence[Shot], paths: Sequence[LightPath], threads: int | None = None) -> float:
     """Tell the level (`GhostPass.level`) of ghosts as they are without art direction.
 
@@ -330,7 +325,7 @@ def plain_level(shots: Sequence[Shot], paths: Sequence[LightPath], threads: int 
     float
     """
     with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
-        found = list(pool.map(_look(shots, paths, {}), paths))
+        found = list(pool.map(looking(shots, paths, {}), paths))
     return _level(found)
 
 
@@ -363,6 +358,27 @@ def _worth_drawing(flux: NDArray[np.float64], cull: float) -> NDArray[np.bool_]:
     return keep
 
 
+def _without_faint(
+    found: Sequence[list[FinalPass]], alone: set[int]
+) -> tuple[list[list[FinalPass]], int, float]:
+    """Leave out the faintest ghosts of single lights among many, but none of a path that gets a layer of its own.
+
+    Returns what is left, how many were left out, and their part of the flux.
+    """
+    lights = {item.shot.number for items in found for item in items}
+    if len(lights) < MANY_LIGHTS:
+        return list(found), 0, 0.0
+    places = [(k, m) for k, items in enumerate(found) for m in range(len(items))]
+    flux = np.array([found[k][m].region.seen_flux * found[k][m].gain for k, m in places])
+    open_to = np.array([k not in alone for k, _ in places])
+    dim = ~_worth_drawing(flux, MANY_CULL) & open_to & (flux > 0.0)
+    left = [list(items) for items in found]
+    for number in np.flatnonzero(dim)[::-1]:
+        k, m = places[number]
+        del left[k][m]
+    return left, int(dim.sum()), float(flux[dim].sum() / flux.sum()) if dim.any() else 0.0
+
+
 def _collect(
     shots: Sequence[Shot],
     items: list[int],
@@ -380,7 +396,7 @@ def _collect(
     luminance = luminance_weights(shot.colorspace)
     alone = len(items) if singles is None else min(singles, len(items))
     most = next((n for size, n in _CHUNKS if width * height <= size), 2)
-    chunks = max(1, min(most, (len(items) - alone) // _PATHS_A_CHUNK))
+    chunks = max(1, min(most, (len(items) - alone) * len(shots) // _GHOSTS_A_CHUNK))
     rest = [items[alone + c :: chunks] for c in range(chunks)]
     totals: list[Plane | None] = [None] * DETAILS
     layers = []

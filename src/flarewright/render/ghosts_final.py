@@ -21,10 +21,11 @@ from ..kernels.bundle import draw_bundle, measure_bundle, node_densities
 from ..kernels.trace import ALIVE, REL, X, Y
 from ..model import Quality
 from ..optics.border import points
-from ..optics.bundle import Bundle, Region, find_region, trace_bundle, trace_grid
+from ..optics.bundle import Bundle, Region, find_region, measure_region, trace_bundle, trace_grid
 from ..optics.paths import LightPath
 from .art import PLAIN, Frame, PathArt
-from .canvas import DETAILS, Canvas, blank, merge
+from .canvas import DETAILS, Canvas, Plane, blank, merge
+from .few_colors import gathered_weights
 from .grade import coarseness, finish
 from .shot import Shot
 from .sources import NARROW_PX, halvings, motion, spread_border
@@ -42,6 +43,8 @@ SHIFT_QUANTILE = 0.9
 DETAIL_CONTRAST = (1.5e-2, 4e-3)
 # a step of colour or a ring fainter than this part of the picture's mean is not seen
 STEP_CONTRAST = 2e-3
+# and a ghost this many times fainter still needs one colour only
+ONE_COLOR = 1.0 / 6.0
 # patterns fade where the iris would cut: a grid of their zone need not follow a rim
 RING_FLUX = 1e-3
 # never more drawings than this between two traced wavelengths
@@ -94,7 +97,9 @@ class FinalPass:
         return self.shot.light.intensity * self.shot.incidence.falloff * self.art.visible_gain
 
 
-def find_final(shot: Shot, path: LightPath, art: PathArt = PLAIN, entry: Region | None = None) -> FinalPass | None:
+def find_final(
+    shot: Shot, path: LightPath, art: PathArt = PLAIN, entry: Region | None = None, around: Floats | None = None
+) -> FinalPass | None:
     """Look where a path accepts light; None when it passes nothing.
 
     Parameters
@@ -105,6 +110,8 @@ def find_final(shot: Shot, path: LightPath, art: PathArt = PLAIN, entry: Region 
         What is changed about it by hand.
     entry : Region, optional
         What reaches the stop without a mirror, of a path that begins so (`LightPath.entry`).
+    around : ndarray, shape (4,), optional
+        A part of the pupil known to hold all that the path accepts; of a point that `art` does not frame.
 
     Returns
     -------
@@ -128,7 +135,10 @@ def find_final(shot: Shot, path: LightPath, art: PathArt = PLAIN, entry: Region 
                 zoom = float(to_pixels[2:].min())
                 source, detail = border, halvings(border, moved[1] * zoom, DETAILS - 1)
                 view_radius += float(np.hypot(*ends.T).max()) / zoom
-    region = find_region(lens, path, tilt, iris_radius, view_radius, within)
+    if around is None:
+        region = find_region(lens, path, tilt, iris_radius, view_radius, within)
+    else:
+        region = measure_region(lens, path, tilt, iris_radius, view_radius, around)
     if region is None:
         return None
     return FinalPass(shot, path, region, to_pixels, view_radius, art, frame, source, detail)
@@ -207,11 +217,14 @@ def draw_final(
     tilt, opening = shot.incidence.tilt, shot.opening
     to_pixels = item.to_pixels / 2.0**detail
     scale = float(max(to_pixels[2], to_pixels[3]))
+    few, one_color = visibility < STEP_CONTRAST and quality.bridge, visibility < ONE_COLOR * STEP_CONTRAST
     bundle = trace_grid(
         shot.packed, path, tilt, (opening.radius, opening.inner), item.region,
-        tolerance=quality.tolerance_px, scale=scale, view_radius=item.view_radius,
+        tolerance=quality.tolerance_px, scale=scale, view_radius=item.view_radius, one_color=few and one_color,
     )  # fmt: skip
     count = len(shot.packed.wavelengths_nm)
+    if few and _drawn_in_few(item, bundle, canvas.plane(detail), to_pixels):
+        return
     traced = [trace_bundle(shot.packed, w, bundle, tilt) for w in range(count)]
     rings = None
     if shot.ringing is not None and visibility >= STEP_CONTRAST:
@@ -242,6 +255,24 @@ def draw_final(
                 data, bundle.pupil, bundle.triangles, densities, path.stop_crossings, opening.blades, opening.mask,
                 opening.half, shot.incidence.axes, to_pixels, shot.gain, rgb, plane, bundle.halves,
             )  # fmt: skip
+
+
+def _drawn_in_few(item: FinalPass, bundle: Bundle, plane: Plane, to_pixels: Floats) -> bool:
+    """Draw a ghost whose steps of colour nobody sees at the wavelengths of its grid alone, if these can stand for all."""
+    shot, path, opening = item.shot, item.path, item.shot.opening
+    shown = tuple(sorted(bundle.traced))
+    colors = shot.weights(shot.packed.wavelengths_nm) * item.art.rgb
+    weights = gathered_weights(shot.packed, bundle, shot.incidence.tilt, colors, shown)
+    if weights is None:
+        return False
+    for w, rgb in zip(shown, weights, strict=True):
+        data = bundle.traced[w]
+        draw_bundle(
+            data, bundle.pupil, bundle.triangles, node_densities(data, bundle.pupil, bundle.triangles),
+            path.stop_crossings, opening.blades, opening.mask, opening.half, shot.incidence.axes, to_pixels, shot.gain,
+            rgb, plane, bundle.halves,
+        )  # fmt: skip
+    return True
 
 
 def _with_shadow(item: FinalPass, rings: Rings, quality: Quality, scale: float) -> tuple[Bundle, list[Floats]]:
@@ -294,6 +325,8 @@ def draw_alone(items: Sequence[FinalPass], quality: Quality, canvas: Canvas, sto
 def _bridges(traced: list[Floats], view_radius: float, scale: float, visibility: float) -> list[int]:
     """Into how many pieces to divide each gap between traced wavelengths so that no step is seen."""
     most = min(MOST_BRIDGES, max(1, int(visibility / STEP_CONTRAST))) if visibility < float("inf") else MOST_BRIDGES
+    if most == 1:
+        return [1] * (len(traced) - 1)
     pieces = []
     for short, long in pairwise(traced):
         passing = (short[:, ALIVE] * long[:, ALIVE] > 0.0) & (np.minimum(short[:, REL], long[:, REL]) <= 1.0)

@@ -176,6 +176,12 @@ def _ghosts(
     told = []
     if ghosts.culled:
         told.append(f"{ghosts.culled} ghosts that carry {ghosts.culled_share:.2e} of the ghost light were left out")
+    if ghosts.faint:
+        facts |= {"faint": ghosts.faint, "faint_share": ghosts.faint_share}
+        told.append(
+            f"{len(project.lights)} lights: {ghosts.faint} ghosts of single lights that carry {ghosts.faint_share:.1e} of the ghost "
+            "light were left out"
+        )
     two = _Drawn((ghosts.total,), ghosts.singles, {"ghosts": facts}, tuple(told))
     if project.quality.orders == 2:
         return two

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ..errors import ProjectError
 from ..model import Iris, Light, Project
 from ..model.camera import Colorspace
+from ..model.light import Spectrum
 from ..optics.border import closed
 from ..optics.bundle import Incidence, incidence
 from ..optics.diffraction import Soil
@@ -117,7 +118,7 @@ class Shot:
 
     def weights(self, wavelengths_nm: Floats) -> Floats:
         """Return the RGB weights of wavelengths for this light, shape (N, 3)."""
-        return _weights(self.light, tuple(wavelengths_nm), self.colorspace)
+        return _weights(self.light.spectrum, tuple(wavelengths_nm), self.colorspace)
 
 
 def moved(shot: Shot, slope: Floats) -> Shot:
@@ -141,9 +142,9 @@ def moved(shot: Shot, slope: Floats) -> Shot:
     return replace(shot, light=light, incidence=seen, packed=packed, border=None)
 
 
-@lru_cache(maxsize=64)
-def _weights(light: Light, wavelengths_nm: tuple[float, ...], colorspace: Colorspace) -> Floats:
-    return band_weights(light.spectrum, np.array(wavelengths_nm), colorspace)
+@lru_cache(maxsize=512)
+def _weights(spectrum: Spectrum, wavelengths_nm: tuple[float, ...], colorspace: Colorspace) -> Floats:
+    return band_weights(spectrum, np.array(wavelengths_nm), colorspace)
 
 
 def make_opening(settled: Settled, mask: Floats | None) -> Opening:

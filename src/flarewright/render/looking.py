@@ -1,0 +1,112 @@
+"""Where each path accepts light, for every light: what is alike for lights or for paths is looked for once.
+
+Of many distant points a lens of revolution shows each path the same part of the pupil at the same field angle, and
+nearly the same a little beside. So between two lights less than `STEP_RAD` apart in field angle, a path's region
+lies in what these two accept, and a bit around it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..optics.bundle import front_box, join_boxes
+from ..optics.paths import LightPath
+from .art import PLAIN, PathArt
+from .ghosts_final import FinalPass, find_entry, find_final
+from .shot import Shot
+
+Floats = NDArray[np.float64]
+
+# so far apart may two lights stand in field angle whose regions bound those between
+STEP_RAD = np.radians(0.5)
+# by this part of their size the regions of both are widened
+MARGIN = 0.15
+# where both together are so many times larger than either, the path moves too fast to tell
+MOST_GROWTH = 3.0
+# fewer lights are looked for one by one
+MANY = 8
+
+__all__ = ["looking"]
+
+
+def looking(
+    shots: Sequence[Shot], paths: Sequence[LightPath], art: Mapping[str, PathArt]
+) -> Callable[[LightPath], list[FinalPass]]:
+    """Return what looks for the ghost of a path, one of `paths`, by every light.
+
+    Parameters
+    ----------
+    shots : sequence of Shot
+    paths : sequence of LightPath
+    art : mapping of str to PathArt
+        What is changed by hand, by path name.
+
+    Returns
+    -------
+    callable
+        Takes a path, and returns its ghosts in the order of the shots, without those that pass no light.
+    """
+    # what reaches the stop is common to all paths whose mirrors stand behind it
+    way_in = next((path.entry for path in paths if path.entry is not None), None)
+    entries = [None if way_in is None else find_entry(shot, way_in) for shot in shots]
+    rows = _rows(shots)
+
+    def look(path: LightPath) -> list[FinalPass]:
+        changed = art.get(path.name, PLAIN)
+        inside = entries if path.entry is not None else [None] * len(shots)
+        found: dict[int, FinalPass | None] = {}
+
+        def at(k: int, around: Floats | None = None) -> FinalPass | None:
+            if k not in found:
+                found[k] = find_final(shots[k], path, changed, inside[k], around)
+            return found[k]
+
+        for row in [] if changed.framed else rows:
+            for first, last in _spans(shots, row):
+                ends = at(row[first]), at(row[last])
+                for k in row[first + 1 : last]:
+                    at(k, _between(shots[k], ends))
+        return [item for item in map(at, range(len(shots))) if item is not None]
+
+    return look
+
+
+def _rows(shots: Sequence[Shot]) -> list[list[int]]:
+    """Collect the distant points that differ by their field angle alone, in its order, where they are many."""
+    groups: dict[tuple[float, ...], list[int]] = {}
+    for k, shot in enumerate(shots):
+        if shot.corners is None and shot.packed.nearness == 0.0 and shot.packed.symmetric and shot.packed.halves == 2:
+            groups.setdefault(tuple(shot.packed.wavelengths_nm), []).append(k)
+    many = [group for group in groups.values() if len(group) >= MANY]
+    return [sorted(group, key=lambda k: (-shots[k].incidence.tilt, k)) for group in many]
+
+
+def _spans(shots: Sequence[Shot], row: Sequence[int]) -> list[tuple[int, int]]:
+    """Divide a row of lights into spans no wider than STEP_RAD; each begins where the last one ends."""
+    tilts = [abs(shots[k].incidence.tilt) for k in row]
+    spans, first = [], 0
+    while first < len(row) - 1:
+        last = first + 1
+        while last + 1 < len(row) and tilts[last + 1] - tilts[first] <= STEP_RAD:
+            last += 1
+        spans.append((first, last))
+        first = last
+    return spans
+
+
+def _between(shot: Shot, ends: tuple[FinalPass | None, FinalPass | None]) -> Floats | None:
+    """Bound what a light between two others accepts by what these do; None where that says nothing."""
+    boxes = [item.region.box for item in ends if item is not None]
+    if len(boxes) < 2:
+        return None
+    box = join_boxes(*boxes)
+    area = [float((b[1] - b[0]) * (b[3] - b[2])) for b in (box, *boxes)]
+    if area[0] > MOST_GROWTH * min(area[1:]):
+        return None
+    grown = box + MARGIN * np.repeat([box[1] - box[0], box[3] - box[2]], 2) * [-1.0, 1.0, -1.0, 1.0]
+    front = front_box(shot.packed, shot.incidence.tilt)
+    low, high = np.maximum(grown[0::2], front[0::2]), np.minimum(grown[1::2], front[1::2])
+    return np.array([low[0], high[0], low[1], high[1]])
