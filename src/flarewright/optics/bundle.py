@@ -249,8 +249,7 @@ def find_region(
     limits = (path.stop_crossings, iris_radius, view_radius)
     middle, *others = [(*_arguments(packed, w, path, tilt), *limits) for w in _fitted(packed)]
     box, cells = front_box(packed, tilt), _cells(packed, PREPASS)
-    # what hides between the samples of a part is looked for as finely as on the whole front
-    finest = ((box[1] - box[0]) / (PROBES * cells[0]), (box[3] - box[2]) / (PROBES * cells[1]))
+    finest = _finest(packed, tilt)
     if within is not None:
         # as dense as on the whole front
         parts = (within[1::2] - within[0::2]) / (box[1::2] - box[0::2])
@@ -286,6 +285,12 @@ def find_region(
     return Region(box, float(sums[0]), seen, float(sums[2] / sums[0]), float(np.clip(sums[5] / area, 1e-3, 1.0)))
 
 
+def _finest(packed: PackedLens, tilt: float) -> tuple[float, float]:
+    """Tell how finely what hides between the samples of a part is looked for: as on the whole front."""
+    box, cells = front_box(packed, tilt), _cells(packed, PREPASS)
+    return float(box[1] - box[0]) / (PROBES * cells[0]), float(box[3] - box[2]) / (PROBES * cells[1])
+
+
 def measure_region(
     packed: PackedLens, path: LightPath, tilt: float, iris_radius: float, view_radius: float, box: Floats
 ) -> Region | None:
@@ -304,7 +309,7 @@ def measure_region(
     """
     w, cells = _fitted(packed)[0], _cells(packed, FINER)
     arguments = (*_arguments(packed, w, path, tilt), path.stop_crossings, iris_radius, view_radius)
-    found, sums, _ = _scan(packed, arguments, box, cells)
+    found, sums, _ = _scan(packed, arguments, box, cells, _finest(packed, tilt))
     if found[1] <= found[0] or sums[0] <= 0.0:
         return None
     # other colours than the middle one may pass a little beside: one more cell of room

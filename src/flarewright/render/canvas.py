@@ -18,6 +18,8 @@ Plane = NDArray[np.float32] | NDArray[np.float64]
 DETAILS = 3
 # lines of a picture that are looked at together
 _STRIP = 32
+# where ghosts fainter than these parts of the picture's mean are drawn
+DETAIL_CONTRAST = (1.5e-2, 4e-3)
 
 
 @dataclass(frozen=True)

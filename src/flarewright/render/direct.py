@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -115,6 +116,12 @@ def defocus_mm(lens: Lens, shot: Shot) -> float:
     # the marginal ray of a near light is lower on the first vertex' plane than in the entrance pupil, or higher
     height = 0.5 * order.entrance_pupil_diameter / (1.0 + nearness * order.entrance_pupil_z)
     return 2.0 * height * abs(float(total[0, 0] + nearness * total[0, 1]))
+
+
+def widest_defocus_mm(lens: Lens, shots: Sequence[Shot]) -> float:
+    """Return the largest `defocus_mm` of some lights; distant ones have the same."""
+    apart = {shot.packed.nearness / shot.incidence.tilt_cosine: shot for shot in shots}
+    return max(defocus_mm(lens, shot) for shot in apart.values())
 
 
 def traced_spot(lens: Lens, shot: Shot, offset: tuple[float, float] = (0.0, 0.0)) -> Floats | None:

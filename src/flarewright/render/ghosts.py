@@ -19,7 +19,14 @@ from ..optics.color import luminance_weights
 from ..optics.paths import LightPath
 from .art import PLAIN, PathArt
 from .canvas import DETAILS, Plane, blank, merge, to_layer
-from .ghosts_draft import draft_alone, draw_draft, draw_draft_by_hand
+from .ghosts_draft import (
+    draft_alone,
+    draft_details,
+    draw_draft,
+    draw_draft_by_hand,
+    draw_draft_coarsely,
+    seen_small,
+)
 from .ghosts_final import FinalPass, contrast, detail_of, draw_alone, draw_final
 from .looking import looking
 from .shot import Shot
@@ -215,7 +222,7 @@ def _final(
 
     wide = _alike([item for k in order if k not in alone for item in found[k]], level)
     jobs = [partial(draw_spread, wide[k::_MOST_CHUNKS]) for k in range(min(len(wide), _MOST_CHUNKS))]
-    total, layers = _collect(shots, order, named, singles, art, draw, pool, jobs)
+    total, layers = _collect(shots, order, named, singles, art, draw, pool, jobs, len(shots))
     share = float(flux[~keep].sum() / flux.sum()) if flux.sum() > 0.0 else 0.0
     names = tuple(path.name for path in named)
     culled = int((~keep).sum())
@@ -233,18 +240,28 @@ def _draft(
     meter: _Meter,
 ) -> GhostPass:
     points, wide = ([s for s in shots if (s.border is None) == point] for point in (True, False))
+    order = list(range(len(paths))) if singles == 0 else _rank_draft(shots, paths, art)
+    alone = set(order if singles is None else order[:singles])
+    plain = [k for k in range(len(paths)) if paths[k].name not in art]
+    coarse = draft_details(points, [paths[k] for k in plain]) if len(points) >= MANY_LIGHTS else None
 
     def draw(group: list[int]) -> list[Plane | None]:
         width, height = shots[0].size_px
-        picture = np.zeros((height, width, 3))
+        sheets: list[Plane | None] = [None] * DETAILS
+        sheets[0] = picture = np.zeros((height, width, 3))
+        mine = [k for k in plain if k in group]
         by_hand = [(paths[k], art[paths[k].name]) for k in group if paths[k].name in art]
         # those that are only graded or moved alike are drawn together
         graded: dict[object, list[LightPath]] = {}
         for path, changed in by_hand:
             if not changed.alone and not changed.framed:
                 graded.setdefault((changed.rgb, changed.offset), []).append(path)
-        for shot in points:
-            draw_draft(shot, [paths[k] for k in group if paths[k].name not in art], picture)
+        for number, shot in enumerate(points):
+            if coarse is None or not alone.isdisjoint(group):
+                draw_draft(shot, [paths[k] for k in mine], picture)
+            else:
+                details = {k: int(d) for k, d in zip(plain, coarse[number], strict=True) if k in group}
+                draw_draft_coarsely(shot, [(paths[k], details[k]) for k in mine], sheets)
             for alike_graded in graded.values():
                 changed = art[alike_graded[0].name]
                 placed = changed.place(shot.to_pixels, None)
@@ -252,7 +269,9 @@ def _draft(
             for path, changed in by_hand:
                 if changed.framed and not changed.alone:
                     draw_draft_by_hand(shot, path, changed, picture)
-        sum_rows(picture)
+        for sheet in sheets:
+            if sheet is not None:
+                sum_rows(sheet)
         # blurring is linear, so ghosts of one blur are blurred together
         alike: dict[object, list[tuple[Shot, LightPath, PathArt]]] = {}
         for number, (shot, (path, changed)) in enumerate(product(points, by_hand)):
@@ -265,9 +284,8 @@ def _draft(
             picture += spread
         for k in group:
             meter.step(f"ghost {paths[k].name}")
-        return [picture]
+        return sheets
 
-    order = list(range(len(paths))) if singles == 0 else _rank_draft(shots, paths, art)
     named = [paths[k] for k in order]
     total, layers = _collect(shots, order, named, singles, art, draw, pool)
     return GhostPass(total, layers, len(paths), None, 0, 0.0, 0)
@@ -295,10 +313,7 @@ def _spread_drafts(
 
 def _rank_draft(shots: Sequence[Shot], paths: Sequence[LightPath], art: Mapping[str, PathArt]) -> list[int]:
     """Order paths by their flux in the picture, seen at a sixteenth of the resolution."""
-    small = [
-        replace(shot, to_pixels=shot.to_pixels / 16.0, size_px=(-(-shot.size_px[0] // 16), -(-shot.size_px[1] // 16)))
-        for shot in shots
-    ]
+    small = [seen_small(shot, 16) for shot in shots]
     flux = np.zeros(len(paths))
     for k, path in enumerate(paths):
         for shot in small:
@@ -388,15 +403,19 @@ def _collect(
     draw: Callable[[list[int]], list[Plane | None]],
     pool: ThreadPoolExecutor,
     jobs: Sequence[Callable[[], list[Plane | None]]] = (),
+    ghosts_each: int = 1,
 ) -> tuple[Layer, tuple[Layer, ...]]:
-    """Draw the first `singles` items by themselves, the others in a fixed number of groups, then jobs; add in order."""
+    """Draw the first `singles` items by themselves, the others in a fixed number of groups, then jobs; add in order.
+
+    An item is so many ghosts' work.
+    """
     shot = shots[0]
     width, height = shot.size_px
     pixel_area = 1.0 / float(shot.to_pixels[2] * shot.to_pixels[3])
     luminance = luminance_weights(shot.colorspace)
     alone = len(items) if singles is None else min(singles, len(items))
     most = next((n for size, n in _CHUNKS if width * height <= size), 2)
-    chunks = max(1, min(most, (len(items) - alone) * len(shots) // _GHOSTS_A_CHUNK))
+    chunks = max(1, min(most, (len(items) - alone) * ghosts_each // _GHOSTS_A_CHUNK))
     rest = [items[alone + c :: chunks] for c in range(chunks)]
     totals: list[Plane | None] = [None] * DETAILS
     layers = []

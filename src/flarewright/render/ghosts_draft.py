@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 
 from ..kernels.matrix import draw_matrix_ghosts, path_matrices
 from ..kernels.raster import sum_rows
+from ..optics.color import luminance_weights
 from ..optics.paths import LightPath
 from .art import Frame, PathArt
-from .canvas import DETAILS, Plane, merge
+from .canvas import DETAIL_CONTRAST, DETAILS, Plane, merge
 from .grade import coarseness, finish
 from .shot import Shot
 from .spread import shape_kernel, spread_within
@@ -61,6 +62,66 @@ def draw_draft(
         nearness, opening.edges, opening.radius, opening.mask, opening.half, axes, shot.to_pixels, shot.gain,
         shot.weights(packed.wavelengths_nm) * rgb, differences,
     )  # fmt: skip
+
+
+def seen_small(shot: Shot, times: int) -> Shot:
+    """Return a shot at a resolution so many times smaller."""
+    size = (-(-shot.size_px[0] // times), -(-shot.size_px[1] // times))
+    return replace(shot, to_pixels=shot.to_pixels / times, size_px=size)
+
+
+def draft_details(shots: Sequence[Shot], paths: Sequence[LightPath]) -> NDArray[np.int64]:
+    """Tell how often the resolution may be halved for each ghost among those of many lights.
+
+    Parameters
+    ----------
+    shots : sequence of Shot
+    paths : sequence of LightPath
+
+    Returns
+    -------
+    ndarray, shape (len(shots), len(paths))
+
+    Notes
+    -----
+    As in final quality (docs/adr/0003), but each path's irradiance is that of one light of middling field angle, at a
+    sixteenth of the resolution, times each light's intensity.
+    """
+    middle = sorted(shots, key=lambda shot: shot.incidence.tilt)[len(shots) // 2]
+    small = seen_small(middle, 16)
+    luminance = luminance_weights(small.colorspace)
+    seen = np.zeros((len(paths), 2))
+    for k, path in enumerate(paths):
+        picture = np.zeros((small.size_px[1], small.size_px[0], 3))
+        draw_draft(small, [path], picture)
+        sum_rows(picture)
+        light = picture @ luminance
+        total = float(light.sum())
+        seen[k] = total, float((light**2).sum()) / total if total > 0.0 else 0.0
+    power = np.array([shot.light.intensity for shot in shots])
+    level = power.sum() * seen[:, 0].sum() / (small.size_px[0] * small.size_px[1])
+    contrast = power[:, None] * seen[:, 1] / level if level > 0.0 else np.full((len(shots), len(paths)), np.inf)
+    return np.sum([contrast < limit for limit in DETAIL_CONTRAST], axis=0)
+
+
+def draw_draft_coarsely(shot: Shot, ghosts: Sequence[tuple[LightPath, int]], sheets: list[Plane | None]) -> None:
+    """Mark paraxial ghosts, each at a resolution of its own.
+
+    Parameters
+    ----------
+    shot : Shot
+    ghosts : sequence of (LightPath, int)
+        How often each one's resolution is halved.
+    sheets : list of ndarray or None
+        One a resolution, as `draw_draft` takes; made where there is none, and added to.
+    """
+    for detail in range(DETAILS):
+        paths = [path for path, halved in ghosts if halved == detail]
+        if paths:
+            small = seen_small(shot, 2**detail)
+            if sheets[detail] is None:
+                sheets[detail] = np.zeros((small.size_px[1], small.size_px[0], 3))
+            draw_draft(small, paths, sheets[detail])
 
 
 def draw_draft_by_hand(shot: Shot, path: LightPath, art: PathArt, differences: Floats) -> None:

@@ -24,7 +24,7 @@ from ..optics.border import points
 from ..optics.bundle import Bundle, Region, find_region, measure_region, trace_bundle, trace_grid
 from ..optics.paths import LightPath
 from .art import PLAIN, Frame, PathArt
-from .canvas import DETAILS, Canvas, Plane, blank, merge
+from .canvas import DETAIL_CONTRAST, DETAILS, Canvas, Plane, blank, merge
 from .few_colors import gathered_weights
 from .grade import coarseness, finish
 from .shot import Shot
@@ -39,8 +39,6 @@ Floats = NDArray[np.float64]
 # lateral colour wider than this many pixels between two drawn wavelengths would show as steps
 BRIDGE_PX = 2.0
 SHIFT_QUANTILE = 0.9
-# ghosts fainter than these parts of the picture's mean are drawn at a half and a quarter of the resolution
-DETAIL_CONTRAST = (1.5e-2, 4e-3)
 # a step of colour or a ring fainter than this part of the picture's mean is not seen
 STEP_CONTRAST = 2e-3
 # and a ghost this many times fainter still needs one colour only

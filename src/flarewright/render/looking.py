@@ -78,7 +78,7 @@ def _rows(shots: Sequence[Shot]) -> list[list[int]]:
     """Collect the distant points that differ by their field angle alone, in its order, where they are many."""
     groups: dict[tuple[float, ...], list[int]] = {}
     for k, shot in enumerate(shots):
-        if shot.corners is None and shot.packed.nearness == 0.0 and shot.packed.symmetric and shot.packed.halves == 2:
+        if shot.border is None and shot.packed.nearness == 0.0 and shot.packed.symmetric and shot.packed.halves == 2:
             groups.setdefault(tuple(shot.packed.wavelengths_nm), []).append(k)
     many = [group for group in groups.values() if len(group) >= MANY]
     return [sorted(group, key=lambda k: (-shots[k].incidence.tilt, k)) for group in many]

@@ -18,7 +18,7 @@ from ..optics.paths import direct_path, ghost_paths
 from ..optics.shape import ideal
 from .art import ResolvedArt, directed, graded, resolve_art
 from .compose import beauty
-from .direct import DirectImage, defocus_mm, direct_image
+from .direct import DirectImage, direct_image, widest_defocus_mm
 from .ghosts import plain_level, render_ghosts
 from .prepare import Settled, settle
 from .scatter import dimmed, render_scatter, scatter_facts, scatter_of
@@ -122,7 +122,7 @@ def render(
         facts, told = scatter_facts(settled, tables)
         scattered = {"scatter": facts}
     if project.output.starburst:
-        passes.insert(0, starburst_of(settled, shots, images, mask, soil))
+        passes.insert(0, starburst_of(settled, shots, images, mask, soil, threads=threads))
     passes = [graded(layer, art.gain.get(layer.name.removesuffix(".order4"), 1.0)) for layer in passes]
     others = [graded(layer, art.gain.get("ghosts", 1.0)) for layer in drawn.others]
     whole = beauty(passes, project.camera.size_px)
@@ -253,7 +253,7 @@ def _reference(
 
 def _remarks(settled: Settled, shots: tuple[Shot, ...]) -> tuple[str, ...]:
     told = []
-    blur_px = max(defocus_mm(settled.lens, shot) * float(shot.to_pixels[2]) for shot in shots)
+    blur_px = widest_defocus_mm(settled.lens, shots) * float(shots[0].to_pixels[2])
     if settled.project.output.starburst and blur_px > OUT_OF_FOCUS_PX:
         of = f"the direct image of {'the light' if len(shots) == 1 else 'a light'} is out of focus"
         told.append(f"{of}: a disc {blur_px:.1f} pixels wide")

@@ -25,7 +25,7 @@ NEAR_PIXELS = 8
 
 NEAR_SPLIT = 8
 
-__all__ = ["starburst_layer"]
+__all__ = ["Painter", "painter_of", "starburst_layer"]
 
 
 def starburst_layer(
@@ -95,12 +95,8 @@ def starburst_layer(
     strength = np.abs(weights).max(axis=1)
     if not strength.any():
         return picture
-    wave, weights = _finer(wave, weights, 2.0 * f_number, min(pixel_mm))
     pattern = pupil_pattern(iris, mask) if pattern is None else pattern
-    # The shortest wavelength that matters reaches the table's end at the outer radius, all others stay inside.
-    lit = np.cumsum(strength) > 1e-3 * strength.sum()
-    outer = pattern.reach * 2.0 * f_number * float(np.asarray(wavelengths_nm, dtype=np.float64)[lit][0]) * 1e-6
-    painter = _Painter(pattern, f_number, wave, weights, 0.5 * outer, outer)
+    painter = painter_of(pattern, f_number, pixel_mm, wave, weights)
     painter.paint(x_edges, y_edges, pixel_mm, picture)
 
     # Where the blend begins inside the near zone, pixels there are too coarse for it.
@@ -117,7 +113,33 @@ def starburst_layer(
     return picture
 
 
-class _Painter:
+def painter_of(
+    pattern: Pattern, f_number: float, pixel_mm: tuple[float, float], wavelengths_nm: Floats, weights: Floats
+) -> Painter:
+    """Make a pattern ready for pixels of a size.
+
+    Parameters
+    ----------
+    pattern : Pattern
+    f_number, pixel_mm
+        As in `starburst_layer`.
+    wavelengths_nm : ndarray, shape (M,)
+    weights : ndarray, shape (M, 3)
+        Some of them not 0.
+
+    Returns
+    -------
+    Painter
+    """
+    strength = np.abs(weights).max(axis=1)
+    # The shortest wavelength that matters reaches the table's end at the outer radius, all others stay inside.
+    lit = np.cumsum(strength) > 1e-3 * strength.sum()
+    outer = pattern.reach * 2.0 * f_number * float(wavelengths_nm[lit][0]) * 1e-6
+    wave, finer = _finer(wavelengths_nm, weights, 2.0 * f_number, min(pixel_mm))
+    return Painter(pattern, f_number, wave, finer, 0.5 * outer, outer)
+
+
+class Painter:
     """One light's pattern, ready for any grid of pixels."""
 
     def __init__(

@@ -17,6 +17,7 @@ from ..optics.border import mapped, points
 from ..optics.diffraction import BladeWings, Pattern, Soil, pupil_pattern
 from ..optics.paths import direct_path
 from .direct import PUPIL_SPAN, DirectImage, defocus_mm, traced_pupil, traced_spot
+from .many_stars import Stars, draw_stars, fits
 from .prepare import Settled
 from .shot import Shot
 from .sources import motion
@@ -31,6 +32,10 @@ DIFFRACTION_STEP_NM = 5.0
 SPIRAL_COPIES = 9
 # a direct image whose disc of defocus is wider than this is drawn out of focus
 OUT_OF_FOCUS_PX = 1.0
+# so many lights of one look are drawn together
+MANY_LIGHTS = 8
+# one look is one spectrum, but for its strength, to this part of its mean
+SAME_SPECTRUM = 0.05
 
 __all__ = ["read_soil", "starburst_of"]
 
@@ -72,6 +77,8 @@ def starburst_of(
     images: Sequence[DirectImage],
     mask: Floats | None,
     soil: Soil | None = None,
+    *,
+    threads: int | None = None,
 ) -> Layer:
     """Draw the direct image of every light, spread by diffraction at the iris.
 
@@ -84,6 +91,8 @@ def starburst_of(
         The iris as an image.
     soil : Soil or None
         From `read_soil`.
+    threads : int, optional
+        None: all cores; the pixels do not depend on it.
 
     Returns
     -------
@@ -102,11 +111,84 @@ def starburst_of(
     scene = _Scene(settled, mask, soil, look)
     width, height = shots[0].size_px
     total = np.zeros((height, width, 3), dtype=np.float32)
-    for _, of_one in groupby(zip(shots, images, strict=True), lambda pair: pair[0].number):
-        picture = _one_light(scene, list(of_one))
+    lights = [list(of_one) for _, of_one in groupby(zip(shots, images, strict=True), lambda pair: pair[0].number)]
+    groups, others = _alike(scene, lights)
+    for group in groups:
+        total += _many_lights(scene, group, threads)
+    for parts in others:
+        picture = _one_light(scene, parts)
         if picture is not None:
             total += picture
     return Layer("starburst", total, (0, 0, width, height))
+
+
+def _alike(
+    scene: _Scene, lights: list[list[tuple[Shot, DirectImage]]]
+) -> tuple[list[list[tuple[Shot, DirectImage]]], list[list[tuple[Shot, DirectImage]]]]:
+    """Collect lights whose direct images are one pattern at many places; the rest are drawn one by one."""
+    if len(lights) < MANY_LIGHTS or scene.look.cats_eye or scene.look.spiral_deg > 0.0:
+        return [], lights
+    groups: list[list[tuple[Shot, DirectImage]]] = []
+    others = []
+    blurred: dict[float, bool] = {}
+    for parts in lights:
+        shot, image = parts[0]
+        # all distant lights are as sharp as one
+        distance = shot.packed.nearness / shot.incidence.tilt_cosine
+        if distance not in blurred:
+            blurred[distance] = _out_of_focus(scene.settled, shot)
+        if shot.border is not None or blurred[distance]:
+            others.append(parts)
+        elif _flux(shot, image) > 0.0:
+            same = (group for group in groups if _one_look(group[0], parts[0]))
+            group = next(same, None)
+            if group is None:
+                groups.append(list(parts))
+            else:
+                group.append(parts[0])
+    few = [group for group in groups if len(group) < MANY_LIGHTS]
+    return [group for group in groups if len(group) >= MANY_LIGHTS], others + [[pair] for group in few for pair in group]
+
+
+def _one_look(a: tuple[Shot, DirectImage], b: tuple[Shot, DirectImage]) -> bool:
+    """Tell whether two direct images have the same spectrum but for its strength."""
+    if a[0].light.spectrum != b[0].light.spectrum:
+        return False
+    one, other = (image.throughput_mm2 / image.throughput_mm2.mean() for _, image in (a, b))
+    return bool(np.abs(one - other).max() < SAME_SPECTRUM)
+
+
+def _many_lights(
+    scene: _Scene, group: list[tuple[Shot, DirectImage]], threads: int | None
+) -> NDArray[np.floating]:
+    """Draw lights of one look together."""
+    shot = group[0][0]
+    fine_nm = _diffracted_wavelengths(shot)
+    (pattern,) = _patterns(scene, shot, np.zeros(1))
+    if pattern is None or not fits(pattern):
+        drawn = [picture for pair in group if (picture := _one_light(scene, [pair])) is not None]
+        return np.sum(drawn, axis=0)
+    pixels = shot.to_pixels
+    places = np.array([image.position_mm for _, image in group]) * [pixels[2], -pixels[3]] + pixels[:2]
+    flux = np.array([
+        np.interp(fine_nm, lit.packed.wavelengths_nm, lit.light.intensity * image.throughput_mm2) for lit, image in group
+    ])  # fmt: skip
+    mean = flux.mean(axis=0)
+    colors = shot.weights(fine_nm) * (scene.look.intensity * pattern.transmittance)
+    whole, each = mean @ colors, flux @ colors
+    # a channel that the spectrum hardly touches follows the light as a whole
+    dim = np.abs(whole) < 1e-6 * np.abs(whole).max()
+    gains = np.where(dim, (flux.sum(axis=1) / mean.sum())[:, None], each / np.where(dim, 1.0, whole))
+    stars = Stars(
+        pattern, scene.settled.order.f_number * scene.look.size, fine_nm, colors * mean[:, None], places, gains
+    )
+    pixel = (1.0 / float(pixels[2]), 1.0 / float(pixels[3]))
+    draft = scene.settled.project.quality.mode == "draft"
+    return draw_stars(stars, pixel, shot.size_px, draft=draft, threads=threads)
+
+
+def _out_of_focus(settled: Settled, shot: Shot) -> bool:
+    return defocus_mm(settled.lens, shot) >= OUT_OF_FOCUS_PX / float(shot.to_pixels[2:].max())
 
 
 def _one_light(scene: _Scene, parts: list[tuple[Shot, DirectImage]]) -> NDArray[np.floating] | None:
@@ -174,7 +256,7 @@ def _kernel(
     """
     settled, shot = scene.settled, brightest[0]
     shape = _shape(settled, parts, brightest, offset) if shot.border is not None else None
-    if defocus_mm(settled.lens, shot) < OUT_OF_FOCUS_PX / float(shot.to_pixels[2:].max()):
+    if not _out_of_focus(settled, shot):
         return shape
     spot = traced_spot(settled.lens, shot, offset if shape is None else (0.0, 0.0))
     if spot is None or shape is None:
