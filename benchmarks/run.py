@@ -27,6 +27,7 @@ from typing import Any
 import numba
 import numpy as np
 from benchmarks.design import design
+from benchmarks.lights import area, lights, surfaces
 
 import flarewright
 from flarewright.kernels.raster import blank_plane, fill_polygon
@@ -57,8 +58,8 @@ from flarewright.render.render import render
 from flarewright.render.shot import make_opening, make_shots
 
 PARTS = (
-    "yardsticks", "trace", "raster", "frame", "art", "built", "scatter", "ringing", "reference", "design", "startup",
-    "memory",
+    "yardsticks", "trace", "raster", "frame", "art", "built", "lights", "area", "surfaces", "scatter", "ringing",
+    "reference", "design", "startup", "memory",
 )  # fmt: skip
 
 LIGHT = (10.0, 5.0)
@@ -464,6 +465,9 @@ def main(arguments: list[str] | None = None) -> None:
         "frame": lambda: frame(asked.repeat),
         "art": lambda: art(asked.repeat),
         "built": lambda: built(asked.repeat),
+        "lights": lambda: lights(lambda work: median_seconds(work, asked.repeat), row),
+        "area": lambda: area(lambda work: median_seconds(work, asked.repeat), row),
+        "surfaces": lambda: surfaces(lambda work: median_seconds(work, asked.repeat), row),
         "scatter": lambda: scatter(asked.repeat),
         "ringing": lambda: ringing(asked.repeat),
         "reference": lambda: reference(asked.repeat),

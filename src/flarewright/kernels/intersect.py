@@ -108,7 +108,7 @@ def _polynomial(shapes, row, x, y):
 
 
 @inner
-def _image(shapes, row, x, y):
+def height_of_image(shapes, row, x, y):
     """Return the height of the image's uniform cubic B-spline, mm, and its gradient; flat beyond its border."""
     side = int(shapes[row, SIDE])
     step = 2.0 * shapes[row, HALF] / side
@@ -185,7 +185,7 @@ def sag_of_shape(shapes, row, x, y):
         value, along_x, along_y = _polynomial(shapes, row, x, y)
         sag, slope_x, slope_y = sag + value, slope_x + along_x, slope_y + along_y
     if shapes[row, SIDE] > 0.0:
-        value, along_x, along_y = _image(shapes, row, x, y)
+        value, along_x, along_y = height_of_image(shapes, row, x, y)
         sag, slope_x, slope_y = sag + value, slope_x + along_x, slope_y + along_y
     return sag, slope_x, slope_y, room
 

@@ -33,7 +33,7 @@ def _rise(t):
 
 @inlined
 def _round(look, x, y):
-    """What a round border sends to a place: the part that is sharp, and what its colour is multiplied by."""
+    """Return which part of a round border's light at a place is sharp, and what its colour is multiplied by."""
     r = math.sqrt(x * x + y * y)
     part = _rise((r - look[DISC_IN]) / (look[DISC_OUT] - look[DISC_IN]))
     area = look[PIXEL_X] * look[PIXEL_X] + look[PIXEL_Y] * look[PIXEL_Y]

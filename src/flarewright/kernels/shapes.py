@@ -1,15 +1,13 @@
-"""Tracing through rows of any shape and place: aspheres, cylinders, toroids, decentre, tilt, figure errors.
+"""One ray through rows of any shape and place: aspheres, cylinders, toroids, decentre, tilt, figure errors.
 
-Ray by ray, without lanes: compiled only for lenses that have such rows (`kernels.trace.trace_nodes` asks the type of
-its `conic`).
+For drawings and random rays; bundles go in lanes (`kernels.shape_lanes`). Compiled only for lenses that have such rows
+(`kernels.trace.trace_nodes` asks the type of its `conic`).
 """
-
-from math import sqrt
 
 import numpy as np
 
 from ._jit import inner
-from .bend import ALIVE, REFLECT, REL, STOP, STOP_X, WEIGHT, X, Y, bend_at, ray_from_near
+from .bend import REFLECT, STOP, bend_at, ray_from_near
 from .intersect import (
     AXES,
     CENTRED,
@@ -96,68 +94,13 @@ def _turn_back(shapes, row, x, y, z):
 
 
 @inner
-def trace_shapes(
-    rows, actions, shapes, z_vertex, inv_semi, n_gap, reflectance, sensor_z, tilt, nearness, px, py, out,
-):  # fmt: skip
-    """Trace rays as `kernels.trace.trace_nodes` does, through rows of any shape.
-
-    Parameters
-    ----------
-    rows, actions
-        As in `trace_nodes`.
-    shapes : ndarray, shape (K, P)
-        The shape table (`kernels.intersect`), in the frame of the rays.
-    z_vertex ... out
-        As in `trace_nodes`. A rim belongs to its surface: it is decentred and tilted with it.
-    """
-    samples = reflectance.shape[1]
-    for k in range(px.shape[0]):
-        x, y, z = px[k], py[k], 0.0
-        dx, dy, dz = 0.0, np.sin(tilt), np.cos(tilt)
-        weight, rel2, alive, heading, passed = 1.0, 0.0, 1.0, 1.0, 0.0
-        if nearness > 0.0:
-            dx, dy, dz, weight = ray_from_near(tilt, nearness, x, y)
-        crossing = 0
-        for step in range(rows.shape[0]):
-            row = rows[step]
-            vertex = z_vertex[row]
-            if actions[step] == STOP:
-                t = (vertex - z) / dz
-                x, y, z = x + t * dx, y + t * dy, vertex
-                out[k, STOP_X + 2 * crossing], out[k, STOP_X + 2 * crossing + 1] = x, y
-                crossing += 1
-                continue
-            mirror = 1.0 if actions[step] == REFLECT else 0.0
-            n_in, n_out = (n_gap[row], n_gap[row + 1]) if heading > 0.0 else (n_gap[row + 1], n_gap[row])
-            x, y, z, dx, dy, dz, radius2, cos_in, cos_out, ok = cross_shape(
-                shapes, row, vertex, x, y, z, dx, dy, dz, heading, n_in / n_out, mirror
-            )
-            rel2 = max(rel2, radius2 * inv_semi[row] * inv_semi[row])
-            if not ok:
-                alive = 0.0
-                break
-            passed += 1.0
-            place = min(cos_in if n_in <= n_out else cos_out, 1.0) * (samples - 1)
-            cell = min(np.int64(place), samples - 2)
-            r = reflectance[row, cell] + (place - cell) * (reflectance[row, cell + 1] - reflectance[row, cell])
-            weight *= r if mirror > 0.0 else 1.0 - r
-            if mirror > 0.0:
-                heading = -heading
-        for m in range(STOP_X + 2 * crossing, out.shape[1]):
-            out[k, m] = 0.0
-        t = (sensor_z - z) / dz
-        out[k, X], out[k, Y] = x + t * dx if alive > 0.0 else passed, y + t * dy
-        out[k, WEIGHT], out[k, REL], out[k, ALIVE] = weight, sqrt(rel2), alive
-
-
-@inner
 def hit_shapes(rows, actions, shapes, z_vertex, n_gap, sensor_z, tilt, nearness, px, py, hits):
     """Keep every hit, as `kernels.trace.trace_hits` does, through rows of any shape.
 
     Parameters
     ----------
     rows ... hits
-        As in `trace_hits`, `shapes` as in `trace_shapes`.
+        As in `trace_hits`, `shapes` as in `cross_shape`.
     """
     for k in range(px.shape[0]):
         x, y, z = px[k], py[k], 0.0

@@ -7,7 +7,8 @@ import numpy as np
 from ._jit import compiled, inner
 from .bend import ALIVE, LANES, REFLECT, REFRACT, REL, STOP, STOP_X, WEIGHT, X, Y, bend, ray_from_near
 from .intersect import intersect_conic
-from .shapes import hit_shapes, trace_shapes
+from .shape_lanes import trace_shapes
+from .shapes import hit_shapes
 
 __all__ = [
     "ALIVE", "LANES", "REFLECT", "REFRACT", "REL", "STOP", "STOP_X", "WEIGHT", "X", "Y", "bend", "trace_hits",

@@ -247,7 +247,7 @@ def _draft(
 
     def draw(group: list[int]) -> list[Plane | None]:
         width, height = shots[0].size_px
-        sheets: list[Plane | None] = [None] * DETAILS
+        sheets: list[NDArray[np.float64] | None] = [None] * DETAILS
         sheets[0] = picture = np.zeros((height, width, 3))
         mine = [k for k in plain if k in group]
         by_hand = [(paths[k], art[paths[k].name]) for k in group if paths[k].name in art]
@@ -284,7 +284,7 @@ def _draft(
             picture += spread
         for k in group:
             meter.step(f"ghost {paths[k].name}")
-        return sheets
+        return list(sheets)
 
     named = [paths[k] for k in order]
     total, layers = _collect(shots, order, named, singles, art, draw, pool)
@@ -373,9 +373,7 @@ def _worth_drawing(flux: NDArray[np.float64], cull: float) -> NDArray[np.bool_]:
     return keep
 
 
-def _without_faint(
-    found: Sequence[list[FinalPass]], alone: set[int]
-) -> tuple[list[list[FinalPass]], int, float]:
+def _without_faint(found: Sequence[list[FinalPass]], alone: set[int]) -> tuple[list[list[FinalPass]], int, float]:
     """Leave out the faintest ghosts of single lights among many, but none of a path that gets a layer of its own.
 
     Returns what is left, how many were left out, and their part of the flux.

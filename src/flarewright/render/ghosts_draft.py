@@ -101,10 +101,11 @@ def draft_details(shots: Sequence[Shot], paths: Sequence[LightPath]) -> NDArray[
     power = np.array([shot.light.intensity for shot in shots])
     level = power.sum() * seen[:, 0].sum() / (small.size_px[0] * small.size_px[1])
     contrast = power[:, None] * seen[:, 1] / level if level > 0.0 else np.full((len(shots), len(paths)), np.inf)
-    return np.sum([contrast < limit for limit in DETAIL_CONTRAST], axis=0)
+    details: NDArray[np.int64] = np.sum([contrast < limit for limit in DETAIL_CONTRAST], axis=0)
+    return details
 
 
-def draw_draft_coarsely(shot: Shot, ghosts: Sequence[tuple[LightPath, int]], sheets: list[Plane | None]) -> None:
+def draw_draft_coarsely(shot: Shot, ghosts: Sequence[tuple[LightPath, int]], sheets: list[Floats | None]) -> None:
     """Mark paraxial ghosts, each at a resolution of its own.
 
     Parameters
@@ -119,9 +120,10 @@ def draw_draft_coarsely(shot: Shot, ghosts: Sequence[tuple[LightPath, int]], she
         paths = [path for path, halved in ghosts if halved == detail]
         if paths:
             small = seen_small(shot, 2**detail)
-            if sheets[detail] is None:
-                sheets[detail] = np.zeros((small.size_px[1], small.size_px[0], 3))
-            draw_draft(small, paths, sheets[detail])
+            held = sheets[detail]
+            if held is None:
+                held = sheets[detail] = np.zeros((small.size_px[1], small.size_px[0], 3))
+            draw_draft(small, paths, held)
 
 
 def draw_draft_by_hand(shot: Shot, path: LightPath, art: PathArt, differences: Floats) -> None:

@@ -256,7 +256,7 @@ def draw_final(
 
 
 def _drawn_in_few(item: FinalPass, bundle: Bundle, plane: Plane, to_pixels: Floats) -> bool:
-    """Draw a ghost whose steps of colour nobody sees at the wavelengths of its grid alone, if these can stand for all."""
+    """Draw a ghost whose steps of colour nobody sees at its grid's wavelengths alone, if these can stand for all."""
     shot, path, opening = item.shot, item.path, item.shot.opening
     shown = tuple(sorted(bundle.traced))
     colors = shot.weights(shot.packed.wavelengths_nm) * item.art.rgb

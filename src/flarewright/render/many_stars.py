@@ -24,7 +24,7 @@ Floats = NDArray[np.float64]
 # cells of the fine pattern a pixel, at most, and a side
 FINEST, DRAFT_FINEST, MOST_CELLS = 8, 4, 1280
 # and of its peak, so many pixels to every side
-PEAK, DRAFT_PEAK, PEAK_PX = 48, 16, 2
+PEAK, PEAK_PX = 64, 1
 # pixels between coarse samples of the wings
 COARSE = 4
 # pixels from a spike's middle, and beyond the finely drawn square, over which coarse samples take over
@@ -204,9 +204,9 @@ def _lay_centres(
     height, width = total.shape[:2]
     half = reach + 1
     cells = max(1, min(DRAFT_FINEST if draft else FINEST, MOST_CELLS // (2 * half)))
-    # the peak is finer than the rest: a third of its width by diffraction, where it is less than a pixel
+    # the peak is finer than the rest: a sixth of its width by diffraction, where it is less than a pixel
     width_px = painter.f_number * float(painter.wave.min()) * 1e-6 / max(pixel_mm)
-    finest = max(cells, min(DRAFT_PEAK if draft else PEAK, math.ceil(3.0 / width_px)))
+    finest = max(cells, min(PEAK, math.ceil(6.0 / width_px)))
     tables = [_summed(painter, pixel_mm, half, cells, PEAK_PX), _summed(painter, pixel_mm, PEAK_PX, finest, 0)]
     for (cx, cy), gain, (left, right, top, bottom) in zip(stars.centres_px, stars.gains, windows, strict=True):
         j0, j1, i0, i1 = max(left, 0), min(right, width), max(top, 0), min(bottom, height)

@@ -179,8 +179,8 @@ def _ghosts(
     if ghosts.faint:
         facts |= {"faint": ghosts.faint, "faint_share": ghosts.faint_share}
         told.append(
-            f"{len(project.lights)} lights: {ghosts.faint} ghosts of single lights that carry {ghosts.faint_share:.1e} of the ghost "
-            "light were left out"
+            f"{len(project.lights)} lights: {ghosts.faint} ghosts of single lights were left out, which carry "
+            f"{ghosts.faint_share:.1e} of the ghost light"
         )
     two = _Drawn((ghosts.total,), ghosts.singles, {"ghosts": facts}, tuple(told))
     if project.quality.orders == 2:

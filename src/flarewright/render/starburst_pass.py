@@ -147,7 +147,8 @@ def _alike(
             else:
                 group.append(parts[0])
     few = [group for group in groups if len(group) < MANY_LIGHTS]
-    return [group for group in groups if len(group) >= MANY_LIGHTS], others + [[pair] for group in few for pair in group]
+    others += [[pair] for group in few for pair in group]
+    return [group for group in groups if len(group) >= MANY_LIGHTS], others
 
 
 def _one_look(a: tuple[Shot, DirectImage], b: tuple[Shot, DirectImage]) -> bool:
@@ -158,21 +159,19 @@ def _one_look(a: tuple[Shot, DirectImage], b: tuple[Shot, DirectImage]) -> bool:
     return bool(np.abs(one - other).max() < SAME_SPECTRUM)
 
 
-def _many_lights(
-    scene: _Scene, group: list[tuple[Shot, DirectImage]], threads: int | None
-) -> NDArray[np.floating]:
+def _many_lights(scene: _Scene, group: list[tuple[Shot, DirectImage]], threads: int | None) -> NDArray[np.floating]:
     """Draw lights of one look together."""
     shot = group[0][0]
     fine_nm = _diffracted_wavelengths(shot)
     (pattern,) = _patterns(scene, shot, np.zeros(1))
     if pattern is None or not fits(pattern):
         drawn = [picture for pair in group if (picture := _one_light(scene, [pair])) is not None]
-        return np.sum(drawn, axis=0)
+        together: NDArray[np.floating] = np.sum(drawn, axis=0)
+        return together
     pixels = shot.to_pixels
     places = np.array([image.position_mm for _, image in group]) * [pixels[2], -pixels[3]] + pixels[:2]
-    flux = np.array([
-        np.interp(fine_nm, lit.packed.wavelengths_nm, lit.light.intensity * image.throughput_mm2) for lit, image in group
-    ])  # fmt: skip
+    throughputs = [lit.light.intensity * image.throughput_mm2 for lit, image in group]
+    flux = np.array([np.interp(fine_nm, shot.packed.wavelengths_nm, throughput) for throughput in throughputs])
     mean = flux.mean(axis=0)
     colors = shot.weights(fine_nm) * (scene.look.intensity * pattern.transmittance)
     whole, each = mean @ colors, flux @ colors

@@ -1,0 +1,165 @@
+"""A hundred lights: what is shared and left out must not show beside the same lights rendered one by one."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from flarewright.kernels.bundle import measure_bundle
+from flarewright.model import D65, Camera, Iris, Light, Output, Project, Quality
+from flarewright.optics.bundle import trace_bundle, trace_grid
+from flarewright.optics.diffraction import pupil_pattern
+from flarewright.optics.paths import ghost_paths
+from flarewright.optics.spectrum import band_weights
+from flarewright.render import looking
+from flarewright.render.few_colors import gathered_weights
+from flarewright.render.many_stars import Stars, draw_stars
+from flarewright.render.prepare import settle
+from flarewright.render.render import render
+from flarewright.render.shot import make_opening, make_shots
+from flarewright.render.starburst import starburst_layer
+
+SIZE = (240, 160)
+
+
+def many(count, seed=3):
+    rng = np.random.default_rng(seed)
+    angles = rng.uniform([-12.0, -8.0], [12.0, 8.0], (count, 2))
+    return tuple(
+        Light(field_deg=(float(x), float(y)), intensity=float(i))
+        for (x, y), i in zip(angles, np.exp(rng.normal(size=count)), strict=True)
+    )
+
+
+def project(lights, mode="final", **changes):
+    return Project(
+        lens="heliar-tronnier",
+        f_number=8.0,
+        lights=lights,
+        camera=Camera(size_px=SIZE),
+        quality=Quality(mode=mode, wavelengths=3 if mode == "draft" else 7, **changes),
+        output=Output(layers="passes"),
+    )
+
+
+def pictures(rendering):
+    found = {}
+    for layer in rendering.layers:
+        x, y, width, height = layer.window
+        found[layer.name] = np.zeros((SIZE[1], SIZE[0], 3))
+        found[layer.name][y : y + height, x : x + width] = layer.pixels
+    return found
+
+
+@pytest.mark.parametrize("mode", ["final", "draft"])
+def test_many_lights_are_the_sum_of_single_ones(mode):
+    lights = many(24)
+    rendering = render(project(lights, mode))
+    together = pictures(rendering)
+    singles = [pictures(render(project((light,), mode))) for light in lights]
+    for name in ("ghosts", "starburst"):
+        alone = np.sum([single[name] for single in singles], axis=0)
+        sums = together[name].sum(axis=(0, 1)) / alone.sum(axis=(0, 1))
+        assert sums == pytest.approx(np.ones(3), abs=2e-3), name
+        # what is moved about: coarse edges of faint ghosts, peaks within a pixel
+        assert np.abs(together[name] - alone).sum() < 0.02 * alone.sum(), name
+    if mode == "final":
+        facts = rendering.summary["ghosts"]
+        assert facts["faint"] > 0
+        assert 0.0 < facts["faint_share"] <= 5e-4
+        assert any("single lights" in remark for remark in rendering.remarks)
+
+
+def test_the_number_of_threads_does_not_show():
+    one, three = (render(project(many(12)), threads=threads) for threads in (1, 3))
+    for a, b in zip(one.layers, three.layers, strict=True):
+        assert np.array_equal(a.pixels, b.pixels)
+
+
+def test_a_layer_of_its_own_holds_every_light():
+    lights = many(10)
+    found = render(project(lights).replace(output=Output(layers="ghosts", starburst=False)))
+    assert found.summary["ghosts"].get("faint", 0) == 0
+    whole = sum(layer.pixels.sum() for layer in found.layers if layer.name.startswith("ghost."))
+    ghosts = next(layer for layer in found.layers if layer.name == "ghosts")
+    assert whole == pytest.approx(ghosts.pixels.sum(), rel=1e-5)
+
+
+@pytest.mark.parametrize("iris", [Iris(), Iris(blades=6, rotation_deg=7.0), Iris(blades=5)])
+def test_stars_laid_together_are_stars_drawn_one_by_one(iris):
+    wave = np.arange(380.0, 781.0, 5.0)
+    weights = band_weights(D65(), wave, "rec709")
+    pattern = pupil_pattern(iris)
+    pixel, size = (0.05, 0.06), (300, 200)
+    # within, on the border, and far outside
+    centres = np.array([[150.3, 80.8], [0.2, 199.9], [-60.0, 30.5], [222.5, 10.0]])
+    gains = np.array([[1.0, 1.0, 1.0], [0.5, 0.7, 0.9], [3.0, 3.0, 3.0], [0.1, 0.1, 0.1]])
+    stars = Stars(pattern, 8.0, wave, weights, centres, gains)
+    together = draw_stars(stars, pixel, size, draft=False, threads=2)
+    alone = np.zeros((size[1], size[0], 3))
+    for (x, y), gain in zip(centres, gains, strict=True):
+        alone += starburst_layer(iris, 8.0, pixel, size, (x, y), wave, weights * gain, pattern=pattern)
+    # the picture's border halves a peak
+    assert together.sum(axis=(0, 1)) == pytest.approx(alone.sum(axis=(0, 1)), rel=5e-4)
+    off = np.abs(together - alone) / alone
+    assert np.quantile(off, 0.99) < 0.02
+    assert np.median(off) < 2e-3
+
+
+def _shots(lights):
+    settled = settle(project(lights))
+    return settled, make_shots(settled, make_opening(settled, None))
+
+
+def test_a_region_between_two_lights_holds_what_passes():
+    """Looked for one by one and bounded by neighbours, a path's ghosts have the same flux."""
+    settled, shots = _shots(tuple(Light(field_deg=(0.1 * k, 3.0)) for k in range(60, 80)))
+    paths = ghost_paths(settled.lens)
+    shared = looking.looking(shots, paths, {})
+    assert looking._rows(shots), "nothing is shared"
+    for path in paths[::4]:
+        found = {item.shot.number: item for item in shared(path)}
+        for shot in shots[::5]:
+            item = next(iter(looking.looking([shot], paths, {})(path)), None)
+            mine = found.get(shot.number)
+            assert (item is None) == (mine is None)
+            if item is None or mine is None:
+                continue
+            flux = []
+            for region in (item.region, mine.region):
+                bundle = trace_grid(
+                    shot.packed, path, shot.incidence.tilt, (shot.opening.radius, shot.opening.inner), region,
+                    tolerance=0.25, scale=20.0,
+                )  # fmt: skip
+                flux.append(_flux(bundle, trace_bundle(shot.packed, 3, bundle, shot.incidence.tilt), path, shot))
+            assert flux[1] == pytest.approx(flux[0], rel=5e-3, abs=1e-9)
+
+
+def _flux(bundle, data, path, shot):
+    return measure_bundle(
+        data,
+        bundle.pupil,
+        bundle.triangles,
+        path.stop_crossings,
+        shot.opening.blades,
+        shot.incidence.axes,
+        bundle.halves,
+    )[0]
+
+
+def test_gathered_weights_keep_the_flux_of_every_wavelength():
+    _, (shot,) = _shots((Light(field_deg=(6.0, 3.0)),))
+    path = ghost_paths(settle(project((shot.light,))).lens)[5]
+    tilt = shot.incidence.tilt
+    (item,) = looking.looking([shot], [path], {})(path)
+    bundle = trace_grid(
+        shot.packed, path, tilt, (shot.opening.radius, shot.opening.inner), item.region, tolerance=0.25, scale=20.0
+    )
+    weights = shot.weights(shot.packed.wavelengths_nm)
+    shown = tuple(sorted(bundle.traced))
+    gathered = gathered_weights(shot.packed, bundle, tilt, weights, shown)
+    count = len(weights)
+    flux = np.array([
+        _flux(bundle, trace_bundle(shot.packed, w, bundle, tilt), path, shot) for w in range(count)
+    ])  # fmt: skip
+    assert flux[list(shown)] @ gathered == pytest.approx(flux @ weights, rel=5e-3)
