@@ -303,6 +303,10 @@ COMMAND_LINES = {
     "unknown view": ([*H, *GOOD, "--view", "aces"], "--view 'aces'"),
     "exposure nan": ([*H, *GOOD, "--exposure", "nan"], "--exposure"),
     "unknown paths": ([*H, *GOOD, "--paths", "some"], "--paths"),
+    "ghosts of a light behind": (["ghosts", "heliar-tronnier", "--light", "1,1", "--distance", "-3"], "--distance"),
+    "a sensor's ghost of no row": (
+        ["lens", "show", "heliar-tronnier", "--plot", "a.svg", "--ghost", "sensor-99"], "sensor-99 is no ghost",
+    ),
     "focus behind": ([*H, *GOOD, "--focus", "-10"], "--focus"),
     "threads zero": ([*H, *GOOD, "--threads", "0"], "--threads"),
     "output is no EXR": ([*H, "--light", "1,1", "-o", "a.jpg"], "*.exr"),

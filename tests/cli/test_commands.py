@@ -263,6 +263,27 @@ def test_ghosts_json_is_the_promised_contract(capsys):
     assert len(same_side["ghosts"]) == 13
 
 
+def test_ghosts_of_a_near_light(capsys):
+    """Far away it is distant; near, the front takes in the solid angle that it covers."""
+    arguments = ("ghosts", "heliar-tronnier", "--light", "4,3", "--fstop", "8")
+    distant, far, near = (call_json(capsys, *arguments, "--distance", distance) for distance in ("inf", "1e9", "300"))
+    for table in (distant, far, near):
+        table["ghosts"].sort(key=lambda row: (row["first_reflection"], row["second_reflection"]))
+    assert [row["throughput_mm2"] for row in far["ghosts"]] == pytest.approx(
+        [row["throughput_mm2"] for row in distant["ghosts"]], rel=5e-4
+    )
+    # a light at 300 mm is imaged behind the sensor, so the direct image is a wide disc
+    assert near["direct"]["rms_radius_mm"] > 20.0 * distant["direct"]["rms_radius_mm"]
+    project = fw.Project(
+        lens="heliar-tronnier", f_number=8.0, iris={"blades": 0}, quality={"mode": "draft", "wavelengths": 1},
+        lights=[{"field_deg": (4.0, 3.0), "distance": 300.0, "spectrum": {"kind": "lines", "lines": [(587.56, 1.0)]}}],
+        output={"layers": "passes", "starburst": False}, camera={"size_px": (60, 40)},
+    )  # fmt: skip
+    rendered = fw.render(project).summary["lights"][0]
+    assert near["direct"]["throughput_mm2"] == pytest.approx(rendered["direct_throughput_mm2"][0], rel=1e-3)
+    assert near["direct"]["centroid_mm"] == pytest.approx(rendered["direct_position_mm"], abs=0.02)
+
+
 def test_ghosts_tells_the_veiling_glare(capsys):
     words = ["ghosts", "triplet-pestrecov", "--light", "5,0", "--brightest", "1", "--glare"]
     bare = call_json(capsys, *words, "--coating", "none")["veiling_glare"]
@@ -308,6 +329,13 @@ def test_lens_show_json_has_every_row(capsys):
     text = call(capsys, "lens", "show", "heliar-tronnier").out
     for words in ("LAKN7", "stop", "flat", "99.236", "thesis"):
         assert words in text
+
+
+@pytest.mark.parametrize("ghost", [(), ("--ghost", "4-1"), ("--ghost", "sensor-8")])
+def test_lens_show_names_the_ghost_it_draws(capsys, folder, ghost):
+    said = call(capsys, "lens", "show", "heliar-tronnier", "--plot", "a.svg", "--light", "0,3", *ghost)
+    assert "no ray" not in said.err
+    assert all(f"ghost {name}, light" in (folder / "a.svg").read_text("utf-8") for name in ghost[1:])
 
 
 @pytest.mark.parametrize("more", [(), ("--light", "0,12"), ("--light", "0,12", "--ghost", "4-1")])

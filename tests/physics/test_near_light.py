@@ -15,6 +15,7 @@ from flarewright.optics.color import luminance_weights
 from flarewright.optics.pack import facing, pack_lens
 from flarewright.optics.paraxial import D_LINE_NM, first_order, path_matrices
 from flarewright.optics.paths import direct_path, ghost_path
+from flarewright.render.analysis import ghosts
 from flarewright.render.direct import defocus_mm, direct_image, traced_spot
 from flarewright.render.ledger import trace_ledger
 from flarewright.render.prepare import settle
@@ -211,5 +212,7 @@ def test_a_light_in_the_lens_is_refused():
     sag = 0.5 * abs(rows[0].curvature) * semi**2
     with pytest.raises(ProjectError, match=r"lights\[0\].distance: a light at .* stands in the lens"):
         shot_of(project(0.9 * sag, f_number=None).replace(lens=hollow))
+    with pytest.raises(ProjectError, match=r"a light at .* stands in the lens"):
+        ghosts(hollow, (0.0, 0.0), distance=0.9 * sag)
     for near, whole in ((1.2 * sag, hollow), (0.9 * sag, a_lens)):
         shot_of(project(near, f_number=None).replace(lens=whole))

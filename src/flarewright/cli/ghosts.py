@@ -24,6 +24,9 @@ EPILOG = (
 def ghosts(
     lens: Annotated[str, typer.Argument(metavar="LENS", help="A shipped lens (flarewright lenses) or a lens file.")],
     light: Annotated[str, typer.Option(metavar="X,Y", help="Field angles in degrees, right and up in the picture.")],
+    distance: Annotated[
+        float | None, typer.Option(help="Light in front of the lens, mm; inf, or left out: distant.")
+    ] = None,
     wavelength_nm: Annotated[float, typer.Option(help="One wavelength, 380 to 780.")] = 587.56,
     coating: Annotated[
         str,
@@ -108,7 +111,8 @@ def ghosts(
 
     remarks: list[str] = []
     prescription = load_lens(lens, remarks=remarks)
-    for name, value in (("--focus", focus), ("--sensor-distance", sensor_distance)):
+    distance = None if distance == math.inf else distance
+    for name, value in (("--focus", focus), ("--sensor-distance", sensor_distance), ("--distance", distance)):
         if value is not None and not (math.isfinite(value) and value > 0.0):
             raise ProjectError(f"{name} {value:g} is no distance; give millimetres above 0")
     compile_for_analysis()
@@ -128,6 +132,7 @@ def ghosts(
         cover_glass=behind,
         orders=orders,
         order4_limit=order4_limit,
+        distance=distance,
         remarks=remarks,
     )
     veil = None

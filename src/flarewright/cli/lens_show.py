@@ -27,7 +27,9 @@ def show(
     light: Annotated[
         str | None, typer.Option(metavar="X,Y", help="Draw the rays of this light beside those of the axis.")
     ] = None,
-    ghost: Annotated[str | None, typer.Option(metavar="J-I", help="Draw the rays of this ghost path.")] = None,
+    ghost: Annotated[
+        str | None, typer.Option(metavar="J-I", help="Draw the rays of this ghost path; sensor-I too.")
+    ] = None,
     zoom: Annotated[
         str | None, typer.Option(metavar="MM|NAME", help="Focal length, or a position of the lens file.")
     ] = None,
@@ -50,7 +52,10 @@ def show(
         from ..io.atomic import write_atomically
         from ..render.cross_section import cross_section
 
-        picture = cross_section(prescription, order, field_deg=angles, ghost=mirrors)
+        ghost_rows = None
+        if mirrors is not None:
+            ghost_rows = (len(prescription.rows) if mirrors[0] is None else mirrors[0], mirrors[1])
+        picture = cross_section(prescription, order, field_deg=angles, ghost=ghost_rows)
         remarks += picture.remarks
         write_atomically(plot, lambda temporary: _write_text(temporary, picture.svg))
     tell(remarks)
@@ -65,11 +70,14 @@ def _write_text(path: Path, text: str) -> None:
     path.write_text(text, "utf-8")
 
 
-def _mirrors(text: str) -> tuple[int, int]:
-    match = re.fullmatch(r"\s*(\d+)\s*-\s*(\d+)\s*", text)
+def _mirrors(text: str) -> tuple[int | None, int]:
+    """Read a path's name; None is the sensor."""
+    match = re.fullmatch(r"\s*(\d+|sensor)\s*-\s*(\d+)\s*", text, re.IGNORECASE)
     if not match:
-        raise ProjectError(f"--ghost {text!r} is no ghost path; write J-I, the rows of its two reflections, 4-1 say")
-    return int(match[1]), int(match[2])
+        raise ProjectError(
+            f"--ghost {text!r} is no ghost path; write J-I, the rows of its two reflections, 4-1 say, or sensor-I"
+        )
+    return None if match[1].lower() == "sensor" else int(match[1]), int(match[2])
 
 
 def as_data(lens: Lens, order: FirstOrder) -> dict[str, Any]:

@@ -104,6 +104,24 @@ def incidence(field_deg: tuple[float, float], distance: float | None = None, pup
     return Incidence(-atan(height / distance), axes, 1.0 / from_vertex, (from_pupil / from_vertex) ** 2)
 
 
+def least_distance(packed: PackedLens) -> float:
+    """Return how far in front of the first vertex a light must stand not to stand in the lens, mm.
+
+    Parameters
+    ----------
+    packed : PackedLens
+
+    Returns
+    -------
+    float
+        In front of the entrance pupil, and of the rim of a concave front, which stands before its vertex.
+    """
+    first = packed.first_surface
+    semi, c = float(packed.semi[first]), float(packed.curvature[first])
+    sag = c * semi**2 / (1.0 + sqrt(max(1.0 - (c * semi) ** 2, 0.0)))
+    return max(0.0, -packed.first_order.entrance_pupil_z, -float(packed.z_vertex[first]) - min(sag, 0.0))
+
+
 @dataclass(frozen=True)
 class Bundle:
     """The grid of one path's rays.

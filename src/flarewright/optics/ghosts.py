@@ -47,7 +47,8 @@ class GhostRow:
     first_reflection, second_reflection : int or None
         Rows j, then i < j; None for the direct image. The sensor as a mirror is "sensor".
     throughput_mm2 : float
-        Flux on the unbounded sensor plane when the light gives irradiance 1 on a plane facing it.
+        Flux on the unbounded sensor plane when the light gives irradiance 1 on a plane facing it; a near light gives it
+        at the middle of the entrance pupil.
     centroid_mm : tuple of float
     rms_radius_mm : float
         Root mean square distance from the centroid, weighted by flux. It has no limit where a path's light leaves the
@@ -123,9 +124,10 @@ def ghost_table(
     focus_distance: float | None = None,
     sensor: SensorMirror | None = None,
     others: Sequence[LightPath] = (),
+    distance: float | None = None,
     threads: int | None = None,
 ) -> GhostTable:
-    """Analyse every ghost of a lens for one distant light.
+    """Analyse every ghost of a lens for one light.
 
     Parameters
     ----------
@@ -145,6 +147,8 @@ def ghost_table(
         The sensor reflects too: adds the paths "sensor-i".
     others : sequence of LightPath
         Further paths to analyse, of four reflections.
+    distance : float, optional
+        How far in front of the first vertex the light stands, mm along the axis; None: distant.
     threads : int, optional
         None: all cores; the numbers do not depend on it.
 
@@ -161,8 +165,8 @@ def ghost_table(
     order = first_order(lens, f_number, sensor_distance=sensor_distance, focus_distance=focus_distance)
     coatings = resolve_coatings(lens, AsLens() if coating is None else coating)
     packed = pack_lens(lens, order, coatings, np.array([wavelength_nm]), sensor=sensor)
-    light = incidence(field_deg)
-    packed = facing(packed, light.axes)
+    light = incidence(field_deg, distance, order.entrance_pupil_z)
+    packed = facing(packed, light.axes, light.nearness)
     todo = (direct_path(lens), *ghost_paths(lens, paths, sensor=sensor is not None), *others)
     with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
         measured = list(pool.map(lambda path: _measure(lens, packed, path, light), todo))
@@ -189,7 +193,7 @@ def _relative(row: GhostRow, unit: float) -> GhostRow:
 
 
 def _measure(lens: Lens, packed: PackedLens, path: LightPath, light: Incidence) -> GhostRow:
-    bounded_by, focus = _paraxial_facts(lens, packed, path)
+    bounded_by, focus = _paraxial_facts(lens, packed, path, packed.nearness / light.tilt_cosine)
     blades = blade_edges(Iris(), packed.stop_semi)
     region = find_region(packed, path, light.tilt, packed.stop_semi)
     mirrors: list[Mirror] = ["sensor" if row == len(lens.rows) else row for row in path.mirrors]
@@ -440,12 +444,16 @@ def bounding_edges(lens: Lens, order: FirstOrder, paths: Sequence[LightPath]) ->
     return [_paraxial_facts(lens, packed, path)[0] for path in paths]
 
 
-def _paraxial_facts(lens: Lens, packed: PackedLens, path: LightPath) -> tuple[str, float | None]:
-    """Tell which edge bounds a ghost, and where the path focuses (docs/physics.md, "Ray transfer matrices")."""
+def _paraxial_facts(lens: Lens, packed: PackedLens, path: LightPath, nearness: float = 0.0) -> tuple[str, float | None]:
+    """Tell which edge bounds a ghost, and where the path focuses (docs/physics.md, "Ray transfer matrices").
+
+    `nearness` is the slope per height of the rays on the plane of the first vertex.
+    """
     to_stop, total = path_matrices(lens, path, float(packed.wavelengths_nm[0]), packed.sensor_z)
     entrance = packed.semi[packed.first_surface]
-    stop_height = min((packed.stop_semi / max(abs(Ma[0, 0]), 1e-12)) for Ma in to_stop)
+    stop_height = min((packed.stop_semi / max(abs(Ma[0, 0] + nearness * Ma[0, 1]), 1e-12)) for Ma in to_stop)
     bounded_by = "stop" if stop_height < entrance else "entrance"
-    if abs(total[1, 0]) < 1e-12:
+    height, slope = total[:, 0] + nearness * total[:, 1]
+    if abs(slope) < 1e-12:
         return bounded_by, None
-    return bounded_by, float(-total[0, 0] / total[1, 0])
+    return bounded_by, float(-height / slope)

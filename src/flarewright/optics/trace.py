@@ -10,7 +10,7 @@ from ..model import Lens
 from .bundle import incidence, trace_points
 from .pack import PackedLens, facing
 from .paraxial import D_LINE_NM, first_order, gap_indices, vertex_positions
-from .paths import LightPath, direct_path, ghost_path
+from .paths import LightPath, direct_path, ghost_path, sensor_path
 from .shape import shape_table
 
 Floats = NDArray[np.float64]
@@ -72,7 +72,7 @@ def trace_polylines(
     lens : Lens
         Semi-diameters are not needed; rims do not stop these rays.
     ghost : tuple of int or None
-        Rows (j, i) of a ghost path's mirrors; None for the direct path.
+        Rows (j, i) of a ghost path's mirrors, j = len(lens.rows) for the sensor; None for the direct path.
     x, y : ndarray, shape (N,)
         Start on the plane of the first vertex, mm.
     tilt : float
@@ -86,7 +86,10 @@ def trace_polylines(
     ndarray, shape (N, S + 2, 3)
         Start, a hit for each step of the path, end on the sensor; NaN behind the point where a ray ends.
     """
-    path = direct_path(lens) if ghost is None else ghost_path(lens, *ghost)
+    by_sensor = ghost is not None and ghost[0] == len(lens.rows)
+    path = (
+        direct_path(lens) if ghost is None else sensor_path(lens, ghost[1]) if by_sensor else ghost_path(lens, *ghost)
+    )
     z = vertex_positions(lens)
     distance = first_order(lens).sensor_distance if sensor_distance is None else sensor_distance
     # a stop neither bends nor shifts anything, so its curvature 0 is only a place holder in the arrays
@@ -95,6 +98,11 @@ def trace_polylines(
     conic = np.array([getattr(row, "conic", 0.0) for row in lens.rows]) if shapes is None else shapes
     hits = np.empty((len(x), len(path.rows) + 2, 3))
     n = gap_indices(lens, wavelength_nm)
+    if by_sensor:
+        # a plane between air and air; a row of zeros is a centred plane
+        z, distance = np.append(z, z[-1] + distance), 0.0
+        curvature, n = np.append(curvature, 0.0), np.append(n, 1.0)
+        conic = np.append(conic, np.zeros_like(conic[:1]), axis=0)
     start_x, start_y = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
     trace_hits(
         path.rows, path.actions, curvature, conic, z, n, float(z[-1] + distance), tilt, 0.0, start_x, start_y, hits

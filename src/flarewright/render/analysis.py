@@ -10,6 +10,7 @@ import numpy as np
 
 from ..errors import ProjectError
 from ..model import CoatingChoice, Imperfection, Lens, Plate
+from ..optics.bundle import least_distance
 from ..optics.ghosts import GhostTable, ghost_table
 from ..optics.pack import SensorMirror, pack_lens, resolve_coatings
 from ..optics.paraxial import D_LINE_NM, FirstOrder
@@ -67,10 +68,11 @@ def ghosts(
     imperfection: Imperfection | None = None,
     orders: int = 2,
     order4_limit: float = 1e-4,
+    distance: float | None = None,
     remarks: list[str] | None = None,
     threads: int | None = None,
 ) -> GhostTable:
-    """Analyse every ghost of a lens for one distant light (`optics.ghosts.ghost_table`).
+    """Analyse every ghost of a lens for one light (`optics.ghosts.ghost_table`).
 
     Parameters
     ----------
@@ -98,6 +100,8 @@ def ghosts(
         4 adds ghosts of four reflections.
     order4_limit : float
         Of those only paths that carry more than this part of all two-reflection light on the unbounded sensor plane.
+    distance : float, optional
+        How far in front of the first vertex the light stands, mm along the axis; None: distant.
     remarks : list of str, optional
         What is assumed on the way, and which rows a filter and a cover glass are, is appended to it.
     threads : int, optional
@@ -129,12 +133,20 @@ def ghosts(
     )
     sensor = SensorMirror(sensor_reflectance) if sensor_reflectance > 0.0 else None
     found = None
+    packed = pack_lens(
+        built.lens, order, resolve_coatings(built.lens, built.coating), np.array([wavelength_nm]), sensor=sensor
+    )
+    if distance is not None and not distance > least_distance(packed):
+        raise ProjectError(
+            f"a light at {distance:g} mm stands in the lens {built.lens.name} or behind its entrance pupil; "
+            f"give more than {least_distance(packed):.4g} mm"
+        )
     if orders == 4:
         from .four_reflections import find_fours_everywhere
 
-        coatings = resolve_coatings(built.lens, built.coating)
-        packed = pack_lens(built.lens, order, coatings, np.array([wavelength_nm]), sensor=sensor)
-        found = find_fours_everywhere(built.lens, packed, field_deg, order4_limit, which=paths, threads=threads)
+        found = find_fours_everywhere(
+            built.lens, packed, field_deg, order4_limit, distance=distance, which=paths, threads=threads
+        )
     table = ghost_table(
         built.lens,
         field_deg,
@@ -146,6 +158,7 @@ def ghosts(
         focus_distance=built.focus_distance,
         sensor=sensor,
         others=() if found is None else found.paths,
+        distance=distance,
         threads=threads,
     )
     return table if found is None else _above(table, found, order4_limit, remarks)

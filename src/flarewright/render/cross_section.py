@@ -75,7 +75,7 @@ def cross_section(
     field_deg : tuple of float, optional
         A light whose rays are drawn beside those of the axis; None: the lens' own field, if it is known.
     ghost : tuple of int, optional
-        Rows (j, i) of a ghost path whose rays are drawn.
+        Rows (j, i) of a ghost path whose rays are drawn; j = len(lens.rows) is the sensor.
 
     Returns
     -------
@@ -128,11 +128,15 @@ def cross_section(
 def _check_ghost(lens: Lens, ghost: tuple[int, int]) -> None:
     j, i = ghost
     last = len(lens.rows) - 1
-    if not 0 <= i < j <= last or lens.stop_row in ghost:
+    if not 0 <= i < j <= last + 1 or lens.stop_row in ghost:
         raise ProjectError(
-            f"{j}-{i} is no ghost of {lens.name}: a path J-I reflects at row J, then at row I < J, "
-            f"both between 0 and {last} and neither the stop (row {lens.stop_row})"
+            f"{_name(lens, ghost)} is no ghost of {lens.name}: a path J-I reflects at row J or at the sensor, then at "
+            f"row I < J, both between 0 and {last} and neither the stop (row {lens.stop_row})"
         )
+
+
+def _name(lens: Lens, ghost: tuple[int, int]) -> str:
+    return f"{'sensor' if ghost[0] == len(lens.rows) else ghost[0]}-{ghost[1]}"
 
 
 def _semi(row: object, order: FirstOrder) -> float:
@@ -217,7 +221,7 @@ def _draw_fans(
     for angle_deg, path, colour in fans:
         rays = _fan(lens, order, angle_deg, path)
         if not len(rays):
-            what = f"the ghost {path[0]}-{path[1]}" if path else "the direct path"
+            what = f"the ghost {_name(lens, path)}" if path else "the direct path"
             remarks.append(f"no ray of {what} gets through at {angle_deg:g} degrees, so none is drawn")
         for points in rays:
             direction = np.array([cos(radians(angle_deg)), -sin(radians(angle_deg))])
@@ -231,17 +235,21 @@ def _draw_fans(
 
 def _fan(lens: Lens, order: FirstOrder, angle_deg: float, ghost: tuple[int, int] | None) -> list[Floats]:
     """Return the polylines (z, y) of a few rays that get through, spread over the opening."""
-    from ..optics.paths import direct_path, ghost_path
+    from ..optics.paths import direct_path, ghost_path, sensor_path
     from ..optics.trace import trace_polylines
 
-    path = direct_path(lens) if ghost is None else ghost_path(lens, *ghost)
+    sensor = len(lens.rows)
+    path = direct_path(lens)
+    if ghost is not None:
+        path = sensor_path(lens, ghost[1]) if ghost[0] == sensor else ghost_path(lens, *ghost)
     first = lens.rows[0]
     limit = _semi(first, order)
     # Rays start on the plane of the first vertex; a bulging front lets oblique ones in from further out.
     reach = limit * (1.0 + abs(tan(radians(angle_deg))))
     y = np.linspace(-reach, reach, _CANDIDATES)
     hits = trace_polylines(lens, ghost, np.zeros_like(y), y, -radians(angle_deg), sensor_distance=order.sensor_distance)
-    semi = np.array([_semi(lens.rows[row], order) for row in path.rows])
+    # the sensor, unbounded here, clips nothing
+    semi = np.array([np.inf if row == sensor else _semi(lens.rows[row], order) for row in path.rows])
     radius = np.hypot(hits[:, 1:-1, 0], hits[:, 1:-1, 1])
     with np.errstate(invalid="ignore"):
         through = np.flatnonzero((radius <= semi * (1 + 1e-9)).all(axis=1) & np.isfinite(hits).all(axis=(1, 2)))
@@ -261,7 +269,7 @@ def _label(
     foot = height - 16.0
     legend = [(_AXIS_RAYS, "axis")]
     if ghost is not None:
-        legend.append((_GHOST_RAYS, f"ghost {ghost[0]}-{ghost[1]}, light at {angle:g}°"))
+        legend.append((_GHOST_RAYS, f"ghost {_name(lens, ghost)}, light at {angle:g}°"))
     elif angle:
         legend.append((_FIELD_RAYS, f"light at {angle:g}°"))
     at = _MARGIN_PX

@@ -136,6 +136,7 @@ def find_fours_everywhere(
     field_deg: tuple[float, float],
     limit: float,
     *,
+    distance: float | None = None,
     which: str = "all",
     threads: int | None = None,
 ) -> FourReflections:
@@ -150,6 +151,8 @@ def find_fours_everywhere(
         (X, Y) of the light.
     limit : float
         Least flux, as part of all two-reflection flux.
+    distance : float, optional
+        How far in front of the first vertex the light stands, mm; None: distant.
     which, threads
         As in `find_fours`.
 
@@ -157,13 +160,15 @@ def find_fours_everywhere(
     -------
     FourReflections
     """
-    seen, semi = incidence(field_deg), packed.stop_semi
+    seen, semi = incidence(field_deg, distance, packed.first_order.entrance_pupil_z), packed.stop_semi
     blades = blade_edges(Iris(), semi)
-    line = Light(field_deg=field_deg, spectrum=Lines(lines=((float(packed.wavelengths_nm[0]), 1.0),)))
+    line = Light(
+        field_deg=field_deg, distance=distance, spectrum=Lines(lines=((float(packed.wavelengths_nm[0]), 1.0),))
+    )
     opening = Opening(blades, blades, semi, semi, None, 1.0)
     # one pixel of a thousand kilometres
     plane = np.array([0.5, 0.5, 1e-9, 1e-9])
-    shot = Shot(line, seen, facing(packed, seen.axes), opening, plane, (1, 1), "rec709")
+    shot = Shot(line, seen, facing(packed, seen.axes, seen.nearness), opening, plane, (1, 1), "rec709")
     return find_fours(lens, [shot], limit, 0, which=which, threads=threads)
 
 

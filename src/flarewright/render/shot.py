@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from math import sqrt
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,7 +14,7 @@ from ..model import Iris, Light, Project
 from ..model.camera import Colorspace
 from ..model.light import Spectrum
 from ..optics.border import closed
-from ..optics.bundle import Incidence, incidence
+from ..optics.bundle import Incidence, incidence, least_distance
 from ..optics.diffraction import Soil
 from ..optics.dirt import lay_elements, rasterise
 from ..optics.iris import blade_edges, outline, transmission
@@ -286,15 +285,10 @@ def _seen(settled: Settled, packed: PackedLens, number: int, light: Light) -> In
     """Find where a light stands, and refuse one that stands in the lens."""
     if light.distance is None:
         return incidence(light.field_deg)
-    pupil_z = settled.order.entrance_pupil_z
-    # the rim of a concave front stands before its vertex
-    first = packed.first_surface
-    semi, c = float(packed.semi[first]), float(packed.curvature[first])
-    sag = c * semi**2 / (1.0 + sqrt(max(1.0 - (c * semi) ** 2, 0.0)))
-    least = max(0.0, -pupil_z, -float(packed.z_vertex[first]) - min(sag, 0.0))
+    least = least_distance(packed)
     if light.distance <= least:
         raise ProjectError(
             f"lights[{number}].distance: a light at {light.distance:g} mm stands in the lens {settled.lens.name} or "
             f"behind its entrance pupil; give more than {least:.4g} mm"
         )
-    return incidence(light.field_deg, light.distance, pupil_z)
+    return incidence(light.field_deg, light.distance, settled.order.entrance_pupil_z)
