@@ -183,6 +183,14 @@ def render(
         float | None,
         typer.Option(help="Part of the light the sensor mirrors back, 0 to 1 (0).", rich_help_panel=_CAMERA),
     ] = None,
+    sensor_grating: Annotated[
+        str | None,
+        typer.Option(
+            metavar="UM[:FILL[:ORDERS]]",
+            help="Period of its pixels, which diffract what it mirrors (final): 8:0.7:3.",
+            rich_help_panel=_CAMERA,
+        ),
+    ] = None,
     squeeze: Annotated[
         float | None,
         typer.Option(help="Of an anamorphic lens; its file's when left out.", rich_help_panel=_CAMERA),
@@ -339,7 +347,8 @@ def render(
         ringing=ringing, scatter=scatter, surface_roughness=surface_roughness, cleanliness=cleanliness,
         holdout=holdout, depth=depth,
         zoom=zoom, filter_plate=filter_plate, imperfection=imperfection, ghost_offset=ghost_offset,
-        cover_glass=cover_glass, sensor_reflectance=sensor_reflectance, squeeze=squeeze, desqueeze=desqueeze,
+        cover_glass=cover_glass, sensor_reflectance=sensor_reflectance, sensor_grating=sensor_grating,
+        squeeze=squeeze, desqueeze=desqueeze,
     )  # fmt: skip
     settings = build_project(flags)
     run = _reference_run(settings, output, state, time_limit)

@@ -10,7 +10,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from ..errors import ProjectError
-from ..io.plate_text import parse_imperfection, parse_plate
+from ..io.plate_text import parse_grating, parse_imperfection, parse_plate
 from ..io.project_file import ProjectFileError, explain, parse_coating_choice, read_project
 from ..io.spectrum_text import parse_spectrum
 from ..model import Art, Holdout, Iris, Light, Project, Rule, Scatter
@@ -45,6 +45,7 @@ _FLAG_OF = {
     "camera.sensor_distance": "--sensor-distance",
     "camera.focus_distance": "--focus",
     "camera.sensor_reflectance": "--sensor-reflectance",
+    "camera.sensor_grating": "--sensor-grating",
     "imperfection.ghost_offset_mm": "--ghost-offset",
     "camera.squeeze": "--squeeze",
     "quality.mode": "--quality",
@@ -112,6 +113,7 @@ class Flags:
     ghost_offset: float | None = None
     cover_glass: str | None = None
     sensor_reflectance: float | None = None
+    sensor_grating: str | None = None
     squeeze: float | None = None
     desqueeze: bool = False
     scatter: str | None = None
@@ -214,6 +216,7 @@ def _sections(flags: Flags) -> dict[str, dict[str, Any]]:
             "focus_distance": flags.focus,
             "cover_glass": None if flags.cover_glass is None else parse_plate(flags.cover_glass, "--cover-glass"),
             "sensor_reflectance": flags.sensor_reflectance,
+            "sensor_grating": None if flags.sensor_grating is None else parse_grating(flags.sensor_grating),
             "squeeze": flags.squeeze,
             "desqueeze": True if flags.desqueeze else None,
         },

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pydantic import ValidationError
 
 from ..errors import ProjectError
-from ..model import Imperfection, Plate
+from ..model import Imperfection, Plate, SensorGrating
 from .sentences import validation_sentences
 
 
@@ -84,3 +84,36 @@ def parse_imperfection(text: str) -> Imperfection:
         return Imperfection.model_validate(fields)
     except ValidationError as error:
         raise ProjectError(f"--imperfection {text!r}: {validation_sentences(error)[0]}") from None
+
+
+def parse_grating(text: str) -> SensorGrating:
+    """Read "PERIOD_UM", "PERIOD_UM:FILL" or "PERIOD_UM:FILL:ORDERS".
+
+    Parameters
+    ----------
+    text : str
+
+    Returns
+    -------
+    SensorGrating
+
+    Raises
+    ------
+    ProjectError
+        When it is none.
+    """
+    names = ("period_um", "fill", "orders")
+    parts = [part.strip() for part in text.split(":")]
+    try:
+        if len(parts) > len(names):
+            raise ValueError
+        found = {name: int(part) if name == "orders" else float(part) for name, part in zip(names, parts, strict=False)}
+    except ValueError:
+        raise ProjectError(
+            f"--sensor-grating {text!r} is no grating; write --sensor-grating 8 (its period in micrometres) or "
+            "--sensor-grating 8:0.7:3 with the part of it that reflects and how many orders are drawn"
+        ) from None
+    try:
+        return SensorGrating.model_validate(found)
+    except ValidationError as error:
+        raise ProjectError(f"--sensor-grating {text!r}: {validation_sentences(error)[0]}") from None

@@ -31,6 +31,7 @@ ABOUT = {
     "imperfection": "{ seed = 1, decentre_um = 10.0, tilt_arcmin = 1.0, figure_nm = 0.0 }   # one sample of the lens",
     "camera.cover_glass": '"N-BK7:2:0.5"   # plane glass in front of the sensor, with its gap to the sensor, mm',
     "camera.sensor_reflectance": "part of the light that the sensor mirrors back",
+    "camera.sensor_grating": "{ period_um = 8.0, fill = 0.7, orders = 3 }   # its pixels diffract what it reflects",
     "camera.squeeze": "2.0   # of an anamorphic lens; left out: the lens file's",
     "camera.desqueeze": "true: drawn wide, for size_px as shown",
     "iris.blades": "0 is round",

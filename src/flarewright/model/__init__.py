@@ -6,6 +6,7 @@ from .coating import Bare, Coating, Film, QuarterWave, Stack, Standard
 from .design import Bounds, Design, GhostWish
 from .figure import Figure
 from .glass import Dispersion, Medium
+from .grating import SensorGrating
 from .holdout import Holdout
 from .imperfection import Imperfection
 from .iris import Iris
@@ -59,6 +60,7 @@ __all__ = [
     "RowScatter",
     "Rule",
     "Scatter",
+    "SensorGrating",
     "Spectrum",
     "Stack",
     "Standard",

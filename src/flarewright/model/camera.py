@@ -7,6 +7,7 @@ from typing import Literal
 from pydantic import Field
 
 from .base import Frozen
+from .grating import SensorGrating
 from .plate import Plate
 
 
@@ -25,6 +26,8 @@ class Camera(Frozen):
         A plane plate in front of the sensor.
     sensor_reflectance : float
         Part of the light that the sensor sends back as a mirror does; 0: none. It makes ghosts "sensor-I".
+    sensor_grating : SensorGrating or None
+        Its pixels diffract what it reflects (final quality); None: an even mirror.
     squeeze : float or None
         By how much the lens squeezes the picture across: the file's pixel aspect tells viewers to show it wide again.
         None: the lens file's.
@@ -41,6 +44,7 @@ class Camera(Frozen):
     focus_distance: float | None = Field(None, gt=0.0)
     cover_glass: Plate | None = None
     sensor_reflectance: float = Field(0.0, ge=0.0, le=1.0)
+    sensor_grating: SensorGrating | None = None
     squeeze: float | None = Field(None, ge=0.25, le=4.0)
     desqueeze: bool = False
 

@@ -22,6 +22,7 @@ from ..kernels.trace import ALIVE, REL, X, Y
 from ..model import Quality
 from ..optics.border import points
 from ..optics.bundle import Bundle, Region, find_region, measure_region, trace_bundle, trace_grid
+from ..optics.grating import GratingOrder, grating_orders
 from ..optics.paths import LightPath
 from .art import PLAIN, Frame, PathArt
 from .canvas import DETAIL_CONTRAST, DETAILS, Canvas, Plane, blank, merge
@@ -70,6 +71,8 @@ class FinalPass:
         What the extent of an area light spreads it over: columns and rows from its place.
     detail : int
         How often the resolution may be halved because it is spread.
+    orders : tuple of GratingOrder
+        Into which the sensor diffracts it; empty for one that is mirrored.
     """
 
     shot: Shot
@@ -81,6 +84,7 @@ class FinalPass:
     frame: Frame | None
     source: Floats | None = None
     detail: int = 0
+    orders: tuple[GratingOrder, ...] = ()
 
     @property
     def alone(self) -> tuple[object, ...]:
@@ -133,13 +137,17 @@ def find_final(
                 zoom = float(to_pixels[2:].min())
                 source, detail = border, halvings(border, moved[1] * zoom, DETAILS - 1)
                 view_radius += float(np.hypot(*ends.T).max()) / zoom
+    orders: tuple[GratingOrder, ...] = ()
+    if shot.grating is not None and path.sensor and path.second_reflection is not None and not path.later_reflections:
+        orders = grating_orders(lens, path.second_reflection, shot.grating)
+        view_radius += float(np.nanmax([np.hypot(*order.shift_mm.T) for order in orders]))
     if around is None:
         region = find_region(lens, path, tilt, iris_radius, view_radius, within)
     else:
         region = measure_region(lens, path, tilt, iris_radius, view_radius, around)
     if region is None:
         return None
-    return FinalPass(shot, path, region, to_pixels, view_radius, art, frame, source, detail)
+    return FinalPass(shot, path, region, to_pixels, view_radius, art, frame, source, detail, orders)
 
 
 def find_entry(shot: Shot, way_in: LightPath) -> Region | None:
@@ -215,7 +223,8 @@ def draw_final(
     tilt, opening = shot.incidence.tilt, shot.opening
     to_pixels = item.to_pixels / 2.0**detail
     scale = float(max(to_pixels[2], to_pixels[3]))
-    few, one_color = visibility < STEP_CONTRAST and quality.bridge, visibility < ONE_COLOR * STEP_CONTRAST
+    few = visibility < STEP_CONTRAST and quality.bridge and not item.orders
+    one_color = visibility < ONE_COLOR * STEP_CONTRAST
     bundle = trace_grid(
         shot.packed, path, tilt, (opening.radius, opening.inner), item.region,
         tolerance=quality.tolerance_px, scale=scale, view_radius=item.view_radius, one_color=few and one_color,
@@ -243,16 +252,30 @@ def draw_final(
         data = traced[w] if part == 0.0 else _between(traced[w], traced[w + 1], part)
         densities = node_densities(data, bundle.pupil, bundle.triangles)
         plane = canvas.plane(detail)
-        if patterns is not None:
-            patterns.draw(
-                k, data, bundle.pupil, bundle.triangles, densities, shot.incidence.axes, to_pixels, shot.gain, rgb,
-                plane, bundle.halves,
-            )  # fmt: skip
-        else:
-            draw_bundle(
-                data, bundle.pupil, bundle.triangles, densities, path.stop_crossings, opening.blades, opening.mask,
-                opening.half, shot.incidence.axes, to_pixels, shot.gain, rgb, plane, bundle.halves,
-            )  # fmt: skip
+        for place, share in _places(item, to_pixels, w, part):
+            if patterns is not None:
+                patterns.draw(
+                    k, data, bundle.pupil, bundle.triangles, densities, shot.incidence.axes, place, shot.gain,
+                    rgb * share, plane, bundle.halves,
+                )  # fmt: skip
+            else:
+                draw_bundle(
+                    data, bundle.pupil, bundle.triangles, densities, path.stop_crossings, opening.blades, opening.mask,
+                    opening.half, shot.incidence.axes, place, shot.gain, rgb * share, plane, bundle.halves,
+                )  # fmt: skip
+
+
+def _places(item: FinalPass, to_pixels: Floats, w: int, part: float) -> list[tuple[Floats, float]]:
+    """Tell where a ghost is drawn between two traced wavelengths, and how much of it: once, or for each order."""
+    if not item.orders:
+        return [(to_pixels, 1.0)]
+    places = []
+    for order in item.orders:
+        shift = order.shift_mm[w] if part == 0.0 else (1.0 - part) * order.shift_mm[w] + part * order.shift_mm[w + 1]
+        if np.isfinite(shift).all():
+            place = to_pixels + np.append(shift * to_pixels[2:], [0.0, 0.0])
+            places.append((place, order.efficiency))
+    return places
 
 
 def _drawn_in_few(item: FinalPass, bundle: Bundle, plane: Plane, to_pixels: Floats) -> bool:

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from ..io.mask_image import read_mask
 from ..kernels.trace import REFRACT
-from ..model import Layer, Project
+from ..model import Layer, Project, Stop
+from ..optics.grating import grating_orders
 from ..optics.paths import direct_path, ghost_paths
 from ..optics.shape import ideal
 from .art import ResolvedArt, directed, graded, resolve_art
@@ -260,9 +261,25 @@ def _remarks(settled: Settled, shots: tuple[Shot, ...]) -> tuple[str, ...]:
     if settled.project.quality.mode == "draft" and ideal(settled.lens) != settled.lens:
         told.append("draft quality draws the lens as designed, without decentre, tilt and figure errors")
     quality = settled.project.quality
+    told += _grating_remarks(settled, shots)
     if quality.ringing != "off" and quality.mode != "final":
         told.append(f"{quality.mode} quality traces rays alone: quality.ringing is for final quality")
     return tuple(told)
+
+
+def _grating_remarks(settled: Settled, shots: tuple[Shot, ...]) -> list[str]:
+    """Tell what of a sensor's grating cannot be seen, or is left out."""
+    camera, mode = settled.project.camera, settled.project.quality.mode
+    if camera.sensor_grating is None:
+        return []
+    if settled.sensor is None:
+        return ["camera.sensor_grating diffracts what the sensor reflects: nothing without camera.sensor_reflectance"]
+    if mode != "final":
+        return [f"{mode} quality mirrors at the sensor: camera.sensor_grating is for final quality"]
+    last = max(k for k, row in enumerate(settled.lens.rows) if not isinstance(row, Stop))
+    orders = grating_orders(shots[0].packed, last, camera.sensor_grating)
+    drawn = sum(order.efficiency for order in orders)
+    return [f"{len(orders)} orders of the sensor's grating were drawn, which hold {drawn:.1%} of what it reflects"]
 
 
 def _scene_scale(settled: Settled, shot: Shot) -> float:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ..errors import ProjectError
 from ..model import Iris, Light, Project
 from ..model.camera import Colorspace
+from ..model.grating import SensorGrating
 from ..model.light import Spectrum
 from ..optics.border import closed
 from ..optics.bundle import Incidence, incidence, least_distance
@@ -90,6 +91,8 @@ class Shot:
     border : ndarray, shape (N, 5), or None
         Of the part, or of what is seen of it (`optics.border`), in slopes (tan X, tan Y) from its own; None for a
         point.
+    grating : SensorGrating or None
+        What the sensor's pixels make of the light that it reflects.
     """
 
     light: Light
@@ -103,6 +106,7 @@ class Shot:
     number: int = 0
     share: float = 1.0
     border: Floats | None = None
+    grating: SensorGrating | None = None
 
     @property
     def gain(self) -> float:
@@ -265,6 +269,7 @@ def make_shots(settled: Settled, opening: Opening) -> tuple[Shot, ...]:
                     number=number,
                     share=part.share,
                     border=closed(part.corners) if light.extended else None,
+                    grating=project.camera.sensor_grating,
                 )
             )
         shots += whole if project.holdout is None and light.holdout is None else _unhidden(settled, light, whole)
