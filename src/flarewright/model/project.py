@@ -69,7 +69,7 @@ class Quality(Frozen):
         The bundle's grid is refined until interpolation errs by less than this, in pixels.
     ringing : {"off", "collins", "frft"}
         Rings inside ghosts (final quality). collins: Fresnel diffraction at the iris with each ghost's own matrix, per
-        wavelength, blurred by the light's disc; frft: one fractional Fourier transform for all (Hullin et al. 2011,
+        wavelength; frft: one fractional Fourier transform for all (Hullin et al. 2011,
         equation 5); off: sharp edges.
     cull : float
         Paths that carry less than this part of all ghost flux are left out, and said so.

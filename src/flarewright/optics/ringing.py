@@ -15,7 +15,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,7 +55,6 @@ __all__ = [
     "FresnelGrid",
     "StopToSensor",
     "crop",
-    "disc_blurred",
     "fresnel_grid",
     "fresnel_intensity",
     "frft_fresnel_number",
@@ -75,13 +73,10 @@ class StopToSensor:
         L = B / M, mm; infinite where the light comes to a focus on the sensor.
     magnification : ndarray, shape (W, 2)
         M, the sensor's height per height in the stop along the light's rays.
-    turn : ndarray, shape (W, 2)
-        By how much the pattern moves in the stop, mm, when the light moves by 1 rad.
     """
 
     length: Floats
     magnification: Floats
-    turn: Floats
 
 
 def stop_to_sensor(packed: PackedLens, path: LightPath, nearness: float = 0.0) -> tuple[StopToSensor, ...]:
@@ -103,12 +98,11 @@ def stop_to_sensor(packed: PackedLens, path: LightPath, nearness: float = 0.0) -
     -----
     With Ma to the stop and S to the sensor, both from the first vertex, light of slope k per height has the height
     a = Ma00 + k Ma01 in the stop and s = S00 + k S01 on the sensor. B, reduced by the index in the stop so that
-    lambda is that of vacuum, is S01 Ma00 - S00 Ma01, whatever the indices: M = s / a, L = B a / s. A light that moves
-    by an angle moves the rays of one stop height by B / a on the sensor, that is L / a in the stop.
+    lambda is that of vacuum, is S01 Ma00 - S00 Ma01, whatever the indices: M = s / a, L = B a / s.
     """
     sides = (packed.curvature if packed.curvature_x is None else packed.curvature_x, packed.curvature)
     count, crossings = len(packed.wavelengths_nm), path.stop_crossings
-    found = np.empty((3, crossings, count, 2))
+    found = np.empty((2, crossings, count, 2))
     to_stop = np.empty((crossings, 2, 2))
     for w in range(count):
         for side, curvature in enumerate(sides):
@@ -122,7 +116,7 @@ def stop_to_sensor(packed: PackedLens, path: LightPath, nearness: float = 0.0) -
             B = S01 * to_stop[:, 0, 0] - S00 * to_stop[:, 0, 1]
             with np.errstate(divide="ignore", invalid="ignore"):
                 length = B * a / s
-                found[:, :, w, side] = length, s / a, length / a
+                found[:, :, w, side] = length, s / a
     return tuple(StopToSensor(*found[:, c]) for c in range(crossings))
 
 
@@ -324,49 +318,3 @@ def halved(pattern: Singles, half: tuple[float, float], times: tuple[int, int]) 
     for _ in range(times[1]):
         wide = 0.5 * (wide[::2] + wide[1::2])
     return wide, (half[0] + more[0] * step[0], half[1] + more[1] * step[1])
-
-
-def disc_blurred(
-    pattern: Singles, half: tuple[float, float], radius: tuple[float, float]
-) -> tuple[Singles, tuple[float, float]]:
-    """Average a pattern over the places that the points of a round light give it.
-
-    Parameters
-    ----------
-    pattern : ndarray, shape (Ky, Kx)
-    half : tuple of float
-        Half its sides, mm.
-    radius : tuple of float
-        Half the width and height of the disc's ellipse in the stop, mm.
-
-    Returns
-    -------
-    pattern : ndarray, float32
-        With room around it for what was spread; its sum is the same. The points of a light do not interfere with each
-        other, so their irradiances add.
-    half : tuple of float
-        Half its sides, mm.
-    """
-    rows, columns = pattern.shape
-    step = (2.0 * half[0] / columns, 2.0 * half[1] / rows)
-    # what is narrower than a sample is one sample wide
-    across = tuple(max(r / d, 0.5) for r, d in zip(radius, step, strict=True))
-    if max(across) <= 0.5:
-        return pattern, half
-    more = (math.ceil(across[0]) + 2, math.ceil(across[1]) + 2)
-    wide = np.pad(pattern, ((more[1], more[1]), (more[0], more[0])))
-    size = (fast_size(wide.shape[0], even=True), fast_size(wide.shape[1], even=True))
-    transfer = _disc_transfer(size, (round(across[0], 9), round(across[1], 9)))
-    spread = np.fft.irfft2(np.fft.rfft2(wide, size) * transfer, size)[: wide.shape[0], : wide.shape[1]]
-    found = np.ascontiguousarray(np.maximum(spread, 0.0), dtype=np.float32)
-    found[0], found[-1], found[:, 0], found[:, -1] = 0.0, 0.0, 0.0, 0.0
-    return found, (half[0] + more[0] * step[0], half[1] + more[1] * step[1])
-
-
-@lru_cache(maxsize=8)
-def _disc_transfer(size: tuple[int, int], across: tuple[float, float]) -> NDArray[np.complex64]:
-    """Transform of an ellipse of unit sum, its half width and half height in samples."""
-    x, y = np.fft.fftfreq(size[1], 1.0 / size[1]), np.fft.fftfreq(size[0], 1.0 / size[0])
-    far = np.hypot(x / across[0], y[:, None] / across[1])
-    disc = np.clip((1.0 - far) * min(across) + 0.5, 0.0, 1.0)
-    return np.asarray(np.fft.rfft2((disc / disc.sum()).astype(np.float32)), dtype=np.complex64)

@@ -1,8 +1,8 @@
 """Rings inside ghosts: what the iris' diffraction makes of a path, drawn in the iris' place.
 
 For every crossing of the stop whose edge is lit, a pattern takes the iris' place in the ghost (`optics.ringing`). It is
-averaged over the light that each drawn wavelength stands for, and over the light's disc. Ghosts whose rings nobody
-could see are left to the plain pass, pixel for pixel.
+averaged over the light that each drawn wavelength stands for; an area light spreads it with its ghost. Ghosts whose
+rings nobody could see are left to the plain pass, pixel for pixel.
 """
 
 from __future__ import annotations
@@ -29,7 +29,6 @@ from ..optics.ringing import (
     FresnelGrid,
     StopToSensor,
     crop,
-    disc_blurred,
     fresnel_grid,
     fresnel_intensity,
     frft_fresnel_number,
@@ -53,7 +52,7 @@ LEAST_FRINGE_PX = 0.15
 """Edges whose scale sqrt(lambda L / 2) is less than this on the sensor show no rings: the first is two thirds of it."""
 
 WIDEST_RADII = 2.0
-"""Neither a shadow nor the blur of a light's disc is followed farther than this from the opening."""
+"""A shadow is not followed farther than this from the opening."""
 
 NODE_STEP = 0.08
 """Patterns are computed at Fresnel areas this part apart and shared by all ghosts; cubics run between them.
@@ -66,9 +65,6 @@ OCTAVES = 1.5
 
 TEXEL_PX = 0.7
 """Patterns are no finer than this on the sensor, in pixels."""
-
-TEXELS_A_DISC = 5.0
-"""Nor finer than this part of the radius of the light's disc."""
 
 KEPT_BYTES = 400_000_000
 KEPT_GRID_BYTES = 100_000_000
@@ -209,8 +205,6 @@ class _Crossing:
     ----------
     area : ndarray, shape (W, 2)
         lambda L at the traced wavelengths, mm^2.
-    disc : ndarray, shape (2,)
-        Half the size of the light's disc in the stop, mm.
     octaves, half
         As `Ringing.pattern`.
     halvings : tuple of int
@@ -218,7 +212,6 @@ class _Crossing:
     """
 
     area: Floats
-    disc: Floats
     octaves: Octaves
     half: tuple[float, float]
     halvings: tuple[int, int]
@@ -226,7 +219,7 @@ class _Crossing:
     @property
     def reach(self) -> float:
         """How far out in the stop there is light, mm."""
-        return float(max(side + more for side, more in zip(self.half, self.disc, strict=True)))
+        return max(self.half)
 
 
 @dataclass(frozen=True)
@@ -265,7 +258,7 @@ class Rings:
         return np.concatenate([values.ravel() for values, _ in found]), table.astype(np.float64)
 
     def _average(self, item: _Crossing, waves: Floats, shares: Floats) -> Pattern:
-        """Average a crossing's pattern over the light of a band and over the light's disc."""
+        """Average a crossing's pattern over the light of a band."""
         sides = [np.interp(waves, self.wavelengths_nm, side / self.wavelengths_nm) * waves for side in item.area.T]
         middle = len(self.wavelengths_nm) // 2
         ratio = float(item.area[middle, 1] / item.area[middle, 0])
@@ -286,7 +279,7 @@ class Rings:
             values, half = self.ringing.pattern(item.octaves, area, item.half, white=white)
             total = values * np.float32(share) if total is None else total + values * np.float32(share)
         assert total is not None
-        return disc_blurred(*halved(total, half, item.halvings), (float(item.disc[0]), float(item.disc[1])))
+        return halved(total, half, item.halvings)
 
 
 @dataclass(frozen=True)
@@ -359,10 +352,8 @@ def _crossing(
     middle = len(wavelengths_nm) // 2
     if ringing.mode == "frft":
         area = ringing.radius**2 / frft_fresnel_number(wavelengths_nm, ringing.f_number)[:, None] * np.ones(2)
-        disc = np.zeros(2)
     else:
         area = 1e-6 * wavelengths_nm[:, None] * way.length
-        disc = np.abs(way.turn[middle]) * math.radians(0.5 * light.diameter_deg)
     magnified = np.abs(way.magnification[middle]) * pixels_per_mm
     if not np.isfinite(area).all() or not np.abs(area).max() <= ringing.radius**2 / LEAST_FRESNEL_NUMBER:
         return None
@@ -378,9 +369,9 @@ def _crossing(
     most = [math.log2(1.12 * side) for side in np.abs(area).max(axis=0)]
     high = [max(start + OCTAVES, math.ceil(2.0 * end) / 2.0) for start, end in zip(low, most, strict=True)]
     octaves = ((low[0] - finer, high[0]), (low[1] - finer, high[1]))
-    # no finer than pixels show, nor than the light's disc leaves
-    enough = np.maximum(TEXEL_PX / np.maximum(magnified, 1e-9), disc / TEXELS_A_DISC)
+    # no finer than pixels show
+    enough = TEXEL_PX / np.maximum(magnified, 1e-9)
     halvings = [int(np.clip(math.log2(side / ringing.grid(octaves).step), 0, 6)) for side in enough]
     widest = WIDEST_RADII * ringing.radius
     half = [ringing.opening.radius + min(SHADOW * math.sqrt(0.5 * 2.0**top), widest) for top in high]
-    return _Crossing(area, np.minimum(disc, widest), octaves, (half[0], half[1]), (halvings[0], halvings[1]))
+    return _Crossing(area, octaves, (half[0], half[1]), (halvings[0], halvings[1]))
