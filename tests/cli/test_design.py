@@ -92,7 +92,7 @@ def test_scratch_and_colors_write_lenses(folder, capsys):
     assert run([*words, "--json"]) == 0
     assert len(json.loads(capsys.readouterr().out)["lenses"][0]["ghosts"]) == 3
     (folder / "red.toml").write_text(PROJECT.replace("height = 1.001", "color = [1.0, 0.2, 0.1]"))
-    words = ["design", "colors", "red.toml", "-o", "red-lens.toml", "--starts", "4", "--map", "4-1"]
+    words = ["design", "colors", "red.toml", "-o", "red-lens.toml", "--starts", "4", "--map", "4-1", "--curves", "3"]
     assert run([*words, "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
     assert set(told["rows"]) == {str(k) for k in range(9)} - {"5"}
@@ -100,6 +100,7 @@ def test_scratch_and_colors_write_lenses(folder, capsys):
     lens = read_lens(folder / "red-lens.toml")[0]
     assert lens.rows[0].coating.center_wavelength_nm == told["rows"]["0"]["center_wavelength_nm"]
     assert (folder / "red-lens.4-1.png").stat().st_size > 1000
+    assert (folder / "red-lens.row-3.png").stat().st_size > 1000
     assert run([*words, "--films", "free"]) == 0
     assert "Algorithm 2" in capsys.readouterr().out
 
@@ -129,6 +130,7 @@ def test_scratch_and_colors_write_lenses(folder, capsys):
         (["scratch", "-o", "x", "--random", "20", "--surfaces", "4"], "surfaces ="),
         (["colors", "shot.toml", "-o", "x.exr"], "must be named"),
         (["colors", "shot.toml", "-o", "x.toml", "--films", "gold"], "choose quarter-wave or free"),
+        (["colors", "shot.toml", "-o", "x.toml", "--curves", "5"], "--curves 5"),
         (["colors", "shot.toml", "-o", "x.toml", "--judge", "lab"], "choose linear or oklab"),
         (["colors", "shot.toml", "-o", "x.toml", "--map", "9-9"], "is no ghost"),
         (["resume", "nothing"], "design solve has written"),

@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from flarewright.design.color_chart import channel_chart, channel_curves
 from flarewright.design.colors import (
     WAVELENGTHS_NM,
     ColorProblem,
@@ -144,3 +145,16 @@ def test_judged_by_the_eye_colours_come_nearer_to_the_eye():
         if perceptual:
             assert found.cost == pytest.approx(sums[-1], rel=1e-6)
     assert sums[1] < sums[0]
+
+
+def test_curves_of_one_surface_are_the_textbooks():
+    n_d = indices_of(LENS)
+    across, reflectance = channel_curves(n_d, 0, Bounds())
+    # a quarter wave reflects least at its centre: ((n0 ns - n1^2) / (n0 ns + n1^2))^2 with magnesium fluoride
+    n = n_d[1]
+    least = ((n - 1.38**2) / (n + 1.38**2)) ** 2
+    for channel, wavelength in enumerate(WAVELENGTHS_NM):
+        at = int(np.argmin(reflectance[:, channel]))
+        assert across[at] == pytest.approx(wavelength, abs=2.0)
+        assert reflectance[at, channel] == pytest.approx(least, abs=2e-5)
+    assert "row 0" in channel_chart(n_d, 0, Bounds()).title

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
 from ..errors import ProjectError
 from .common import check_place, console, print_json, tell
+
+if TYPE_CHECKING:
+    from ..design.colors import ColorProblem
 
 EPILOG = (
     'Example, in the project:\n\n[[design.wishes]]\n\nghost = "4-1"\n\ncolor = [1.0, 0.4, 0.1]\n\n'
@@ -27,6 +30,9 @@ def colors(
     ] = "linear",
     pair_map: Annotated[
         str | None, typer.Option("--map", metavar="J-I", help="Also draw what colours the ghost J-I can have.")
+    ] = None,
+    curves: Annotated[
+        int | None, typer.Option("--curves", metavar="ROW", help="Also draw what quarter waves on this row reflect.")
     ] = None,
     starts: Annotated[int, typer.Option(min=1, max=100000, help="Descents; more find better coatings.")] = 64,
     seed: Annotated[int, typer.Option(min=0, help="Begins the random numbers.")] = 0,
@@ -54,6 +60,9 @@ def colors(
     names = [f"{j}-{i}" for j, i in problem.structure.pairs]
     if pair_map is not None and pair_map not in names:
         raise ProjectError(f"--map {pair_map!r} is no ghost of this lens on one side of its stop, such as {names[0]}")
+    if curves is not None and curves not in mirrors_of(problem.structure):
+        rows = ", ".join(str(k) for k in mirrors_of(problem.structure))
+        raise ProjectError(f"--curves {curves}: no glass surface is there; the lens' rows that have one are {rows}")
     found = solve_colors(problem, seed=seed, starts=starts, threads=threads)
     write_lens(coated(lens, problem.structure, kind, found.values), output)
     remarks = [f"wrote {output}"]
@@ -63,6 +72,8 @@ def colors(
         data = png_bytes(np.repeat(np.repeat(picture, 2, axis=0), 2, axis=1))
         write_atomically(map_path, lambda temporary: _write(temporary, data))
         remarks.append(f"wrote {map_path}: first mirror upwards, second to the right, centre wavelengths in 2 nm steps")
+    if curves is not None:
+        remarks.append(_draw_curves(output, problem, curves))
     tell(remarks)
     fitness = algorithm_2(problem.targets, found.colors)
     differences = perceived_differences(problem, found.colors)
@@ -92,6 +103,16 @@ def colors(
         out.add_row(name, *(" ".join(f"{part:.3f}" for part in c / c.sum()) for c in (wanted, got)),
                     f"{got.sum() / wanted.sum():.3f}")  # fmt: skip
     console().print(out)
+
+
+def _draw_curves(output: Path, problem: ColorProblem, row: int) -> str:
+    """Draw the curves of one row beside the lens; return what there is to tell."""
+    from ..design.color_chart import channel_chart
+    from ..render.figure import write_figure
+
+    path = output.with_name(f"{output.stem}.row-{row}.png")
+    write_figure(path, channel_chart(problem.n_d, row, problem.bounds), f"quarter waves on row {row}")
+    return f"wrote {path}"
 
 
 def _write(path: Path, data: bytes) -> None:
