@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import signal
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
@@ -182,3 +183,23 @@ def progress_bar() -> Iterator[Callable[[str], Callable[[float, str], None]]]:
             return lambda part, words: bars.update(task, completed=part, description=f"{name}: {words}")
 
         yield begin
+
+
+@contextmanager
+def interruptible() -> Iterator[Callable[[], bool]]:
+    """Turn Ctrl-C into a wish to end, which the search hears after its round."""
+    asked: list[bool] = []
+
+    def note(*_: Any) -> None:
+        asked.append(True)
+
+    try:
+        before = signal.signal(signal.SIGINT, note)
+    except ValueError:
+        # not the main thread: nobody presses Ctrl-C here
+        yield lambda: False
+        return
+    try:
+        yield lambda: bool(asked)
+    finally:
+        signal.signal(signal.SIGINT, before)

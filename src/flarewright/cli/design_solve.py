@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 import math
-import signal
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from ..errors import OutputError, ProjectError
-from .common import print_json, tell
+from .common import interruptible, print_json, tell
+from .design_benchmark import check_fitness
 
 if TYPE_CHECKING:
+    from ..design.genes import Measure
     from ..design.search import Problem, State
+    from ..design.solvers import Choice
     from ..model import Project
 
 EPILOG = (
@@ -29,7 +31,11 @@ Seed = Annotated[int, typer.Option(min=0, help="Begins the random numbers.")]
 Time = Annotated[float, typer.Option("--time", help="Seconds to search; Ctrl-C ends it earlier and keeps the best.")]
 Lenses = Annotated[int, typer.Option("--lenses", min=1, max=50, help="Write so many distinct lenses.")]
 Threads = Annotated[int | None, typer.Option(min=1, help="All cores when left out; the lenses do not depend on it.")]
-Searches = Annotated[int | None, typer.Option(min=1, help="End after about so many local searches.")]
+Searches = Annotated[int | None, typer.Option(min=1, help="End after about so many local searches (evaluations).")]
+Solver = Annotated[
+    str, typer.Option(help="pools (ours), pso, sade, de, de1220, gaco or cmaes; pso:5x30 is 5 islands of 30 per gene.")
+]
+Fitness = Annotated[str, typer.Option(help="What a solver sees that evolves: ours, or algorithm1 of the thesis.")]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
 
 
@@ -41,6 +47,8 @@ def solve(
     lenses: Lenses = 5,
     searches: Searches = None,
     threads: Threads = None,
+    solver: Solver = "pools",
+    fitness: Fitness = "ours",
     as_json: Json = False,
 ) -> None:
     """Search lenses whose ghosts land where the project wants them.
@@ -48,8 +56,11 @@ def solve(
     Without a [design] in the project: other lenses with the same ghosts as its own.
     """
     check_time(time_s)
+    measure = check_fitness(fitness)
+    from ..design.solvers import chosen
     from ..io.project_file import read_project
 
+    choice = chosen(solver)
     given = read_project(project)
     if output.exists() and not output.is_dir():
         raise OutputError(f"{output} is a file; give a folder for the lenses")
@@ -58,7 +69,7 @@ def solve(
                           "another folder")  # fmt: skip
     from ..design.search import State as Fresh
 
-    search(given, output, time_s, Fresh(seed), lenses, searches, threads, as_json)
+    search(given, output, time_s, Fresh(seed), lenses, searches, threads, as_json, choice=choice, measure=measure)
 
 
 def resume(
@@ -87,6 +98,7 @@ def check_time(time_s: float) -> None:
 def search(
     project: Project, folder: Path, time_s: float, state: State, lenses: int, searches: int | None,
     threads: int | None, as_json: bool, name: str | None = None,
+    choice: Choice | None = None, measure: Measure = "ours",
 ) -> None:  # fmt: skip
     """Search, write the folder and tell what was found.
 
@@ -103,12 +115,15 @@ def search(
     as_json : bool
     name : str, optional
         Of the lenses; None: after the project's.
+    choice : Choice, optional
+        None: pools of local minima.
+    measure : {"ours", "algorithm1"}
+        The fitness that a solver sees that evolves.
     """
     from ..design.candidate import outcomes
     from ..design.impossible import obstacles
     from ..design.report import summary, write_folder
-    from ..design.search import compile_kernels
-    from ..design.search import solve as run
+    from ..design.solvers import Limits, chosen, make_ready, solve_with
     from ..design.target import problem_of
 
     problem, settled = problem_of(project)
@@ -119,12 +134,13 @@ def search(
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise OutputError(f"cannot make the folder {folder}: {(error.strerror or str(error)).lower()}") from None
-    compile_kernels()
-    with _interruptible() as asked, _telling() as progress:
-        state = run(
-            problem, seed=state.seed, time_limit=time_s, most_searches=searches, threads=threads, state=state,
-            progress=progress, cancelled=asked,
-        )  # fmt: skip
+    solver = chosen("pools") if choice is None else choice
+    make_ready(solver, problem, measure)
+    with interruptible() as asked, _telling(solver.unit) as progress:
+        state = solve_with(
+            solver, problem, limits=Limits(time_s, searches, progress, asked), seed=state.seed, measure=measure,
+            threads=threads, state=state,
+        ).state  # fmt: skip
     found = outcomes(state, problem, count=lenses, name=name or f"After {settled.lens.name}", iris=settled.iris)
     remarks = write_folder(folder, project, problem, state, found, proven)
     data = summary(state, found, problem, proven)
@@ -155,27 +171,7 @@ def _check_fit(state: State, problem: Problem) -> None:
 
 
 @contextmanager
-def _interruptible() -> Iterator[Callable[[], bool]]:
-    """Turn Ctrl-C into a wish to end, which the search hears after its round."""
-    asked: list[bool] = []
-
-    def note(*_: Any) -> None:
-        asked.append(True)
-
-    try:
-        before = signal.signal(signal.SIGINT, note)
-    except ValueError:
-        # not the main thread: nobody presses Ctrl-C here
-        yield lambda: False
-        return
-    try:
-        yield lambda: bool(asked)
-    finally:
-        signal.signal(signal.SIGINT, before)
-
-
-@contextmanager
-def _telling() -> Iterator[Callable[[State], None] | None]:
+def _telling(unit: str) -> Iterator[Callable[[State], None] | None]:
     """Tell the best so far where someone looks at it."""
     if not sys.stderr.isatty():
         yield None
@@ -187,6 +183,6 @@ def _telling() -> Iterator[Callable[[State], None] | None]:
 
         def show(state: State) -> None:
             best = "-" if state.best is None else f"{state.best.cost:.3g}"
-            status.update(f"searching: {state.searches} local searches, {state.next_run} runs, best cost {best}")
+            status.update(f"searching: {state.searches} {unit}, best cost {best}")
 
         yield show

@@ -11,10 +11,13 @@ from numpy.typing import NDArray
 
 from ..model.design import Bounds
 from ..render.prepare import load_lens
+from .genes import Measure
+from .hunt import Limits, Solution
 from .objective import diagonal_slope, fitness, fitness_thesis, own_objective
 from .picture import GAIN, grey_picture, psnr, psnr_with_gain, ssim
 from .prescription import Structure, structure_of, structures, vector_of
-from .search import STEPS, Candidate, Problem, compile_kernels, polish, solve
+from .search import STEPS, Candidate, Problem, State, polish
+from .solvers import Choice, chosen, make_ready, solve_with
 
 Floats = NDArray[np.float64]
 
@@ -53,6 +56,19 @@ THESIS = {
     ("canon", 5.45): (27.20, 0.8898, 3600.0),
 }
 
+# points of a trace
+TOLD = 60
+
+
+@dataclass(frozen=True)
+class TracePoint:
+    """The best lens at some time: seconds, local searches or evaluations so far, and both kinds of fitness."""
+
+    seconds: float
+    searches: int
+    fitness_algorithm1: float
+    fitness: float
+
 
 @dataclass(frozen=True)
 class BenchmarkRun:
@@ -60,10 +76,15 @@ class BenchmarkRun:
 
     Attributes
     ----------
+    solver : str
+        As it was asked for.
+    saw : {"ours", "algorithm1"}
+        The fitness that it made least.
     seed : int
     seconds, cpu_seconds : float
         Of the search.
     searches : int
+        Local searches; evaluations of a solver that evolves.
     fitness_algorithm1 : float
         The thesis' own, sorted by size.
     fitness : float
@@ -72,8 +93,12 @@ class BenchmarkRun:
         Of the thesis' grey picture; of a black one; with the best gain.
     recovered : bool
         Whether it is the lens itself: indices to 1e-3, thicknesses to 0.01 mm.
+    trace : tuple of TracePoint
+        How the best lens came about.
     """
 
+    solver: str
+    saw: Measure
     seed: int
     seconds: float
     cpu_seconds: float
@@ -85,6 +110,7 @@ class BenchmarkRun:
     psnr_black_db: float
     psnr_gain_db: float
     recovered: bool
+    trace: tuple[TracePoint, ...] = ()
 
 
 def problem_of_case(
@@ -129,11 +155,15 @@ def run_case(
     angle_deg: float,
     *,
     seed: int = 0,
-    time_limit: float = 10.0,
+    time_limit: float | None = 10.0,
+    most: int | None = None,
+    choice: Choice | None = None,
+    measure: Measure = "algorithm1",
     unsigned: bool = False,
     fresnel: bool = False,
     threads: int | None = None,
     progress: Callable[[str], None] | None = None,
+    cancelled: Callable[[], bool] | None = None,
 ) -> tuple[BenchmarkRun, Floats, Floats]:
     """Run one seed of a test.
 
@@ -142,11 +172,19 @@ def run_case(
     name, angle_deg, unsigned, fresnel
         As in `problem_of_case`.
     seed : int
-    time_limit : float
-        Seconds.
+    time_limit : float, optional
+        Seconds; None: no limit.
+    most : int, optional
+        End after about so many local searches or evaluations.
+    choice : Choice, optional
+        None: pools of local minima.
+    measure : {"ours", "algorithm1"}
+        The fitness that a solver sees that evolves.
     threads : int, optional
     progress : callable, optional
-        Gets a line after every round.
+        Gets a line now and then.
+    cancelled : callable, optional
+        Asked now and then.
 
     Returns
     -------
@@ -155,15 +193,18 @@ def run_case(
         Grey pictures.
     """
     problem, structure, vector = problem_of_case(name, angle_deg, unsigned=unsigned, fresnel=fresnel)
-    compile_kernels()
+    solver = chosen("pools") if choice is None else choice
+    make_ready(solver, problem, measure)
+
+    def tell(now: State) -> None:
+        if progress is not None:
+            progress(f"{solver.label}, seed {seed}: {now.searches} {solver.unit}")
+
     cpu = time.process_time()
-    state = solve(
-        problem, seed=seed, time_limit=time_limit, threads=threads,
-        progress=None if progress is None else lambda now: progress(f"{now.searches} searches, {now.next_run} runs"),
-    )  # fmt: skip
+    limits = Limits(time_limit, most, tell, cancelled)
+    solution = solve_with(solver, problem, limits=limits, seed=seed, measure=measure, threads=threads)
     cpu = time.process_time() - cpu
-    assert state.best is not None
-    best = _finest(problem, state.best)
+    best, state = _best(problem, solution, solver), solution.state
     found = problem.variables(best.structure).prescription(best.x)
     case, slope = CASES[name], diagonal_slope(angle_deg)
     pictures = [
@@ -171,12 +212,37 @@ def run_case(
         for s, v in ((structure, vector), (best.structure, found))
     ]
     run = BenchmarkRun(
-        seed, state.seconds, cpu, state.searches, fitness_thesis(problem.objective, best.structure, found),
-        fitness(problem.objective, best.structure, found), psnr(*pictures), ssim(*pictures),
-        psnr(pictures[0], np.zeros_like(pictures[0])), psnr_with_gain(*pictures),
-        best.structure == structure and same_lens(vector, found),
+        solver.label, measure if solver.evolves else "ours", seed, state.seconds, cpu, state.searches,
+        fitness_thesis(problem.objective, best.structure, found), fitness(problem.objective, best.structure, found),
+        psnr(*pictures), ssim(*pictures), psnr(pictures[0], np.zeros_like(pictures[0])), psnr_with_gain(*pictures),
+        best.structure == structure and same_lens(vector, found), _trace(problem, solution),
     )  # fmt: skip
     return run, pictures[0], pictures[1]
+
+
+def _best(problem: Problem, solution: Solution, solver: Choice) -> Candidate:
+    """Return what a solver made best: what it saw counts, and nobody but ours polishes."""
+    if solver.evolves:
+        return solution.steps[-1].best
+    assert solution.state.best is not None
+    return _finest(problem, solution.state.best)
+
+
+def _trace(problem: Problem, solution: Solution) -> tuple[TracePoint, ...]:
+    """Tell both kinds of fitness along the way, at some tens of steps."""
+    steps = solution.steps
+    shown = sorted({round(k) for k in np.linspace(0, len(steps) - 1, min(len(steps), TOLD))})
+    points = []
+    for k in shown:
+        best = steps[k].best
+        vector = problem.variables(best.structure).prescription(best.x)
+        points.append(
+            TracePoint(
+                steps[k].seconds, steps[k].work, fitness_thesis(problem.objective, best.structure, vector),
+                fitness(problem.objective, best.structure, vector),
+            )
+        )  # fmt: skip
+    return tuple(points)
 
 
 def _finest(problem: Problem, best: Candidate) -> Candidate:

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..kernels.design_fitness import HIDDEN
 from .ghosts import differentiate
-from .objective import HIDDEN, seen
+from .objective import seen
 from .prescription import Structure
 
 Floats = NDArray[np.float64]

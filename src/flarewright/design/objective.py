@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..kernels import design_ghosts as columns
+from ..kernels.design_fitness import HIDDEN, sorted_misfit
 from ..kernels.design_match import match
 from ..model.design import Bounds
 from .ghosts import differentiate, evaluate
@@ -18,8 +19,6 @@ from .rims import STEEPEST
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-# half a ghost's height where it cannot be seen, so that sorting puts it last (the thesis' program)
-HIDDEN = 100000.0
 # what too few ghosts are worth there
 TOO_FEW = 100000.0
 # a ghost of 100 mm without a target costs a tenth of a wanted one that misses by its own radius
@@ -238,12 +237,7 @@ def algorithm_1(sizes: Floats, places: Floats, found: Floats) -> float:
     -------
     float
     """
-    radii = np.abs(found[:, 1])
-    by_target, by_ghost = np.argsort(sizes, kind="stable"), np.argsort(radii, kind="stable")
-    used = by_ghost[: len(places)]
-    errors = (places[by_target] - found[used, 0]) ** 2 + (sizes[by_target] - radii[used]) ** 2
-    extras = 500.0 / np.maximum(radii[by_ghost[len(places) :]], 1e-300)
-    return float(errors.sum() + extras.sum()) / len(places)
+    return float(sorted_misfit(np.ascontiguousarray(sizes), np.ascontiguousarray(places), np.ascontiguousarray(found)))
 
 
 def algorithm_2(targets: Floats, found: Floats) -> float:

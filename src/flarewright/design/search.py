@@ -81,6 +81,22 @@ class Problem:
     glasses: GlassList | None = None
     fixed_media: tuple[Medium | None, ...] = ()
 
+    def check(self) -> None:
+        """Refuse what no solver can begin with.
+
+        Raises
+        ------
+        ProjectError
+            When no structure has enough ghosts, or nothing is free to change.
+        """
+        if not self.structures:
+            raise ProjectError(
+                f"no lens of that many surfaces has {self.objective.wanted} ghosts; ask for fewer, or give more "
+                "surfaces"
+            )
+        if self.variables(self.structures[0]).free.size == 0:
+            raise ProjectError("every row is fixed, so there is nothing to search; leave some rows free")
+
     def variables(self, structure: Structure) -> Variables:
         """Return the variables of a structure."""
         return variables(
@@ -181,12 +197,7 @@ def solve(
     ProjectError
         When no structure has enough ghosts, or nothing is free to change.
     """
-    if not problem.structures:
-        raise ProjectError(
-            f"no lens of that many surfaces has {problem.objective.wanted} ghosts; ask for fewer, or give more surfaces"
-        )
-    if problem.variables(problem.structures[0]).free.size == 0:
-        raise ProjectError("every row is fixed, so there is nothing to search; leave some rows free")
+    problem.check()
     begun, spent = time.perf_counter(), 0.0 if state is None else state.seconds
     state = State(seed) if state is None else state
     workers = min(threads or os.cpu_count() or 1, ACTIVE)

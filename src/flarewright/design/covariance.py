@@ -1,0 +1,96 @@
+"""CMA-ES, by the package cmaes: one swarm that learns the shape of the valley, begun anew with twice as many."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import ProjectError
+from .genes import Genes
+from .hunt import Hunt, Limits, Solution
+
+Floats = NDArray[np.float64]
+
+# of a gene's range from 0 to 1
+FIRST_SPREAD = 0.2
+# a population larger than this many times the first is begun again from the first
+LARGEST = 32
+
+
+def adapt(genes: Genes, *, seed: int, limits: Limits, first_size: int | None = None) -> Solution:
+    """Search with CMA-ES, begun anew with twice the population whenever it has converged.
+
+    Parameters
+    ----------
+    genes : Genes
+    seed : int
+    limits : Limits
+    first_size : int, optional
+        Population of the first; None: 4 + 3 log of the number of genes.
+
+    Returns
+    -------
+    Solution
+
+    Raises
+    ------
+    ProjectError
+        Without cmaes.
+
+    Notes
+    -----
+    Hansen and Ostermeier 2001; restarts as Auger and Hansen 2005. It knows no bounds: what leaves 0 to 1 is folded
+    back (`folded`).
+    """
+    strategy = imported_cmaes()
+    hunt, size = Hunt(genes, limits, seed), first_size or 4 + int(3.0 * np.log(genes.count))
+    begun = 0
+    while True:
+        random = np.random.default_rng([seed, begun])
+        start = random.random(genes.count)
+        if begun < len(genes.problem.begin_with):
+            start = genes.encode(*genes.problem.begin_with[begun])
+        population = size * min(2**begun, LARGEST) if begun % 7 else size
+        swarm = strategy.CMA(
+            mean=start, sigma=FIRST_SPREAD, population_size=population, seed=int(random.integers(2**31))
+        )
+        if _converge(swarm, genes, hunt):
+            return hunt.solution()
+        begun += 1
+
+
+def _converge(swarm: Any, genes: Genes, hunt: Hunt) -> bool:
+    """Let a swarm converge (False) unless the work is over before (True)."""
+    while not swarm.should_stop():
+        asked = [swarm.ask() for _ in range(swarm.population_size)]
+        inside = folded(np.array(asked))
+        costs = genes.fitness(inside)
+        if hunt.note(inside, costs, len(asked)):
+            return True
+        swarm.tell([(x, float(cost)) for x, cost in zip(asked, costs, strict=True)])
+    return False
+
+
+def folded(x: Floats) -> Floats:
+    """Fold the real line into 0 to 1, like a strip of paper."""
+    turned = np.mod(x, 2.0)
+    return np.asarray(np.where(turned > 1.0, 2.0 - turned, turned), dtype=np.float64)
+
+
+def imported_cmaes() -> Any:
+    """Import cmaes.
+
+    Raises
+    ------
+    ProjectError
+        When it is not there.
+    """
+    try:
+        import cmaes
+    except ImportError:
+        raise ProjectError(
+            "the solver cmaes needs the package cmaes; install it with: pip install 'flarewright[evo]'"
+        ) from None
+    return cmaes
