@@ -204,18 +204,26 @@ def run_case(
     limits = Limits(time_limit, most, tell, cancelled)
     solution = solve_with(solver, problem, limits=limits, seed=seed, measure=measure, threads=threads)
     cpu = time.process_time() - cpu
+    return _measured(name, angle_deg, problem, (structure, vector), solution, solver, cpu, measure)
+
+
+def _measured(
+    name: str, angle_deg: float, problem: Problem, lens: tuple[Structure, Floats], solution: Solution, solver: Choice,
+    cpu: float, measure: Measure,
+) -> tuple[BenchmarkRun, Floats, Floats]:  # fmt: skip
+    """Compare what a solver found with the lens."""
     best, state = _best(problem, solution, solver), solution.state
     found = problem.variables(best.structure).prescription(best.x)
     case, slope = CASES[name], diagonal_slope(angle_deg)
     pictures = [
         grey_picture(s, v, slope, entrance=problem.objective.entrance, blades=case.blades, gain=case.gain)
-        for s, v in ((structure, vector), (best.structure, found))
+        for s, v in (lens, (best.structure, found))
     ]
     run = BenchmarkRun(
-        solver.label, measure if solver.evolves else "ours", seed, state.seconds, cpu, state.searches,
+        solver.label, measure if solver.evolves else "ours", state.seed, state.seconds, cpu, state.searches,
         fitness_thesis(problem.objective, best.structure, found), fitness(problem.objective, best.structure, found),
         psnr(*pictures), ssim(*pictures), psnr(pictures[0], np.zeros_like(pictures[0])), psnr_with_gain(*pictures),
-        best.structure == structure and same_lens(vector, found), _trace(problem, solution),
+        best.structure == lens[0] and same_lens(lens[1], found), _trace(problem, solution),
     )  # fmt: skip
     return run, pictures[0], pictures[1]
 

@@ -28,7 +28,7 @@ def adapt(genes: Genes, *, seed: int, limits: Limits, first_size: int | None = N
     seed : int
     limits : Limits
     first_size : int, optional
-        Population of the first; None: 4 + 3 log of the number of genes.
+        Population of the first; None: twice the number of genes, for there are many valleys.
 
     Returns
     -------
@@ -45,7 +45,7 @@ def adapt(genes: Genes, *, seed: int, limits: Limits, first_size: int | None = N
     back (`folded`).
     """
     strategy = imported_cmaes()
-    hunt, size = Hunt(genes, limits, seed), first_size or 4 + int(3.0 * np.log(genes.count))
+    hunt, size = Hunt(genes, limits, seed), first_size or 2 * genes.count
     begun = 0
     while True:
         random = np.random.default_rng([seed, begun])

@@ -211,6 +211,7 @@ def imported_pygmo(name: str) -> Any:
         import pygmo
     except ImportError:
         raise ProjectError(
-            f"the solver {name} needs the package pygmo; install it with: pip install 'flarewright[evo]'"
+            f"the solver {name} needs the package pygmo; install it with: pip install 'flarewright[evo]' "
+            "(Linux; elsewhere pygmo comes from conda-forge)"
         ) from None
     return pygmo

@@ -1,0 +1,129 @@
+"""`--solver` of the design commands: lenses, comparisons, Ctrl-C, and packages that are not there."""
+
+import json
+import os
+import re
+import signal
+import sys
+
+import pytest
+
+from flarewright.cli.app import run
+from flarewright.io.lens_file import read_lens
+
+PROJECT = """
+lens = "triplet-pestrecov"
+f_number = 8
+[[lights]]
+field_deg = [7, 3]
+[design]
+structure = "lens"
+brightness = "stop"
+"""
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "shot.toml").write_text(PROJECT)
+    return tmp_path
+
+
+def test_solve_with_another_solver_writes_lenses_and_resume_goes_on(folder, capsys):
+    pytest.importorskip("pygmo", reason="the extra evo is not installed: no pygmo")
+    words = "design solve shot.toml -o found --solver sade:3x4 --searches 3000 --lenses 1 --json"
+    assert run(words.split()) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["searches"] >= 3000
+    assert read_lens(folder / "found" / told["lenses"][0]["file"])[0].rows
+    assert run(["design", "resume", "found", "--searches", "3100", "--lenses", "1", "--json"]) == 0
+    again = json.loads(capsys.readouterr().out)
+    assert again["lenses"][0]["cost"] <= told["lenses"][0]["cost"] * (1 + 1e-9)
+
+
+def test_ctrl_c_ends_a_search_and_keeps_the_best(folder, capsys, monkeypatch):
+    pytest.importorskip("pygmo", reason="the extra evo is not installed: no pygmo")
+    from flarewright.design.hunt import Hunt
+
+    note, calls = Hunt.note, []
+
+    def pressed(self, *facts):
+        calls.append(self)
+        if len(calls) == 8:
+            os.kill(os.getpid(), signal.SIGINT)
+        return note(self, *facts)
+
+    monkeypatch.setattr(Hunt, "note", pressed)
+    assert run(["design", "solve", "shot.toml", "-o", "found", "--solver", "pso:3x4", "--lenses", "1", "--json"]) == 0
+    assert len(calls) in (8, 9)
+    assert json.loads(capsys.readouterr().out)["lenses"]
+    calls.clear()
+    assert run(["design", "benchmark", "heliar", "--solver", "pso:2x2", "--solver", "sade:2x2", "--time", "60"]) == 0
+    told = capsys.readouterr()
+    assert "1 of 2 runs" in told.err
+    assert "sade" not in told.out
+
+
+def test_benchmark_compares_solvers(folder, capsys):
+    for package in ("pygmo", "cmaes"):
+        pytest.importorskip(package, reason=f"the extra evo is not installed: no {package}")
+    words = ["design", "benchmark", "heliar", "--unsigned", "--seeds", "2", "--time", "0.2", "--report", "a.html"]
+    names = ["pools", "pso:2x2", "cmaes"]
+    assert run([*words, *(part for name in names for part in ("--solver", name)), "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert [(one["solver"], one["seed"]) for one in told["runs"]] == [(name, seed) for name in names for seed in (0, 1)]
+    assert [one["saw"] for one in told["runs"][::2]] == ["ours", "algorithm1", "algorithm1"]
+    for one in told["runs"][2:]:
+        # what it makes least never grows
+        fitness = [point["fitness_algorithm1"] for point in one["trace"]]
+        assert fitness == sorted(fitness, reverse=True)
+        assert fitness[-1] == pytest.approx(one["fitness_algorithm1"])
+    assert [one["figure"] for one in told["figures"]] == ["6.1", "6.3"]
+    assert [one["solver"] for one in told["figures"][0]["curves"]] == names
+    assert told["figures"][1]["solvers"][1]["psnr_db"] == [one["psnr_db"] for one in told["runs"][2:4]]
+    assert told["figures"][1]["thesis"]["psnr_db"] == 25.89
+    page = (folder / "a.html").read_text()
+    assert page.count("<svg") == 4
+    assert page.count("data:image/png;base64,") == 1 + len(names)
+    # the SVG name space is a name and no request
+    assert "http" not in page.replace("http://www.w3.org/2000/svg", "")
+    assert all(name in page for name in names)
+    assert "nan" not in " ".join(re.findall(r'points="([^"]*)"', page))
+
+
+def test_population_sizes_are_figure_6_5(capsys):
+    pytest.importorskip("pygmo", reason="the extra evo is not installed: no pygmo")
+    words = ["design", "benchmark", "heliar", "--angle", "13.40", "--time", "0.1", "--json"]
+    assert run([*words, "--solver", "pso:2x2", "--solver", "pso:2x4"]) == 0
+    assert json.loads(capsys.readouterr().out)["figures"][0]["figure"] == "6.5"
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["solve", "shot.toml", "-o", "x", "--solver", "newton"], "choose from pools, pso"),
+        (["solve", "shot.toml", "-o", "x", "--fitness", "best"], "choose ours or algorithm1"),
+        (["benchmark", "heliar", "--solver", "pools", "--solver", "pools:2x2"], "pso:15x15"),
+        (["benchmark", "heliar", "--fitness", "best"], "choose ours or algorithm1"),
+        (["benchmark", "heliar", "--report", "a.pdf"], "must be named"),
+    ],
+)
+def test_a_mistake_is_one_sentence(words, told, folder, capsys):
+    refused(words, told, folder, capsys)
+
+
+@pytest.mark.parametrize(("solver", "package"), [("de1220", "pygmo"), ("cmaes", "cmaes")])
+def test_a_missing_package_is_one_sentence(solver, package, folder, capsys, monkeypatch):
+    monkeypatch.setitem(sys.modules, package, None)
+    for words in (["solve", "shot.toml", "-o", "x"], ["benchmark", "canon"]):
+        refused([*words, "--solver", solver], f"the solver {solver} needs the package {package}", folder, capsys)
+
+
+def refused(words, told, folder, capsys):
+    before = sorted(path.name for path in folder.iterdir())
+    assert run(["design", *words]) == 2
+    error = capsys.readouterr().err
+    assert told in error
+    assert error.startswith("flarewright: error: ")
+    assert len(error.strip().splitlines()) == 1
+    assert sorted(path.name for path in folder.iterdir()) == before
