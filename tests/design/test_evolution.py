@@ -151,7 +151,7 @@ def test_fitness_is_that_of_the_search_and_of_the_thesis():
                 expected = polish(problem, [(found.structure, found.x)], steps=0)[0].cost
             else:
                 vector = problem.variables(found.structure).prescription(found.x)
-                expected = fitness_thesis(replace(problem.objective), found.structure, vector) + wishes(problem, found)
+                expected = fitness_thesis(problem.objective, found.structure, vector) + wishes(problem, found)
             assert found.cost == pytest.approx(expected, rel=1e-9)
 
 
@@ -195,9 +195,8 @@ def test_the_lens_that_is_there_joins(text):
     problem, _, _ = planted(begin=True)
     with_it = solve_with(solver(text), problem, limits=Limits(None, 300), seed=0)
     without = solve_with(solver(text), replace(problem, begin_with=()), limits=Limits(None, 300), seed=0)
-    assert with_it.state.best.cost < 0.5 * without.state.best.cost
-    # individuals of an archipelago are there as they are
-    assert text == "cmaes" or with_it.state.best.cost < 1e-15
+    assert with_it.state.best.cost < 1e-15
+    assert without.state.best.cost > 0.1
 
 
 def test_it_ends_when_asked_and_keeps_the_best():

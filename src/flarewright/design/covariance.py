@@ -52,6 +52,9 @@ def adapt(genes: Genes, *, seed: int, limits: Limits, first_size: int | None = N
         start = random.random(genes.count)
         if begun < len(genes.problem.begin_with):
             start = genes.encode(*genes.problem.begin_with[begun])
+            # a swarm around it need not find anything as good
+            if hunt.note(start[None], genes.fitness(start[None]), 1):
+                return hunt.solution()
         population = size * min(2**begun, LARGEST) if begun % 7 else size
         swarm = strategy.CMA(
             mean=start, sigma=FIRST_SPREAD, population_size=population, seed=int(random.integers(2**31))
