@@ -35,8 +35,9 @@ def two_singlets():
     """The ghosts of two singlets around a stop, looked for among such lenses."""
     structure = Structure(2, (True, False, False, True, False))
     vector = np.array([6.0, 3.0, 4.0, 5.0, 2.5, 40.0, 0.02, -0.01, 0.0, 0.015, -0.02, 1.6, 1.0, 1.0, 1.7, 1.0])
-    aim = own_objective(structure, vector, np.array([0.15]), bounds=Bounds())
-    return Problem(aim, (structure,), Bounds(), stop_diameter=6.0), structure, vector
+    bounds = Bounds(hard=())
+    aim = own_objective(structure, vector, np.array([0.15]), bounds=bounds)
+    return Problem(aim, (structure,), bounds, stop_diameter=6.0), structure, vector
 
 
 def solver(text):
