@@ -122,7 +122,7 @@ def fitness_charts(case: str, angle_deg: float, runs: Sequence[BenchmarkRun]) ->
     tuple of Figure
     """
     drawn = curves(runs)
-    names = (f"Algorithm 1 (thesis, figure {figure_numbers(case, angle_deg, runs)[0]})", "Best matching, signs, mm²")
+    names = (f"Algorithm 1 (thesis, figure {figure_numbers(case, angle_deg, runs)[0]})", "Best matching, mm²")
     sheets = []
     for title, values in zip(names, ([c.algorithm1 for c in drawn], [c.fitness for c in drawn]), strict=True):
         lines = [
