@@ -9,6 +9,7 @@ from typing import Any
 
 from ..design.candidate import outcomes
 from ..design.colors import coated, color_problem, solve_colors
+from ..design.impossible import obstacles
 from ..design.report import verdict
 from ..design.search import Problem, State, compile_kernels, solve
 from ..design.target import problem_of
@@ -136,6 +137,9 @@ class Solver:
         state = solve(problem, time_limit=seconds, progress=look, cancelled=stop.is_set)
         found = self._found(project, problem, state, CANDIDATES, name, exposure_stops)
         told = f"{len(found)} lenses of {state.searches} tries" if found else "No lens was found; search longer"
+        proven = obstacles(problem, project)
+        if proven:
+            told = f"No lens can do that: {' '.join(f'{one.target}: {one.reason}' for one in proven)} ({told})"
         self._tell(False, told, state.seconds, found)
 
     def _found(
