@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from flarewright.kernels.resample import blend_blade_wings
-from flarewright.model import D65, Iris
+from flarewright.model import D65, Camera, Iris, Light, Output, Project, Quality
 from flarewright.optics.diffraction import BladeWings, FanWings, pupil_pattern, spike_profile
 from flarewright.optics.iris import blade_edges, outline
 from flarewright.optics.spectrum import band_weights
+from flarewright.render.render import render
 from flarewright.render.starburst import starburst_layer
 
 WHITE_NM = np.arange(380.0, 781.0, 5.0)
@@ -314,3 +315,22 @@ def test_darkness_is_black_and_flux_is_linear():
 def test_bad_arguments(change, words):
     with pytest.raises(ValueError, match=words):
         layer(Iris(), **change)
+
+
+@pytest.mark.parametrize("mode", ["draft", "final"])
+@pytest.mark.parametrize("lights", [1, 9])
+def test_no_flux_is_lost_where_the_core_is_smaller_than_a_pixel(mode, lights):
+    """A fast lens in a small picture, against one of many more pixels."""
+    found = []
+    for size in ((64, 36), (640, 360)):
+        project = Project(
+            lens="biotar-50-f1.4",
+            lights=(Light(field_deg=(0.0, 0.0)),) * lights,
+            iris=Iris(),
+            camera=Camera(size_px=size),
+            quality=Quality(mode=mode, wavelengths=3),
+            output=Output(layers="passes"),
+        )
+        (layer,) = (layer for layer in render(project).layers if layer.name == "starburst")
+        found.append(layer.pixels.sum(dtype=np.float64) / size[0] ** 2)
+    assert found[0] == pytest.approx(found[1], rel=1e-4)

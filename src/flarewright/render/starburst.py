@@ -25,6 +25,9 @@ NEAR_PIXELS = 8
 
 NEAR_SPLIT = 8
 
+LEAST_CORE = 1.0
+"""Radius of the core, before the blend begins, in parts of a pixel: with less the blend loses flux."""
+
 __all__ = ["Painter", "painter_of", "starburst_layer"]
 
 
@@ -65,9 +68,9 @@ def starburst_layer(
     pattern : Pattern, optional
         Made by `optics.diffraction.pupil_pattern` of a pupil with more to it; iris and mask are not looked at then.
     split : int
-        Parts a side into which pixels near the centre are divided where the wings begin there. 1 is for drafts: it
-        costs half the time, keeps the flux to 2e-5, and errs by 4e-6 of the peak, which is up to 0.4 of the value of
-        some pixels within eight of the centre.
+        Least number of parts a side into which pixels near the centre are divided where the wings begin there; more
+        where the whole core is smaller than that. 1 is for drafts: it costs half the time, keeps the flux to 3e-5, and
+        errs by 4e-6 of the peak, which is up to 0.4 of the value of some pixels within eight of the centre.
 
     Returns
     -------
@@ -100,11 +103,11 @@ def starburst_layer(
     painter.paint(x_edges, y_edges, pixel_mm, picture)
 
     # Where the blend begins inside the near zone, pixels there are too coarse for it.
-    if split > 1 and painter.inner < NEAR_PIXELS * max(pixel_mm):
+    k = max(split, math.ceil(LEAST_CORE * max(pixel_mm) / painter.inner))
+    if k > 1 and painter.inner < NEAR_PIXELS * max(pixel_mm):
         left, right = _near(cx, width)
         top, bottom = _near(cy, height)
         if left < right and top < bottom:
-            k = split
             fine = np.zeros(((bottom - top) * k, (right - left) * k, 3))
             x_fine = (left + np.arange((right - left) * k + 1) / k - cx) * pixel_mm[0]
             y_fine = (cy - top - np.arange((bottom - top) * k + 1) / k) * pixel_mm[1]
