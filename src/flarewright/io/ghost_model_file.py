@@ -15,7 +15,7 @@ from ..model.ghost_model import GhostModel
 from ..model.replay_camera import ReplayCamera
 from .atomic import write_atomically
 from .sentences import summary, validation_sentences
-from .text_file import lower_first, read_text
+from .text_file import check_version, lower_first, read_text
 
 Record = TypeVar("Record", bound=Frozen)
 
@@ -31,11 +31,10 @@ def _read(path: str | Path, what: str, record: type[Record]) -> Record:
         raise FlarewrightError(str(error)) from None
     if not isinstance(data, dict):
         raise FlarewrightError(f"{path} is not {what}: a JSON object was expected")
-    version = data.get("schema_version", 1)
-    if isinstance(version, int) and version > _NEWEST:
-        raise FlarewrightError(
-            f"{path} has schema_version {version}, newer than this program's {_NEWEST}: update flarewright"
-        )
+    try:
+        check_version(data, _NEWEST, str(path))
+    except ValueError as error:
+        raise FlarewrightError(str(error)) from None
     try:
         return record.model_validate(data)
     except ValidationError as error:

@@ -42,7 +42,7 @@ from .plate_text import parse_plate
 from .project_text import ABOUT, FILES, HOLDOUT_FILES, lens_location, project_text
 from .sentences import count, did_you_mean, shorten
 from .spectrum_text import parse_spectrum
-from .text_file import read_toml
+from .text_file import check_version, read_toml
 
 __all__ = [
     "ProjectFileError",
@@ -101,14 +101,9 @@ def read_project(path: str | os.PathLike[str]) -> Project:
     path = Path(path)
     try:
         data = read_toml(path, "a project file")
+        check_version(data, _NEWEST, f"the project file {path}")
     except ValueError as error:
         raise ProjectError(str(error)) from None
-    version = data.get("schema_version", 1)
-    if isinstance(version, int) and version > _NEWEST:
-        raise ProjectError(
-            f"the project file {path} has schema_version {version}, newer than this program's {_NEWEST}: "
-            "update Flarewright"
-        )
     return project_from_data(data, folder=path.parent, where=str(path))
 
 

@@ -28,7 +28,7 @@ from .project_file import (
 )
 from .project_text import ABOUT
 from .sentences import shorten, summary
-from .text_file import read_toml
+from .text_file import check_version, read_toml
 
 _NEWEST = 1
 
@@ -124,12 +124,10 @@ def read_scene(path: str | os.PathLike[str]) -> Scene:
 
 def scene_from_data(data: dict[str, Any], *, folder: Path, where: str) -> Scene:
     """Return the scene that parsed TOML describes; parameters and errors as `project_file.project_from_data`."""
-    version = data.get("schema_version", 1)
-    if isinstance(version, int) and version > _NEWEST:
-        raise ProjectError(
-            f"the scene file {where} has schema_version {version}, newer than this program's {_NEWEST}: "
-            "update Flarewright"
-        )
+    try:
+        check_version(data, _NEWEST, f"the scene file {where}")
+    except ValueError as error:
+        raise ProjectError(str(error)) from None
     problems: list[str] = []
     out = dict(data)
     if isinstance(out.get("cameras"), list):

@@ -82,6 +82,28 @@ def read_toml(path: str | Path, what: str) -> dict[str, Any]:
         raise ValueError(f"{path} is not {what}: its tables are nested too deeply") from None
 
 
+def check_version(data: dict[str, Any], newest: int, file: str) -> None:
+    """Refuse a file that a newer program has written.
+
+    Parameters
+    ----------
+    data : dict
+        As read; without `schema_version` it counts as the first.
+    newest : int
+        The newest version that can be read.
+    file : str
+        What the message begins with: "the project file shot.toml".
+
+    Raises
+    ------
+    ValueError
+        When it is newer.
+    """
+    version = data.get("schema_version", 1)
+    if isinstance(version, int) and version > newest:
+        raise ValueError(f"{file} has schema_version {version}, newer than this program's {newest}: update Flarewright")
+
+
 def lower_first(text: str) -> str:
     """Return the text with a small first letter, to stand inside a sentence."""
     return text[:1].lower() + text[1:]
