@@ -10,7 +10,10 @@ import typer
 from ..errors import OutputError
 from .common import check_place, tell
 
-EPILOG = "Example:\n\nflarewright lens convert old/tessar.lens tessar.toml"
+EPILOG = (
+    "Examples:\n\nflarewright lens convert old/tessar.lens tessar.toml\n\nflarewright lens convert double-gauss.zmx "
+    "own.toml"
+)
 
 
 def convert(

@@ -7,6 +7,7 @@ import hashlib
 import io
 import shlex
 from collections.abc import Callable
+from dataclasses import dataclass
 from math import atan, degrees
 from pathlib import Path
 from typing import Literal
@@ -97,7 +98,17 @@ def _is_project(data: dict[str, object]) -> bool:
     return "lights" in data or "lens" in data
 
 
-def imported(name: str, data: bytes, folder: Path, project: Project) -> tuple[Project | None, Lens | None, str | None]:
+@dataclass(frozen=True)
+class Imported:
+    """What a dropped file holds: one of a project, a lens and a picture (its path), and what was noticed."""
+
+    project: Project | None = None
+    lens: Lens | None = None
+    picture: str | None = None
+    remarks: tuple[str, ...] = ()
+
+
+def imported(name: str, data: bytes, folder: Path) -> Imported:
     """Take in a file that was dropped on the page.
 
     Parameters
@@ -107,26 +118,22 @@ def imported(name: str, data: bytes, folder: Path, project: Project) -> tuple[Pr
     data : bytes
     folder : Path
         Where it is kept: pictures are read again later.
-    project : Project
-        What is open, for messages.
 
     Returns
     -------
-    project, lens, picture
-        One of the three.
+    Imported
 
     Raises
     ------
     FlarewrightError
         When it is nothing that the editor reads; the message names the kinds that it does.
     """
-    del project
     suffix = Path(name).suffix.lower()
     plain = Path(name).name or "dropped"
     if suffix not in (*LENS_SUFFIXES, *PICTURES):
         raise LensError(
-            f"{plain} cannot be opened here: drop a lens (.lens or .toml), a project (.toml), or a background picture "
-            "(.exr, .png, .jpg)"
+            f"{plain} cannot be opened here: drop a lens (.toml, .lens, .zmx), a project (.toml), or a background "
+            "picture (.exr, .png, .jpg)"
         )
     # a name of its own for other contents: what undo leads back to must stay as it was
     folder = folder / hashlib.sha256(data).hexdigest()[:12]
@@ -134,19 +141,20 @@ def imported(name: str, data: bytes, folder: Path, project: Project) -> tuple[Pr
     path = folder / plain
     write_atomically(path, lambda temporary: _write_bytes(temporary, data))
     if suffix in PICTURES:
-        return None, None, str(path)
+        return Imported(picture=str(path))
+    remarks: list[str] = []
     try:
         if suffix == ".toml":
             table = read_toml_of(path)
             if _is_project(table):
                 found = project_from_data(table, folder=folder, where=plain)
                 settle(found)
-                return found, None, None
-        lens = load_lens(path)
+                return Imported(project=found)
+        lens = load_lens(path, remarks=remarks)
     except FlarewrightError as error:
         # the folder is ours, and means nothing to a person
         raise type(error)(str(error).replace(str(path), plain)) from None
-    return None, lens.replace(name=lens.name or plain), None
+    return Imported(lens=lens.replace(name=lens.name or plain), remarks=tuple(remarks))
 
 
 def _write_bytes(path: Path, data: bytes) -> None:

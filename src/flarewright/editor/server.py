@@ -225,8 +225,8 @@ def _import(desk: Desk, request: Request, body: Any) -> Any:
     if len(body) > MOST_BYTES:
         raise ProjectError(f"{name} is larger than {MOST_BYTES // 2**20} MB, which no lens or background is")
     kept = state_folder() / "imports"
-    project, lens, picture = files.imported(name, body, kept, desk.session.project)
-    if picture is not None:
+    found = files.imported(name, body, kept)
+    if (picture := found.picture) is not None:
         if request.query_params.get("as") == "mask":
             from ..io.mask_image import read_mask
 
@@ -236,11 +236,11 @@ def _import(desk: Desk, request: Request, body: Any) -> Any:
             # what is no picture is refused here, not when it is shown
             plate_for(View(plate=picture), (16, 16))
             desk.session.set_view({"plate": picture})
-    elif project is not None:
-        desk.session.put(project, f"Import {name}")
-    elif lens is not None:
-        desk.session.put(choose_lens(desk.session.project, lens), f"Import {name}")
-    return desk.state()
+    elif found.project is not None:
+        desk.session.put(found.project, f"Import {name}")
+    elif found.lens is not None:
+        desk.session.put(choose_lens(desk.session.project, found.lens), f"Import {name}")
+    return desk.state() | {"told": list(found.remarks)}
 
 
 def _open(desk: Desk, _request: Request, body: Any) -> Any:

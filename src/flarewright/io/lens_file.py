@@ -22,9 +22,9 @@ from pydantic import ValidationError
 
 from flarewright.errors import GlassError, LensError, ProjectError
 from flarewright.model import Coating, Iris, Lens, Row, Stop, Surface
-from flarewright.model.raw_lens import LensReading, RawLens
+from flarewright.model.raw_lens import LensReading, RawLens, RawSequence
 
-from . import dotlens, media
+from . import dotlens, media, zmx
 from .coating_text import coating_from
 from .lens_fields import (
     CURVATURE,
@@ -46,18 +46,19 @@ MOST_ROWS = 500
 """Lenses of photography end at some sixty rows; beyond this the file is no lens."""
 
 
-def read_lens(path: str | Path) -> LensReading | RawLens:
+def read_lens(path: str | Path) -> LensReading | RawLens | RawSequence:
     """Read a lens file of any known kind.
 
     Parameters
     ----------
     path : str or Path
-        `.toml` is our own format; `.lens` the text table that several flare tools share.
+        `.toml` is our own format; `.lens` the text table that several flare tools share; `.zmx` a sequential file of
+        Zemax.
 
     Returns
     -------
-    LensReading or RawLens
-        A `.lens` file still has to be judged and repaired by `optics.repair`.
+    LensReading or RawLens or RawSequence
+        A `.lens` file still has to be judged and repaired by `optics.repair`, a `.zmx` file by `optics.sequence`.
 
     Raises
     ------
@@ -67,9 +68,13 @@ def read_lens(path: str | Path) -> LensReading | RawLens:
     suffix = Path(path).suffix.lower()
     if suffix == ".lens":
         return dotlens.read_dotlens(path)
+    if suffix == ".zmx":
+        return zmx.read_zmx(path)
     if suffix == ".toml" or Path(path).is_dir() or not Path(path).exists():
         return read_lens_toml(path)
-    raise LensError(f"{path} is not of a kind that can be read: Flarewright reads .toml (its own) and .lens files")
+    raise LensError(
+        f"{path} is not of a kind that can be read: Flarewright reads .toml (its own), .lens and .zmx files"
+    )
 
 
 def read_lens_toml(path: str | Path) -> LensReading:

@@ -43,7 +43,7 @@ def lens_path(name_or_path: str | Path) -> Path:
     path = Path(text).expanduser()
     if path.exists():
         return path
-    if path.suffix in (".toml", ".lens") or path.parent != Path():
+    if path.suffix.lower() in (".toml", ".lens", ".zmx") or path.parent != Path():
         raise LensError(
             f"{text} does not exist: check the path, or choose a shipped lens (flarewright lenses lists them)"
         )

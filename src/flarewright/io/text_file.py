@@ -10,8 +10,8 @@ LARGEST = 4_000_000
 """Bytes; a text file beyond it is something else under a wrong name."""
 
 
-def read_text(path: str | Path, what: str) -> str:
-    """Read a small UTF-8 text file.
+def read_bytes(path: str | Path, what: str) -> bytes:
+    """Read a small file.
 
     Parameters
     ----------
@@ -21,13 +21,12 @@ def read_text(path: str | Path, what: str) -> str:
 
     Returns
     -------
-    str
-        Lines end with a line feed alone; a byte order mark is dropped.
+    bytes
 
     Raises
     ------
     ValueError
-        The file is missing, a folder, not readable, too large, empty or not UTF-8; the message is one sentence.
+        The file is missing, a folder, not readable, too large or empty; the message is one sentence.
     """
     file = Path(path)
     try:
@@ -47,11 +46,34 @@ def read_text(path: str | Path, what: str) -> str:
         ) from None
     if not data.strip():
         raise ValueError(f"{file} is empty: {what} was expected")
+    return data
+
+
+def read_text(path: str | Path, what: str) -> str:
+    """Read a small UTF-8 text file.
+
+    Parameters
+    ----------
+    path : str or Path
+    what : str
+        As in `read_bytes`.
+
+    Returns
+    -------
+    str
+        Lines end with a line feed alone; a byte order mark is dropped.
+
+    Raises
+    ------
+    ValueError
+        The file cannot be read (as in `read_bytes`) or is not UTF-8; the message is one sentence.
+    """
+    data = read_bytes(path, what)
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         line = data.count(b"\n", 0, error.start) + 1
-        raise ValueError(f"{file} is not UTF-8 text (line {line}): save it as UTF-8") from None
+        raise ValueError(f"{path} is not UTF-8 text (line {line}): save it as UTF-8") from None
     return text.replace("\r\n", "\n")
 
 

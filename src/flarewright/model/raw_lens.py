@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from .base import Frozen
 from .glass import Medium
-from .lens import Lens
+from .lens import Lens, Surface
 
 
 class LensReading(NamedTuple):
@@ -86,4 +86,58 @@ class RawLens(Frozen):
     stated_surfaces: int | None = None
     stated_elements: int | None = None
     rows: tuple[RawRow, ...]
+    remarks: tuple[str, ...] = ()
+
+
+class SequenceRow(Frozen):
+    """One surface of a sequential ray-trace file.
+
+    Attributes
+    ----------
+    number : int
+        The file's own: the object is 0.
+    surface : Surface
+        With what lies behind it.
+    stop : bool
+        Whether the file makes it the stop; it may refract all the same.
+    automatic_rim : bool
+        Whether the program that wrote the file chose the rim, so that it passes the file's fields.
+    """
+
+    number: int
+    surface: Surface
+    stop: bool = False
+    automatic_rim: bool = False
+
+
+class RawSequence(Frozen):
+    """What a sequential ray-trace file says; `optics.sequence` makes a Lens of it or tells why it is none.
+
+    Attributes
+    ----------
+    file : str
+        File name, for messages.
+    name, notes : str
+    rows : tuple of SequenceRow
+        Between object and image, mm.
+    f_number, entrance_pupil_diameter : float or None
+        What sets the opening; where both are None the stop's own size does.
+    stop_semi_diameter : float or None
+    field_deg, image_height : float or None
+        The largest field, as an angle or as millimetres in the picture.
+    focus_distance : float or None
+        From the object to the first of `rows`, mm; None: it lies at infinity.
+    remarks : tuple of str
+    """
+
+    file: str
+    name: str
+    notes: str = ""
+    rows: tuple[SequenceRow, ...]
+    f_number: float | None = None
+    entrance_pupil_diameter: float | None = None
+    stop_semi_diameter: float | None = None
+    field_deg: float | None = None
+    image_height: float | None = None
+    focus_distance: float | None = None
     remarks: tuple[str, ...] = ()

@@ -15,7 +15,7 @@ from ..io.media import attach
 from ..io.media import complete as complete_media
 from ..io.media import remarks as media_remarks
 from ..model import AsLens, CoatingChoice, Imperfection, Iris, Lens, Medium, Plate, Project, Surface
-from ..model.raw_lens import RawLens
+from ..model.raw_lens import RawLens, RawSequence
 from ..optics.imperfection import imperfect
 from ..optics.pack import SensorMirror, resolve_coatings
 from ..optics.paraxial import FirstOrder
@@ -23,6 +23,7 @@ from ..optics.paraxial import first_order as _first_order
 from ..optics.plates import with_cover_glass, with_filter
 from ..optics.repair import repair
 from ..optics.semi_diameters import complete
+from ..optics.sequence import lens_of_sequence
 from ..optics.zoom import at_position, positioned
 
 
@@ -32,7 +33,7 @@ def load_lens(name_or_path: str | Path, *, remarks: list[str] | None = None) -> 
     Parameters
     ----------
     name_or_path : str or Path
-        A shipped lens' name (`flarewright lenses`), a TOML lens file, or a `.lens` file.
+        A shipped lens' name (`flarewright lenses`), a TOML lens file, a `.lens` or a `.zmx` file.
     remarks : list of str, optional
         Every repair, estimate and assumption is appended to it, a sentence each.
 
@@ -64,8 +65,12 @@ def _shipped_lens(path: Path) -> tuple[Lens, tuple[str, ...]]:
 def _read_complete(path: Path) -> tuple[Lens, tuple[str, ...]]:
     """Read a lens file and fill in what it leaves out; also returns what there is to tell."""
     reading = read_lens(path)
-    # a `.lens` table needs optics to tell diameters from semi-diameters, so it is repaired here
-    lens, found = repair(reading) if isinstance(reading, RawLens) else reading
+    # what other programs wrote needs optics to be judged, so it is repaired here
+    if isinstance(reading, RawLens):
+        reading = repair(reading)
+    elif isinstance(reading, RawSequence):
+        reading = lens_of_sequence(reading)
+    lens, found = reading
     told = list(found)
     return complete_lens(lens, remarks=told), tuple(told)
 

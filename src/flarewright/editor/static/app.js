@@ -317,7 +317,9 @@ addEventListener('keydown', (event) => {
 // ---------------------------------------------------------------------------------------------------------- dropping
 export async function importFile(file, as = '') {
   const answer = await app.ask(`/api/import?name=${encodeURIComponent(file.name)}${as ? `&as=${as}` : ''}`, file);
-  if (answer) toast(`Opened ${file.name}`, 'good');
+  if (!answer) return;
+  toast(`Opened ${file.name}`, 'good');
+  if (answer.told?.length) dialog(`${file.name}: what was noticed`, h('ul', { class: 'remarks' }, ...answer.told.map((words) => h('li', {}, sentence(words)))));
 }
 app.importFile = importFile;
 let over = 0;
