@@ -4,6 +4,11 @@ Every message is one sentence that tells what is wrong, where, and what to do ab
 The command line prints it and ends with exit code 2; a library user catches `FlarewrightError`.
 """
 
+from __future__ import annotations
+
+from importlib import import_module
+from typing import Any
+
 
 class FlarewrightError(Exception):
     """A mistake in what a person gave; the message says what, where, and the remedy.
@@ -35,3 +40,38 @@ class ProjectError(FlarewrightError):
 
 class OutputError(FlarewrightError):
     """A file that could not be written; nothing was left half-written."""
+
+
+def optional(
+    module: str, extra: str, what: str, *, kind: type[FlarewrightError] = FlarewrightError, hint: str = ""
+) -> Any:
+    """Import a module of a package that is not installed with Flarewright itself.
+
+    Parameters
+    ----------
+    module : str
+        Like "astral.sun".
+    extra : str
+        Which installs the package.
+    what : str
+        Needs it; begins the message.
+    kind : type of FlarewrightError
+    hint : str
+        Ends the message.
+
+    Returns
+    -------
+    module
+
+    Raises
+    ------
+    FlarewrightError
+        Of the given kind, when the package is not there.
+    """
+    try:
+        return import_module(module)
+    except ImportError:
+        package = module.partition(".")[0]
+        raise kind(
+            f"{what} needs the package {package}; install it with: pip install 'flarewright[{extra}]'{hint}"
+        ) from None

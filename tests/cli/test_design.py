@@ -101,6 +101,11 @@ def test_scratch_and_colors_write_lenses(folder, capsys):
     assert lens.rows[0].coating.center_wavelength_nm == told["rows"]["0"]["center_wavelength_nm"]
     assert (folder / "red-lens.4-1.png").stat().st_size > 1000
     assert (folder / "red-lens.row-3.png").stat().st_size > 1000
+    assert run([*words[:-4], "--films", "3", "--json"]) == 0
+    films = json.loads(capsys.readouterr().out)["rows"]["0"]["films"]
+    written = read_lens(folder / "red-lens.toml")[0].rows[0].coating
+    written = written.layers if len(films) > 1 else (written,)
+    assert [one.thickness_nm for one in written] == [one["thickness_nm"] for one in films]
     assert run([*words, "--films", "free"]) == 0
     assert "Algorithm 2" in capsys.readouterr().out
 
@@ -131,6 +136,10 @@ def test_scratch_and_colors_write_lenses(folder, capsys):
         (["colors", "shot.toml", "-o", "x.exr"], "must be named"),
         (["colors", "shot.toml", "-o", "x.toml", "--films", "gold"], "choose quarter-wave or free"),
         (["colors", "shot.toml", "-o", "x.toml", "--curves", "5"], "--curves 5"),
+        (["colors", "shot.toml", "-o", "x.toml", "--solver", "luck"], "there is no solver"),
+        (["colors", "shot.toml", "-o", "x.toml", "--fitness", "algorithm1"], "choose ours or algorithm2"),
+        (["colors", "shot.toml", "-o", "x.toml", "--time", "0"], "seconds above 0"),
+        (["scratch", "-o", "x", "--random", "3", "--solver", "luck"], "there is no solver"),
         (["colors", "shot.toml", "-o", "x.toml", "--judge", "lab"], "choose linear or oklab"),
         (["colors", "shot.toml", "-o", "x.toml", "--map", "9-9"], "is no ghost"),
         (["resume", "nothing"], "design solve has written"),

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from ..errors import ProjectError
-from .common import check_place, console, print_json, tell
+from .common import check_place, console, interruptible, print_json, tell
+from .design_solve import check_time
 
 if TYPE_CHECKING:
-    from ..design.colors import ColorProblem
+    from ..design.color_genes import ColorMeasure
+    from ..design.colors import Coatings, ColorProblem, Floats, Kind
 
 EPILOG = (
     'Example, in the project:\n\n[[design.wishes]]\n\nghost = "4-1"\n\ncolor = [1.0, 0.4, 0.1]\n\n'
@@ -23,7 +25,10 @@ def colors(
     project: Annotated[Path, typer.Argument(metavar="PROJECT", help="A project file with a [design].")],
     output: Annotated[Path, typer.Option("-o", "--output", metavar="LENS.toml", help="The coated lens.")],
     films: Annotated[
-        str, typer.Option(help="quarter-wave: one of a centre wavelength; free: one of any index and thickness.")
+        str,
+        typer.Option(
+            help="quarter-wave: of a centre wavelength; free: one of any index and thickness; 2 or 3: so many at most."
+        ),
     ] = "quarter-wave",
     judge: Annotated[
         str, typer.Option(help="linear: parts of red, green and blue; oklab: as the eye sees differences.")
@@ -34,68 +39,115 @@ def colors(
     curves: Annotated[
         int | None, typer.Option("--curves", metavar="ROW", help="Also draw what quarter waves on this row reflect.")
     ] = None,
-    starts: Annotated[int, typer.Option(min=1, max=100000, help="Descents; more find better coatings.")] = 64,
+    starts: Annotated[int, typer.Option(min=1, max=100000, help="Descents of ours; more find better coatings.")] = 64,
+    solver: Annotated[
+        str, typer.Option(help="ours, pso, sade, de, de1220, gaco or cmaes; pso:5x30 is 5 islands of 30 per gene.")
+    ] = "ours",
+    fitness: Annotated[
+        str, typer.Option(help="What a solver sees that evolves: ours, or algorithm2 of the thesis.")
+    ] = "ours",
+    time_s: Annotated[
+        float | None,
+        typer.Option("--time", help="Seconds; 60 for a solver that evolves when left out, all descents for ours."),
+    ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Begins the random numbers.")] = 0,
     threads: Annotated[int | None, typer.Option(min=1, help="All cores when left out.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
     """Choose a coating for every surface so that the ghosts have the wished colours, and the others their own."""
-    if films not in ("quarter-wave", "free"):
-        raise ProjectError(f"--films {films!r} is unknown; choose quarter-wave or free")
+    kind, layers = check_films(films)
     if judge not in ("linear", "oklab"):
         raise ProjectError(f"--judge {judge!r} is unknown; choose linear or oklab")
+    measure = check_color_fitness(fitness)
+    check_time(60.0 if time_s is None else time_s)
     check_place(output, ".toml")
-    import numpy as np
-
-    from ..design.colors import coated, color_problem, mirrors_of, perceived_differences, solve_colors
-    from ..design.colors import pair_map as draw_map
-    from ..design.objective import algorithm_2
-    from ..design.picture import png_bytes
-    from ..io.atomic import write_atomically
+    from ..design.color_genes import colors_with
+    from ..design.colors import coated, color_problem, mirrors_of
+    from ..design.solvers import Limits, chosen
     from ..io.lens_writer import write_lens
     from ..io.project_file import read_project
 
-    kind: Literal["quarter-wave", "film"] = "film" if films == "free" else "quarter-wave"
-    problem, lens = color_problem(read_project(project), kind, perceptual=judge == "oklab")
+    choice = chosen(solver)
+    problem, lens = color_problem(read_project(project), kind, perceptual=judge == "oklab", layers=layers)
     names = [f"{j}-{i}" for j, i in problem.structure.pairs]
     if pair_map is not None and pair_map not in names:
         raise ProjectError(f"--map {pair_map!r} is no ghost of this lens on one side of its stop, such as {names[0]}")
     if curves is not None and curves not in mirrors_of(problem.structure):
         rows = ", ".join(str(k) for k in mirrors_of(problem.structure))
         raise ProjectError(f"--curves {curves}: no glass surface is there; the lens' rows that have one are {rows}")
-    found = solve_colors(problem, seed=seed, starts=starts, threads=threads)
+    if choice.evolves and time_s is None:
+        time_s = 60.0
+    with interruptible() as asked:
+        found = colors_with(
+            choice, problem, limits=Limits(time_s, None, None, asked), starts=starts, seed=seed, measure=measure,
+            threads=threads,
+        )  # fmt: skip
     write_lens(coated(lens, problem.structure, kind, found.values), output)
     remarks = [f"wrote {output}"]
     if pair_map is not None:
-        map_path = output.with_name(f"{output.stem}.{pair_map}.png")
-        picture = draw_map(problem.n_d, problem.structure.pairs[names.index(pair_map)], problem.bounds)
-        data = png_bytes(np.repeat(np.repeat(picture, 2, axis=0), 2, axis=1))
-        write_atomically(map_path, lambda temporary: _write(temporary, data))
-        remarks.append(f"wrote {map_path}: first mirror upwards, second to the right, centre wavelengths in 2 nm steps")
+        remarks.append(_draw_map(output, problem, pair_map))
     if curves is not None:
         remarks.append(_draw_curves(output, problem, curves))
     tell(remarks)
-    fitness = algorithm_2(problem.targets, found.colors)
-    differences = perceived_differences(problem, found.colors)
     if as_json:
-        print_json({
-            "cost": found.cost,
-            "fitness_algorithm2": fitness,
-            "rows": {
-                str(k): {"center_wavelength_nm": value[0]} if kind == "quarter-wave"
-                else {"index": value[0], "thickness_nm": value[1]}
-                for k, value in zip(mirrors_of(problem.structure).tolist(), found.values.tolist(), strict=True)
-            },
-            "ghosts": [
-                {"ghost": name, "wanted": wanted, "found": got, "oklab_difference": seen}
-                for name, wanted, got, seen in zip(
-                    names, problem.targets.tolist(), found.colors.tolist(), differences.tolist(), strict=True
-                )
-            ],
-        })  # fmt: skip
-        return
+        print_json(_data(problem, found, names))
+    else:
+        _print(problem, found, names)
+
+
+def check_films(text: str) -> tuple[Kind, int]:
+    """Return what `--films` says: the kind, and how many on a surface at most."""
+    if text == "quarter-wave":
+        return "quarter-wave", 1
+    if text in ("free", "1", "2", "3"):
+        return "film", 1 if text == "free" else int(text)
+    raise ProjectError(f"--films {text!r} is unknown; choose quarter-wave or free, or 2 or 3 for up to so many")
+
+
+def check_color_fitness(text: str) -> ColorMeasure:
+    """Return what `--fitness` says of colours, checked."""
+    if text == "ours":
+        return "ours"
+    if text == "algorithm2":
+        return "algorithm2"
+    raise ProjectError(f"there is no fitness {text!r} of colours; choose ours or algorithm2")
+
+
+def _data(problem: ColorProblem, found: Coatings, names: list[str]) -> dict[str, object]:
+    """Return what was found, ready for JSON."""
+    from ..design.colors import mirrors_of, perceived_differences
+    from ..design.objective import algorithm_2
+
+    differences = perceived_differences(problem, found.colors)
+    return {
+        "cost": found.cost,
+        "fitness_algorithm2": float(algorithm_2(problem.targets, found.colors)),
+        "rows": {
+            str(k): _row_data(problem, value)
+            for k, value in zip(mirrors_of(problem.structure).tolist(), found.values, strict=True)
+        },
+        "ghosts": [
+            {"ghost": name, "wanted": wanted, "found": got, "oklab_difference": seen}
+            for name, wanted, got, seen in zip(
+                names, problem.targets.tolist(), found.colors.tolist(), differences.tolist(), strict=True
+            )
+        ],
+    }
+
+
+def _row_data(problem: ColorProblem, value: Floats) -> dict[str, object]:
+    if problem.kind == "quarter-wave":
+        return {"center_wavelength_nm": float(value[0])}
+    films = [{"index": float(n), "thickness_nm": float(d)} for n, d in value.reshape(-1, 2) if d > 0.0]
+    return dict(films[0]) if problem.layers == 1 else {"films": films}
+
+
+def _print(problem: ColorProblem, found: Coatings, names: list[str]) -> None:
     from rich.table import Table
 
+    from ..design.objective import algorithm_2
+
+    fitness = float(algorithm_2(problem.targets, found.colors))
     out = Table(title=f"Algorithm 2: {fitness:.3g} over {len(names)} ghosts", caption="Red, green, blue: their parts.")
     for column in ("ghost", "wanted", "found", "brightness, found / wanted"):
         out.add_column(column, justify="right", no_wrap=True)
@@ -103,6 +155,22 @@ def colors(
         out.add_row(name, *(" ".join(f"{part:.3f}" for part in c / c.sum()) for c in (wanted, got)),
                     f"{got.sum() / wanted.sum():.3f}")  # fmt: skip
     console().print(out)
+
+
+def _draw_map(output: Path, problem: ColorProblem, ghost: str) -> str:
+    """Draw the colours that a ghost can have beside the lens; return what there is to tell."""
+    import numpy as np
+
+    from ..design.colors import pair_map
+    from ..design.picture import png_bytes
+    from ..io.atomic import write_atomically
+
+    path = output.with_name(f"{output.stem}.{ghost}.png")
+    j, _, i = ghost.partition("-")
+    picture = pair_map(problem.n_d, (int(j), int(i)), problem.bounds)
+    data = png_bytes(np.repeat(np.repeat(picture, 2, axis=0), 2, axis=1))
+    write_atomically(path, lambda temporary: _write(temporary, data))
+    return f"wrote {path}: first mirror upwards, second to the right, centre wavelengths in 2 nm steps"
 
 
 def _draw_curves(output: Path, problem: ColorProblem, row: int) -> str:

@@ -8,7 +8,8 @@ import typer
 
 from ..errors import OutputError, ProjectError
 from .common import field_angles, pair
-from .design_solve import Json, Lenses, Output, Searches, Seed, Threads, Time, check_time, search
+from .design_benchmark import check_fitness
+from .design_solve import Fitness, Json, Lenses, Output, Searches, Seed, Solver, Threads, Time, check_time, search
 
 EPILOG = (
     "Examples:\n\nflarewright design scratch --light 10,5 --ghost 4,1.5 --ghost -6,0.8 --ghost -11,3 -o found\n\n"
@@ -34,10 +35,13 @@ def scratch(
     lenses: Lenses = 5,
     searches: Searches = None,
     threads: Threads = None,
+    solver: Solver = "pools",
+    fitness: Fitness = "ours",
     as_json: Json = False,
 ) -> None:
     """Search lenses for ghosts along the line through the picture's middle and the light."""
     check_time(time_s)
+    measure = check_fitness(fitness)
     angles = field_angles(light)
     if (ghost is None) == (random is None):
         raise ProjectError("say which ghosts: --ghost PLACE,RADIUS for each, or --random N")
@@ -50,6 +54,7 @@ def scratch(
         raise ProjectError("--ghost: a radius is not 0, and nothing is farther off than 10 m")
     from ..design.scratch import random_wishes, scratch_project
     from ..design.search import State
+    from ..design.solvers import chosen
     from ..model import GhostWish
 
     wishes = (
@@ -58,4 +63,7 @@ def scratch(
         else random_wishes(random, seed)
     )
     project = scratch_project(wishes, angles, surfaces=surfaces, stop_diameter=stop_diameter, signed=not unsigned)
-    search(project, output, time_s, State(seed), lenses, searches, threads, as_json, name="From scratch")
+    search(
+        project, output, time_s, State(seed), lenses, searches, threads, as_json, name="From scratch",
+        choice=chosen(solver), measure=measure,
+    )  # fmt: skip

@@ -1,24 +1,20 @@
-"""Coatings for the colours that ghosts shall have (Van Acoleyen 2025, sections 5.3.6, 5.4 and 5.6.4).
+"""The colours of ghosts by the coatings they meet (Van Acoleyen 2025, sections 5.3.6, 5.4 and 5.6.4).
 
 Light meets every surface head on, at three wavelengths. A ghost's colour is R_j R_i times the transmittances along its
-path, so its logarithm is a sum over the surfaces: what one coating does to all ghosts is known for every thickness at
-once. Coatings are therefore chosen one after the other, each the best of its whole range, until none gets better; the
-best of many such descents is finished by Gauss-Newton with damping.
+path, so its logarithm is a sum over the surfaces. `color_search` chooses coatings.
 """
 
 from __future__ import annotations
 
-import os
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ..errors import ProjectError
 from ..model import Coating, Film, Lens, Project, QuarterWave, Surface
+from ..model.coating import Stack
 from ..model.design import Bounds, Design
 from ..optics.coatings import MAGNESIUM_FLUORIDE, film_stack, stack_reflectance
 from ..optics.color import oklab
@@ -31,12 +27,10 @@ Kind = Literal["quarter-wave", "film"]
 
 # red, green and blue of the thesis' program
 WAVELENGTHS_NM = (650.0, 510.0, 475.0)
-# steps of the tables, and indices in one of free films
+# steps of tables over the centre wavelength
 STEP_NM = 2.0
-INDICES = 14
-SWEEPS = 30
-# descents that least squares finish
-FINISHED, FINISHING_STEPS = 8, 200
+# films of a free coating at most
+MOST_LAYERS = 3
 
 
 @dataclass(frozen=True)
@@ -57,6 +51,8 @@ class ColorProblem:
     bounds : Bounds
     perceptual : bool
         Differences are judged in Oklab instead of by parts of red, green and blue.
+    layers : int
+        Free films on a surface at most.
     """
 
     structure: Structure
@@ -67,6 +63,25 @@ class ColorProblem:
     kind: Kind
     bounds: Bounds
     perceptual: bool = False
+    layers: int = 1
+
+    def check(self) -> None:
+        """Refuse what no solver can begin with.
+
+        Raises
+        ------
+        ProjectError
+            When no ghost's colour is asked for.
+        """
+        if not self.weights.any():
+            raise ProjectError("no ghost's colour counts; give one a weight above 0")
+
+    def limits(self) -> tuple[Floats, Floats]:
+        """Least and largest of a coating's values, each of shape (P,)."""
+        if self.kind == "quarter-wave":
+            return np.array(self.bounds.center_wavelength_nm[:1]), np.array(self.bounds.center_wavelength_nm[1:])
+        low, high = np.array([self.bounds.film_index, self.bounds.film_nm]).T
+        return np.tile(low, self.layers), np.tile(high, self.layers)
 
 
 @dataclass(frozen=True)
@@ -76,8 +91,9 @@ class Coatings:
     Attributes
     ----------
     cost : float
-    values : ndarray, shape (M, 1) or (M, 2)
-        Centre wavelength in nm, or index and thickness in nm, of each mirror in order.
+    values : ndarray, shape (M, P)
+        Of each mirror in order: the centre wavelength in nm, or index and thickness in nm of each film, from the side
+        of the lower index; a film of no thickness is not there.
     colors : ndarray, shape (G, 3)
     """
 
@@ -110,52 +126,47 @@ def uses(structure: Structure) -> tuple[Floats, Floats]:
     return reflections, passes
 
 
-def reflectances(kind: Kind, n_front: float, n_back: float, values: Floats) -> Floats:
-    """Reflectance of one surface for many settings of its coating, at the three wavelengths.
+def reflectances(kind: Kind, n_front: ArrayLike, n_back: ArrayLike, values: Floats) -> Floats:
+    """Reflectance of surfaces for many settings of their coatings, at the three wavelengths.
 
     Parameters
     ----------
     kind : {"quarter-wave", "film"}
-    n_front, n_back : float
-    values : ndarray, shape (V, 1) or (V, 2)
-        Centre wavelengths, or indices and thicknesses.
+    n_front, n_back : array_like, shape (...)
+    values : ndarray, shape (..., P)
+        As in `Coatings`; the shapes broadcast.
 
     Returns
     -------
-    ndarray, shape (V, 3)
+    ndarray, shape (..., 3)
 
     Notes
     -----
-    A film without dispersion answers to thickness over wavelength alone, so many thicknesses are asked for as many
-    wavelengths of one film.
+    Head on a lossless stack reflects the same from both sides, so light comes from the side of the lower index here.
     """
-    waves = np.array(WAVELENGTHS_NM)
-    out = np.empty((len(values), 3))
+    front, back = (np.asarray(n, dtype=np.float64)[..., None] for n in (n_front, n_back))
+    low, high = np.minimum(front, back), np.maximum(front, back)
     if kind == "quarter-wave":
-        index = max(float(np.sqrt(n_front * n_back)), MAGNESIUM_FLUORIDE)
-        unit = 1000.0 / (4.0 * index)
-        scaled = waves[None, :] * 1000.0 / values[:, :1]
-        return np.asarray(stack_reflectance(n_front, n_back, (index,), (unit,), scaled, 1.0), dtype=np.float64)
-    for index in np.unique(values[:, 0]):
-        which = values[:, 0] == index
-        scaled = waves[None, :] * 100.0 / values[which, 1:2]
-        out[which] = stack_reflectance(n_front, n_back, (float(index),), (100.0,), scaled, 1.0)
-    return out
+        index = np.maximum(np.sqrt(low * high), MAGNESIUM_FLUORIDE)
+        n, d = [index], [values[..., :1] / (4.0 * index)]
+    else:
+        n, d = ([values[..., p : p + 1] for p in range(part, values.shape[-1], 2)] for part in (0, 1))
+    return stack_reflectance(low, high, n, d, np.array(WAVELENGTHS_NM), 1.0)
 
 
 def colors_of(problem: ColorProblem, values: Floats) -> Floats:
-    """Return the colour of every ghost for one setting of the coatings.
+    """Return the colour of every ghost for settings of the coatings.
 
     Parameters
     ----------
     problem : ColorProblem
-    values : ndarray, shape (M, 1) or (M, 2)
+    values : ndarray, shape (..., M, P)
 
     Returns
     -------
-    ndarray, shape (G, 3)
+    ndarray, shape (..., G, 3)
     """
-    return np.exp(_log_colors(problem, _logs(problem, values)))
+    return np.exp(log_colors(problem, log_reflectances(problem, values)))
 
 
 def own_colors(lens: Lens, structure: Structure) -> Floats:
@@ -189,79 +200,7 @@ def indices_of(lens: Lens) -> Floats:
     return np.array([1.0, *behind])
 
 
-def solve_colors(problem: ColorProblem, *, seed: int = 0, starts: int = 64, threads: int | None = None) -> Coatings:
-    """Choose the coatings of all surfaces.
-
-    Parameters
-    ----------
-    problem : ColorProblem
-    seed : int
-    starts : int
-        Descents from random settings; the best is finished.
-    threads : int, optional
-        None: all cores; the result does not depend on it.
-
-    Returns
-    -------
-    Coatings
-
-    Raises
-    ------
-    ProjectError
-        When no ghost's colour is asked for.
-    """
-    if not problem.weights.any():
-        raise ProjectError("no ghost's colour counts; give one a weight above 0")
-    grid = _grid(problem)
-    rows = mirrors_of(problem.structure)
-    tables = np.empty((len(rows), 2, len(grid), 3))
-    for m, k in enumerate(rows):
-        R = np.clip(reflectances(problem.kind, problem.n_d[k], problem.n_d[k + 1], grid), 1e-12, 1.0 - 1e-12)
-        tables[m] = np.log(R), np.log1p(-R)
-    with ThreadPoolExecutor(min(threads or os.cpu_count() or 1, starts)) as pool:
-        found = list(pool.map(partial(_descend, problem, grid, tables, seed), range(starts)))
-        found.sort(key=lambda one: one[0])
-        finished = list(pool.map(partial(_finish, problem), [values for _, values in found[:FINISHED]]))
-    return min(finished, key=lambda one: one.cost)
-
-
-def _grid(problem: ColorProblem) -> Floats:
-    """List every setting that a descent tries."""
-    bounds = problem.bounds
-    if problem.kind == "quarter-wave":
-        low, high = bounds.center_wavelength_nm
-        return np.linspace(low, high, round((high - low) / STEP_NM) + 1)[:, None]
-    n = np.linspace(*bounds.film_index, INDICES)
-    d = np.linspace(*bounds.film_nm, round((bounds.film_nm[1] - bounds.film_nm[0]) / (4.0 * STEP_NM)) + 1)
-    return np.stack(np.meshgrid(n, d, indexing="ij"), axis=-1).reshape(-1, 2)
-
-
-def _descend(problem: ColorProblem, grid: Floats, tables: Floats, seed: int, start: int) -> tuple[float, Floats]:
-    """Choose one coating after the other until none gets better."""
-    random = np.random.default_rng([seed, start])
-    reflections, passes = uses(problem.structure)
-    count = len(tables)
-    chosen = random.integers(len(grid), size=count)
-    picked = tables[np.arange(count), :, chosen]
-    logs = reflections @ picked[:, 0] + passes @ picked[:, 1]
-    best = np.inf
-    for _ in range(SWEEPS):
-        before = best
-        for m in random.permutation(count):
-            reflected, passed = reflections[:, m, None, None], passes[:, m, None, None]
-            # against what is chosen now
-            tried = logs[:, None] + reflected * (tables[m, 0] - tables[m, 0, chosen[m]])
-            tried += passed * (tables[m, 1] - tables[m, 1, chosen[m]])
-            costs = (_residuals(problem, tried) ** 2).sum(axis=(0, 2))
-            chosen[m] = int(np.argmin(costs))
-            best = float(costs[chosen[m]])
-            logs = tried[:, chosen[m]]
-        if best >= before * (1.0 - 1e-6):
-            break
-    return best, grid[chosen]
-
-
-def _residuals(problem: ColorProblem, logs: Floats) -> Floats:
+def color_residuals(problem: ColorProblem, logs: Floats) -> Floats:
     """Weighted difference of colours, each in parts of its target; shape (G, V, 3) from log colours of that shape."""
     target = problem.targets / problem.targets.sum(axis=1, keepdims=True)
     found = np.exp(logs)
@@ -286,70 +225,27 @@ def perceived_differences(problem: ColorProblem, colors: Floats) -> Floats:
         About 0.02 is just seen side by side.
     """
     even = replace(problem, perceptual=True, weights=np.ones(len(colors)))
-    off = _residuals(even, np.log(np.maximum(colors, 1e-300))[:, None])[:, 0]
+    off = color_residuals(even, np.log(np.maximum(colors, 1e-300))[:, None])[:, 0]
     return np.asarray(np.linalg.norm(off, axis=1), dtype=np.float64)
 
 
-def _logs(problem: ColorProblem, values: Floats) -> Floats:
-    """Logarithms of R and T of every mirror, shape (2, M, 3)."""
+def log_reflectances(problem: ColorProblem, values: Floats) -> Floats:
+    """Logarithms of R and T of every mirror, shape (2, ..., M, 3), for values of shape (..., M, P)."""
     rows = mirrors_of(problem.structure)
-    R = np.concatenate([
-        reflectances(problem.kind, problem.n_d[k], problem.n_d[k + 1], values[m : m + 1]) for m, k in enumerate(rows)
-    ])  # fmt: skip
+    R = reflectances(problem.kind, problem.n_d[rows], problem.n_d[rows + 1], values)
+    return log_both(R)
+
+
+def log_both(R: Floats) -> Floats:
+    """Logarithms of R and of 1 - R, both kept finite."""
     R = np.clip(R, 1e-12, 1.0 - 1e-12)
     return np.stack([np.log(R), np.log1p(-R)])
 
 
-def _log_colors(problem: ColorProblem, logs: Floats) -> Floats:
+def log_colors(problem: ColorProblem, logs: Floats) -> Floats:
+    """Logarithms of every ghost's colour, shape (..., G, 3), from those of the mirrors, shape (2, ..., M, 3)."""
     reflections, passes = uses(problem.structure)
     return np.asarray(reflections @ logs[0] + passes @ logs[1], dtype=np.float64)
-
-
-def _finish(problem: ColorProblem, values: Floats) -> Coatings:
-    """Least squares from a setting of the grid, inside the bounds; each variable touches one surface's R only."""
-    bounds = problem.bounds
-    limits = [bounds.center_wavelength_nm] if problem.kind == "quarter-wave" else [bounds.film_index, bounds.film_nm]
-    low, high = np.array(limits).T
-    reflections, passes = uses(problem.structure)
-    values, damping = values.copy(), 1e-3
-
-    def cost_of(at: Floats) -> tuple[float, Floats, Floats]:
-        logs = _logs(problem, at)
-        residuals = _residuals(problem, _log_colors(problem, logs)[:, None])
-        return float((residuals**2).sum()), residuals, logs
-
-    cost, residuals, logs = cost_of(values)
-    for _ in range(FINISHING_STEPS):
-        base, columns = _log_colors(problem, logs), []
-        for part in range(values.shape[1]):
-            step = 1e-4 * (high[part] - low[part])
-            moved = values.copy()
-            moved[:, part] += np.where(values[:, part] + step <= high[part], step, -step)
-            change = (_logs(problem, moved) - logs) / (moved - values)[None, :, part, None]
-            for m in range(len(values)):
-                slope = reflections[:, m, None] * change[0, m] + passes[:, m, None] * change[1, m]
-                ahead = _residuals(problem, (base + 1e-6 * slope)[:, None])
-                columns.append((ahead - residuals).ravel() / 1e-6)
-        J = np.array(columns).T
-        normal, push = J.T @ J, J.T @ residuals.ravel()
-        better = False
-        for _ in range(8):
-            scaled = normal + damping * np.diag(np.maximum(np.diag(normal), 1e-12))
-            step = -np.linalg.solve(scaled, push).reshape(values.shape[1], -1).T
-            tried = np.clip(values + step, low, high)
-            new, new_residuals, new_logs = cost_of(tried)
-            if new < cost:
-                better = True
-                break
-            damping *= 5.0
-        if not better:
-            break
-        stop = cost - new < 1e-5 * cost
-        values, cost, residuals, logs = tried, new, new_residuals, new_logs
-        damping *= 0.2
-        if stop or cost < 1e-24:
-            break
-    return Coatings(cost, values, colors_of(problem, values))
 
 
 def coated(lens: Lens, structure: Structure, kind: Kind, values: Floats) -> Lens:
@@ -360,7 +256,8 @@ def coated(lens: Lens, structure: Structure, kind: Kind, values: Floats) -> Lens
     lens : Lens
     structure : Structure
     kind : {"quarter-wave", "film"}
-    values : ndarray, shape (M, 1) or (M, 2)
+    values : ndarray, shape (M, P)
+        As in `Coatings`.
 
     Returns
     -------
@@ -368,14 +265,17 @@ def coated(lens: Lens, structure: Structure, kind: Kind, values: Floats) -> Lens
     """
     rows = list(lens.rows)
     for k, value in zip(mirrors_of(structure), values, strict=True):
-        coating: Coating = (
-            QuarterWave(center_wavelength_nm=float(value[0]))
-            if kind == "quarter-wave"
-            else Film(index=float(value[0]), thickness_nm=float(value[1]))
-        )
-        rows[k] = rows[k].replace(coating=coating)
+        rows[k] = rows[k].replace(coating=coating_of(kind, value))
     out: Lens = lens.replace(rows=tuple(rows))
     return out
+
+
+def coating_of(kind: Kind, values: Floats) -> Coating:
+    """Return a coating of its values, shape (P,)."""
+    if kind == "quarter-wave":
+        return QuarterWave(center_wavelength_nm=float(values[0]))
+    films = [Film(index=float(n), thickness_nm=float(d)) for n, d in values.reshape(-1, 2) if d > 0.0]
+    return films[0] if len(films) == 1 else Stack(layers=tuple(films))
 
 
 def pair_map(n_d: Floats, pair: tuple[int, int], bounds: Bounds) -> Floats:
@@ -399,7 +299,9 @@ def pair_map(n_d: Floats, pair: tuple[int, int], bounds: Bounds) -> Floats:
     return np.asarray(both / np.maximum(np.linalg.norm(both, axis=2, keepdims=True), 1e-300), dtype=np.float64)
 
 
-def color_problem(project: Project, kind: Kind, *, perceptual: bool = False) -> tuple[ColorProblem, Lens]:
+def color_problem(
+    project: Project, kind: Kind, *, perceptual: bool = False, layers: int = 1
+) -> tuple[ColorProblem, Lens]:
     """Read a project as a problem of colours: the lens' own, and those that its wishes change.
 
     Parameters
@@ -408,6 +310,8 @@ def color_problem(project: Project, kind: Kind, *, perceptual: bool = False) -> 
     kind : {"quarter-wave", "film"}
     perceptual : bool
         Judge in Oklab.
+    layers : int
+        Free films on a surface at most.
 
     Returns
     -------
@@ -446,5 +350,7 @@ def color_problem(project: Project, kind: Kind, *, perceptual: bool = False) -> 
             # black in a channel is asked for as a thousandth, for no coating reflects nothing
             hue = np.maximum(np.array(wish.color) / max(wish.color), 1e-3)
             targets[g], hue_only[g] = hue * targets[g].sum() / hue.sum(), True
-    found = ColorProblem(structure, indices_of(lens), targets, weights, hue_only, kind, design.bounds, perceptual)
+    found = ColorProblem(
+        structure, indices_of(lens), targets, weights, hue_only, kind, design.bounds, perceptual, layers
+    )
     return found, lens

@@ -7,9 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import ProjectError
-from .genes import Genes
-from .hunt import Hunt, Limits, Solution
+from ..errors import ProjectError, optional
+from .hunt import Hunt
 
 Floats = NDArray[np.float64]
 
@@ -19,20 +18,15 @@ FIRST_SPREAD = 0.2
 LARGEST = 32
 
 
-def adapt(genes: Genes, *, seed: int, limits: Limits, first_size: int | None = None) -> Solution:
+def adapt(hunt: Hunt, *, first_size: int | None = None) -> None:
     """Search with CMA-ES, begun anew with twice the population whenever it has converged.
 
     Parameters
     ----------
-    genes : Genes
-    seed : int
-    limits : Limits
+    hunt : Hunt
+        Gets what is found.
     first_size : int, optional
         Population of the first; None: twice the number of genes, for there are many valleys.
-
-    Returns
-    -------
-    Solution
 
     Raises
     ------
@@ -45,31 +39,31 @@ def adapt(genes: Genes, *, seed: int, limits: Limits, first_size: int | None = N
     back (`folded`).
     """
     strategy = imported_cmaes()
-    hunt, size = Hunt(genes, limits, seed), first_size or 2 * genes.count
-    begun = 0
+    ground, begun = hunt.ground, 0
+    size, known = first_size or 2 * ground.count, ground.known()
     while True:
-        random = np.random.default_rng([seed, begun])
-        start = random.random(genes.count)
-        if begun < len(genes.problem.begin_with):
-            start = genes.encode(*genes.problem.begin_with[begun])
+        random = np.random.default_rng([hunt.seed, begun])
+        start = random.random(ground.count)
+        if begun < len(known):
+            start = known[begun]
             # a swarm around it need not find anything as good
-            if hunt.note(start[None], genes.fitness(start[None]), 1):
-                return hunt.solution()
+            if hunt.note(start[None], ground.fitness(start[None]), 1):
+                return
         population = size * min(2**begun, LARGEST) if begun % 7 else size
         swarm = strategy.CMA(
             mean=start, sigma=FIRST_SPREAD, population_size=population, seed=int(random.integers(2**31))
         )
-        if _converge(swarm, genes, hunt):
-            return hunt.solution()
+        if _converge(swarm, hunt):
+            return
         begun += 1
 
 
-def _converge(swarm: Any, genes: Genes, hunt: Hunt) -> bool:
+def _converge(swarm: Any, hunt: Hunt) -> bool:
     """Let a swarm converge (False) unless the work is over before (True)."""
     while not swarm.should_stop():
         asked = [swarm.ask() for _ in range(swarm.population_size)]
         inside = folded(np.array(asked))
-        costs = genes.fitness(inside)
+        costs = hunt.ground.fitness(inside)
         if hunt.note(inside, costs, len(asked)):
             return True
         swarm.tell([(x, float(cost)) for x, cost in zip(asked, costs, strict=True)])
@@ -90,10 +84,4 @@ def imported_cmaes() -> Any:
     ProjectError
         When it is not there.
     """
-    try:
-        import cmaes
-    except ImportError:
-        raise ProjectError(
-            "the solver cmaes needs the package cmaes; install it with: pip install 'flarewright[evo]'"
-        ) from None
-    return cmaes
+    return optional("cmaes", "evo", "the solver cmaes", kind=ProjectError)

@@ -15,9 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import ProjectError
-from .genes import Genes
-from .hunt import Hunt, Limits, Solution
+from ..errors import ProjectError, optional
+from .hunt import Ground, Hunt
 
 Floats = NDArray[np.float64]
 
@@ -48,21 +47,16 @@ class Settling:
         return max(_FEWEST[name], round(self.per_gene * genes))
 
 
-def evolve(genes: Genes, name: str, settling: Settling, *, seed: int, limits: Limits) -> Solution:
+def evolve(hunt: Hunt, name: str, settling: Settling) -> None:
     """Search with one of pygmo's algorithms.
 
     Parameters
     ----------
-    genes : Genes
+    hunt : Hunt
+        Gets what is found.
     name : str
         One of `ALGORITHMS`.
     settling : Settling
-    seed : int
-    limits : Limits
-
-    Returns
-    -------
-    Solution
 
     Raises
     ------
@@ -76,18 +70,18 @@ def evolve(genes: Genes, name: str, settling: Settling, *, seed: int, limits: Li
     `PATIENCE` generations is settled anew; the best is kept.
     """
     pygmo = imported_pygmo(name)
-    hunt, settled, size = Hunt(genes, limits, seed), 0, settling.size(name, genes.count)
-    problem = pygmo.problem(_Lens(genes))
+    seed, settled, size = hunt.seed, 0, settling.size(name, hunt.ground.count)
+    problem = pygmo.problem(_Ground(hunt.ground))
     while True:
         islands = []
         for number in range(settling.islands):
             islands.append(pygmo.population(problem, size, seed=_seed(seed, settled, number, 0)))
             if settled == 0:
-                _introduce(islands[-1], genes)
+                _introduce(islands[-1], hunt.ground)
             if hunt.note(islands[-1].get_x(), islands[-1].get_f()[:, 0], size):
-                return hunt.solution()
+                return
         if _live(pygmo, name, islands, hunt, lambda *at, epoch=settled: _seed(seed, epoch, *at)):
-            return hunt.solution()
+            return
         settled += 1
 
 
@@ -170,32 +164,32 @@ def _algorithm(pygmo: Any, name: str, seed: int, generations: int) -> Any:
     return pygmo.algorithm(made)
 
 
-def _introduce(island: Any, genes: Genes) -> None:
-    """Put the lens that is there already among the first, as the thesis does."""
-    for place, (structure, vector) in enumerate(genes.problem.begin_with[: len(island)]):
-        island.set_x(place, genes.encode(structure, vector))
+def _introduce(island: Any, ground: Ground) -> None:
+    """Put what is there already among the first, as the thesis does."""
+    for place, genes in enumerate(ground.known()[: len(island)]):
+        island.set_x(place, genes)
 
 
 def _seed(*numbers: int) -> int:
     return int(np.random.SeedSequence(numbers).generate_state(1)[0] >> 1)
 
 
-class _Lens:
-    """A problem as pygmo wants it; shared, not copied, for it never changes."""
+class _Ground:
+    """A hunting ground as pygmo wants it; shared, not copied, for it never changes."""
 
-    def __init__(self, genes: Genes) -> None:
-        self._genes = genes
+    def __init__(self, ground: Ground) -> None:
+        self._ground = ground
 
-    def fitness(self, gene: Floats) -> Floats:
-        return self._genes.fitness(gene[None])
+    def fitness(self, genes: Floats) -> Floats:
+        return self._ground.fitness(genes[None])
 
     def batch_fitness(self, many: Floats) -> Floats:
-        return self._genes.fitness(many.reshape(-1, self._genes.count))
+        return self._ground.fitness(many.reshape(-1, self._ground.count))
 
     def get_bounds(self) -> tuple[Floats, Floats]:
-        return np.zeros(self._genes.count), np.ones(self._genes.count)
+        return np.zeros(self._ground.count), np.ones(self._ground.count)
 
-    def __deepcopy__(self, memory: dict[int, Any]) -> _Lens:
+    def __deepcopy__(self, memory: dict[int, Any]) -> _Ground:
         return self
 
 
@@ -207,11 +201,5 @@ def imported_pygmo(name: str) -> Any:
     ProjectError
         When it is not there.
     """
-    try:
-        import pygmo
-    except ImportError:
-        raise ProjectError(
-            f"the solver {name} needs the package pygmo; install it with: pip install 'flarewright[evo]' "
-            "(Linux; elsewhere pygmo comes from conda-forge)"
-        ) from None
-    return pygmo
+    hint = " (Linux; elsewhere pygmo comes from conda-forge)"
+    return optional("pygmo", "evo", f"the solver {name}", kind=ProjectError, hint=hint)

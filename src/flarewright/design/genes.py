@@ -75,6 +75,10 @@ class Genes:
             for cost, stop, gaps, x in zip(costs, stops, glass, xs, strict=True)
         )
 
+    def known(self) -> list[Floats]:
+        """List the lenses that join the first, as genes."""
+        return [self.encode(structure, vector) for structure, vector in self.problem.begin_with]
+
     def encode(self, structure: Structure, vector: Floats) -> Floats:
         """Turn a prescription into genes, cut to the bounds.
 

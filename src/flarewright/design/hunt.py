@@ -1,18 +1,32 @@
-"""What every solver reports: the best so far, how it came about, and when to end."""
+"""What every solver that evolves reports: the best so far, how it came about, and when to end."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .genes import Genes
-from .search import KEPT, SOLVED, Candidate, Progress, State, merge
+from .search import KEPT, SOLVED, Candidate, Progress, State
 
 Floats = NDArray[np.float64]
+
+
+class Ground(Protocol):
+    """Where a solver hunts: points of numbers from 0 to 1, each with a fitness that is to be least."""
+
+    @property
+    def count(self) -> int:
+        """Numbers of a point."""
+
+    def fitness(self, genes: Floats) -> Floats:
+        """Compute the fitness of many, shape (B, D): shape (B,)."""
+
+    def known(self) -> Sequence[Floats]:
+        """List the points that join the first, each of shape (D,)."""
 
 
 @dataclass(frozen=True)
@@ -54,29 +68,46 @@ class Solution:
     steps: tuple[Step, ...]
 
 
+@dataclass(frozen=True)
+class Find:
+    """A new best point: seconds since the beginning, evaluations so far, its fitness, and the point."""
+
+    seconds: float
+    work: int
+    cost: float
+    genes: Floats
+
+
 @dataclass
 class Hunt:
     """The books of a solver that works on genes.
 
     Attributes
     ----------
-    genes : Genes
+    ground : Ground
     limits : Limits
     seed : int
+    tell : callable or None
+        Called with the best so far and the number of evaluations now and then.
     work : int
         Evaluations so far.
     best : float
         Least fitness so far.
+    finds : list of Find
+        The best became better so often.
+    pool : list of (float, ndarray)
+        The best distinct points with their fitness.
     """
 
-    genes: Genes
+    ground: Ground
     limits: Limits
     seed: int
+    tell: Callable[[Find, int], None] | None = None
     work: int = 0
     best: float = np.inf
+    finds: list[Find] = field(default_factory=list)
+    pool: list[tuple[float, Floats]] = field(default_factory=list)
     _begun: float = field(default_factory=time.perf_counter)
-    _steps: list[Step] = field(default_factory=list)
-    _pool: list[tuple[float, Floats]] = field(default_factory=list)
 
     def note(self, genes: Floats, costs: Floats, work: int) -> bool:
         """Take in what was found with so many evaluations; return whether the work is over.
@@ -88,32 +119,24 @@ class Hunt:
         work : int
         """
         self.work += work
-        worst = self._pool[-1][0] if len(self._pool) == KEPT else np.inf
+        worst = self.pool[-1][0] if len(self.pool) == KEPT else np.inf
         better = [k for k in np.argsort(costs, kind="stable")[:KEPT] if costs[k] < worst]
         if better:
-            self._pool = _distinct(self._pool + [(float(costs[k]), genes[k].copy()) for k in better])
+            self.pool = _distinct(self.pool + [(float(costs[k]), genes[k].copy()) for k in better])
         k = int(np.argmin(costs))
         if costs[k] < self.best:
             self.best = float(costs[k])
-            self._steps.append(
-                Step(self._elapsed(), self.work, self.genes.candidates(genes[k : k + 1], costs[k : k + 1])[0])
-            )
+            self.finds.append(Find(self.seconds, self.work, self.best, genes[k].copy()))
         limits = self.limits
-        if limits.progress is not None and self._steps:
-            limits.progress(State(self.seed, ended=(self._steps[-1].best,), searches=self.work))
-        over = limits.time_s is not None and self._elapsed() >= limits.time_s
+        if self.tell is not None and self.finds:
+            self.tell(self.finds[-1], self.work)
+        over = limits.time_s is not None and self.seconds >= limits.time_s
         over = over or (limits.most is not None and self.work >= limits.most) or self.best <= SOLVED
         return over or (limits.cancelled is not None and limits.cancelled())
 
-    def solution(self) -> Solution:
-        """Return the best lenses, with the costs that our search gives them."""
-        many = np.array([genes for _, genes in self._pool])
-        ours = replace(self.genes, measure="ours")
-        found = ours.candidates(many, ours.fitness(many))
-        state = State(self.seed, ended=merge((), found, KEPT), searches=self.work, seconds=self._elapsed())
-        return Solution(state, tuple(self._steps))
-
-    def _elapsed(self) -> float:
+    @property
+    def seconds(self) -> float:
+        """Seconds since the beginning."""
         return time.perf_counter() - self._begun
 
 

@@ -240,16 +240,17 @@ def algorithm_1(sizes: Floats, places: Floats, found: Floats) -> float:
     return float(sorted_misfit(np.ascontiguousarray(sizes), np.ascontiguousarray(places), np.ascontiguousarray(found)))
 
 
-def algorithm_2(targets: Floats, found: Floats) -> float:
+def algorithm_2(targets: Floats, found: Floats) -> Floats:
     """Colour fitness of Van Acoleyen 2025: distances of normalised RGB, summed over the ghosts.
 
     Parameters
     ----------
-    targets, found : ndarray, shape (N, 3)
+    targets : ndarray, shape (N, 3)
+    found : ndarray, shape (..., N, 3)
 
     Returns
     -------
-    float
+    ndarray, shape (...)
 
     Notes
     -----
@@ -257,9 +258,10 @@ def algorithm_2(targets: Floats, found: Floats) -> float:
     """
 
     def normalised(rgb: Floats) -> Floats:
-        return np.asarray(rgb / np.maximum(rgb.sum(axis=1, keepdims=True), 1e-300), dtype=np.float64)
+        return np.asarray(rgb / np.maximum(rgb.sum(axis=-1, keepdims=True), 1e-300), dtype=np.float64)
 
-    return float(np.sqrt(((normalised(targets) - normalised(found)) ** 2).sum(axis=1)).sum())
+    off = normalised(targets) - normalised(found)
+    return np.asarray(np.sqrt((off**2).sum(axis=-1)).sum(axis=-1), dtype=np.float64)
 
 
 def own_objective(

@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..errors import ProjectError
 from .covariance import adapt, imported_cmaes
 from .evolution import ALGORITHMS, Settling, evolve, imported_pygmo
-from .genes import Measure, genes_of
-from .hunt import Limits, Solution, Step
-from .search import Problem, State, compile_kernels, solve
+from .genes import Genes, Measure, genes_of
+from .hunt import Find, Hunt, Limits, Solution, Step
+from .search import KEPT, Candidate, Problem, State, compile_kernels, merge, solve
 
 OURS, CMAES = "pools", "cmaes"
 NAMES = (OURS, *ALGORITHMS, CMAES)
 
-__all__ = ["NAMES", "OURS", "Choice", "Limits", "Solution", "chosen", "make_ready", "solve_with"]
+__all__ = ["NAMES", "OURS", "Choice", "Limits", "Solution", "chosen", "evolve_with", "make_ready", "solve_with"]
 
 
 @dataclass(frozen=True)
@@ -66,6 +66,7 @@ def chosen(text: str) -> Choice:
     ProjectError
     """
     name, colon, size = text.strip().lower().partition(":")
+    name = OURS if name == "ours" else name
     if name not in NAMES:
         raise ProjectError(f"there is no solver {name!r}; choose from {', '.join(NAMES)}")
     settling = Settling()
@@ -118,10 +119,8 @@ def solve_with(
     ProjectError
         When there is nothing to search, or a package is missing.
     """
-    if choice.name in ALGORITHMS:
-        return evolve(genes_of(problem, measure), choice.name, choice.settling, seed=seed, limits=limits)
-    if choice.name == CMAES:
-        return adapt(genes_of(problem, measure), seed=seed, limits=limits)
+    if choice.evolves:
+        return _hunted(choice, genes_of(problem, measure), seed, limits)
     steps: list[Step] = []
 
     def note(now: State) -> None:
@@ -136,6 +135,42 @@ def solve_with(
         cancelled=limits.cancelled, state=state,
     )  # fmt: skip
     return Solution(ended, tuple(steps))
+
+
+def evolve_with(choice: Choice, hunt: Hunt) -> None:
+    """Hunt with a solver that evolves, lenses or whatever else has a fitness.
+
+    Parameters
+    ----------
+    choice : Choice
+    hunt : Hunt
+        Gets what is found.
+    """
+    if choice.name == CMAES:
+        adapt(hunt)
+    else:
+        evolve(hunt, choice.name, choice.settling)
+
+
+def _hunted(choice: Choice, genes: Genes, seed: int, limits: Limits) -> Solution:
+    """Hunt lenses; tell them with the costs that our search gives them."""
+
+    def lens(find: Find) -> Candidate:
+        return genes.candidates(find.genes[None], np.array([find.cost]))[0]
+
+    progress, tell = limits.progress, None
+    if progress is not None:
+
+        def tell(best: Find, work: int) -> None:
+            progress(State(seed, ended=(lens(best),), searches=work))
+
+    hunt = Hunt(genes, limits, seed, tell)
+    evolve_with(choice, hunt)
+    many = np.array([one for _, one in hunt.pool])
+    ours = replace(genes, measure="ours")
+    found = merge((), ours.candidates(many, ours.fitness(many)), KEPT)
+    state = State(seed, ended=found, searches=hunt.work, seconds=hunt.seconds)
+    return Solution(state, tuple(Step(find.seconds, find.work, lens(find)) for find in hunt.finds))
 
 
 def make_ready(choice: Choice, problem: Problem, measure: Measure = "ours") -> None:

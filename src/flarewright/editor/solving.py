@@ -8,7 +8,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ..design.candidate import outcomes
-from ..design.colors import coated, color_problem, solve_colors
+from ..design.color_search import solve_colors
+from ..design.colors import coated, color_problem
 from ..design.impossible import obstacles
 from ..design.report import verdict
 from ..design.search import Problem, State, compile_kernels, solve

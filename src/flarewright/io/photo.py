@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import FlarewrightError, OutputError
+from ..errors import FlarewrightError, OutputError, optional
 
 _RAW = (".dng", ".cr2", ".cr3", ".nef", ".arw", ".raf", ".rw2", ".orf", ".pef", ".srw", ".raw", ".crw", ".nrw", ".3fr")
 _TIFF = (".tif", ".tiff")
@@ -322,12 +322,7 @@ def _blocks(photo: Photo, block: int) -> Photo:
 
 
 def _extra(name: str, path: Path) -> Any:
-    from importlib import import_module
-
-    try:
-        return import_module(name)
-    except ImportError:
-        raise FlarewrightError(f"{path} needs the package {name}: pip install 'flarewright[photo]'") from None
+    return optional(name, "photo", str(path))
 
 
 def _short(error: BaseException) -> str:

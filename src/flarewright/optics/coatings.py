@@ -92,8 +92,8 @@ def _quarter_wave(coating: QuarterWave, n_front: float, n_back: float) -> tuple[
 def stack_reflectance(
     n_front: ArrayLike,
     n_back: ArrayLike,
-    indices: Sequence[float],
-    thicknesses_nm: Sequence[float],
+    indices: Sequence[ArrayLike],
+    thicknesses_nm: Sequence[ArrayLike],
     wavelength_nm: ArrayLike,
     cos_front: ArrayLike,
 ) -> Floats:
@@ -103,8 +103,8 @@ def stack_reflectance(
     ----------
     n_front, n_back : array_like
         Indices of the medium that the light comes from and of the one it goes into.
-    indices, thicknesses_nm : sequence of float
-        The films in the order in which the light meets them.
+    indices, thicknesses_nm : sequence of array_like
+        The films in the order in which the light meets them; arrays are many films in one place.
     wavelength_nm : array_like
         Vacuum wavelength.
     cos_front : array_like
@@ -134,8 +134,8 @@ def stack_reflectance(
 def stack_reflectance_transmittance(
     n_front: ArrayLike,
     n_back: ArrayLike,
-    indices: Sequence[float],
-    thicknesses_nm: Sequence[float],
+    indices: Sequence[ArrayLike],
+    thicknesses_nm: Sequence[ArrayLike],
     wavelength_nm: ArrayLike,
     cos_front: ArrayLike,
 ) -> tuple[Floats, Floats]:
@@ -163,10 +163,12 @@ def stack_reflectance_transmittance(
     Where the numerator and the denominator both vanish (grazing between equal media without a film) R is its
     limit, 0.
     """
-    n0, nb, wave, c0 = np.broadcast_arrays(
-        *(np.asarray(a, dtype=np.float64) for a in (n_front, n_back, wavelength_nm, cos_front))
+    films = [np.asarray(a, dtype=np.float64) for a in (*indices, *thicknesses_nm)]
+    n0, nb, wave, c0, *films = np.broadcast_arrays(
+        *(np.asarray(a, dtype=np.float64) for a in (n_front, n_back, wavelength_nm, cos_front)), *films
     )
-    _check(n0, nb, wave, c0, indices, thicknesses_nm)
+    films_n, films_d = films[: len(indices)], films[len(indices) :]
+    _check(n0, nb, wave, c0, films_n, films_d)
 
     cb2 = _cos_squared(n0, nb, c0)
     # Lossless films: the sign of an imaginary cosine in the last medium changes no modulus.
@@ -176,7 +178,7 @@ def stack_reflectance_transmittance(
     Bs, Cs = np.ones_like(cb), nb * cb
     Bp, Cp = cb, nb.astype(np.complex128)
     decay = np.zeros_like(c0)
-    for n, d in zip(reversed(indices), reversed(thicknesses_nm), strict=True):
+    for n, d in zip(reversed(films_n), reversed(films_d), strict=True):
         c2 = _cos_squared(n0, n, c0)
         kd = 2.0 * np.pi * d / wave
         C, S, q = _cos_and_sinc(kd * kd * n * n * c2)
@@ -240,7 +242,7 @@ def reflectance_table(
 
 
 def _check(
-    n0: Floats, nb: Floats, wave: Floats, c0: Floats, indices: Sequence[float], thicknesses_nm: Sequence[float]
+    n0: Floats, nb: Floats, wave: Floats, c0: Floats, indices: Sequence[Floats], thicknesses_nm: Sequence[Floats]
 ) -> None:
     if not bool(np.all((c0 >= 0.0) & (c0 <= 1.0))):
         raise ValueError("cos_front must lie between 0 (grazing) and 1 (normal incidence)")
@@ -248,7 +250,7 @@ def _check(
         raise ValueError("indices and wavelengths must be positive")
     if len(indices) != len(thicknesses_nm):
         raise ValueError(f"{len(indices)} film indices but {len(thicknesses_nm)} thicknesses; each film needs both")
-    if any(n <= 0.0 for n in indices) or any(d < 0.0 for d in thicknesses_nm):
+    if not (all(np.all(n > 0.0) for n in indices) and all(np.all(d >= 0.0) for d in thicknesses_nm)):
         raise ValueError("films need a positive index and a thickness that is not negative")
 
 

@@ -8,7 +8,7 @@ from datetime import UTC, datetime
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import FlarewrightError
+from ..errors import FlarewrightError, optional
 from ..model.scene import Site
 
 Floats = NDArray[np.float64]
@@ -43,20 +43,16 @@ def sun_path(site: Site, times: Sequence[datetime]) -> tuple[Floats, Floats]:
     By `astral` (NOAA's formulas after Meeus), good to some hundredths of a degree for the years 1900 to 2100, less
     within a degree of the horizon. Judged by published almanac values in tests/predict/test_sun.py.
     """
-    try:
-        from astral import Observer
-        from astral.sun import azimuth, elevation
-    except ImportError:
-        raise FlarewrightError(
-            "the sun's path needs the package astral; install it with: pip install 'flarewright[predict]'"
-        ) from None
+    sun = optional("astral.sun", "predict", "the sun's path")
+    from astral import Observer
+
     here = Observer(latitude=site.latitude_deg, longitude=site.longitude_deg)
     found = []
     for time in times:
         if not 1900 <= time.year <= 2100:
             raise FlarewrightError(f"the sun's path is known for the years 1900 to 2100, not for {time.year}")
         utc = time.astimezone(UTC)
-        found.append((azimuth(here, utc), elevation(here, utc, with_refraction=True)))
+        found.append((sun.azimuth(here, utc), sun.elevation(here, utc, with_refraction=True)))
     return np.array([one[0] for one in found]), np.array([one[1] for one in found])
 
 
