@@ -8,16 +8,19 @@ from typing import Any
 
 import numpy as np
 
-from flarewright.design.benchmark import CASES, problem_of_case
+from flarewright.design.benchmark import task_of
 from flarewright.design.ghosts import differentiate, evaluate
 from flarewright.design.search import batch_size, polish
+from flarewright.design.trials import CASES, Trial
 
 
 def design(seconds: Callable[[Callable[[], Any]], float], row: Callable[..., dict[str, Any]]) -> list[dict[str, Any]]:
     """Measure both lenses of the thesis."""
     found = []
     for case in CASES:
-        problem, structure, vector = problem_of_case(case, 5.45)
+        task = task_of(Trial("heliar" if case == "heliar" else "canon"))
+        assert task.lens is not None
+        problem, (structure, vector) = task.problem, task.lens
         many = np.repeat(vector[None], 500, axis=0)
         work = seconds(lambda s=structure, m=many: evaluate(s, m, 100.0))
         found.append(row("design", f"{case}: all ghosts", len(many) / work / 1e6, "million/s"))

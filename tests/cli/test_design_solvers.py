@@ -91,6 +91,28 @@ def test_benchmark_compares_solvers(folder, capsys):
     assert "nan" not in " ".join(re.findall(r'points="([^"]*)"', page))
 
 
+def test_coatings_and_scratch_are_compared_too(folder, capsys):
+    pytest.importorskip("pygmo", reason="the extra evo is not installed: no pygmo")
+    words = ["design", "benchmark", "heliar", "--coatings", "quarter-wave", "--time", "0.5", "--report", "c.html"]
+    assert run([*words, "--solver", "ours", "--solver", "sade:2x4", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert [(one["solver"], one["saw"]) for one in told["runs"]] == [("ours", "ours"), ("sade:2x4", "algorithm2")]
+    assert [one["figure"] for one in told["figures"]] == ["6.8", "6.10"]
+    assert told["figures"][1]["thesis"] == {"psnr_db": 31.82, "ssim": None, "seconds": None}
+    assert set(told["figures"][0]["curves"][0]) == {"solver", "seconds", "fitness_algorithm2"}
+    page = (folder / "c.html").read_text()
+    assert page.count("data:image/png;base64,") == 3
+    assert "figure 6.10" in page
+    assert run([*words[:6], "0.3", "--fitness", "ours"]) == 0
+    assert "quarter waves, 5.45 degrees" in " ".join(capsys.readouterr().out.split())
+    words = ["design", "benchmark", "scratch", "--ghosts", "5", "--unsigned", "--time", "0.5", "--seeds", "2"]
+    assert run([*words, "--picture", "s.png", "--report", "s.html", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert [one["seed"] for one in told["runs"]] == [0, 1]
+    assert [one["figure"] for one in told["figures"]] == ["-", "6.14"]
+    assert (folder / "s.html").read_text().count("data:image/png;base64,") == 2
+
+
 def test_population_sizes_are_figure_6_5(capsys):
     pytest.importorskip("pygmo", reason="the extra evo is not installed: no pygmo")
     words = ["design", "benchmark", "heliar", "--angle", "13.40", "--time", "0.1", "--json"]
@@ -106,6 +128,9 @@ def test_population_sizes_are_figure_6_5(capsys):
         (["benchmark", "heliar", "--solver", "pools", "--solver", "pools:2x2"], "pso:15x15"),
         (["benchmark", "heliar", "--fitness", "best"], "choose ours or algorithm1"),
         (["benchmark", "heliar", "--report", "a.pdf"], "must be named"),
+        (["benchmark", "heliar", "--coatings", "gold"], "--coatings 'gold' is unknown"),
+        (["benchmark", "scratch", "--coatings", "free"], "scratch has no lens"),
+        (["benchmark", "heliar", "--coatings", "free", "--fitness", "algorithm1"], "choose ours or algorithm2"),
     ],
 )
 def test_a_mistake_is_one_sentence(words, told, folder, capsys):

@@ -9,13 +9,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from planted import planted
 
-from flarewright.design.benchmark import problem_of_case
+from flarewright.design.benchmark import task_of
 from flarewright.design.covariance import folded
 from flarewright.design.genes import genes_of
 from flarewright.design.objective import fitness_thesis, own_objective
 from flarewright.design.prescription import Structure, structures
 from flarewright.design.search import Problem, State, polish
 from flarewright.design.solvers import NAMES, Limits, chosen, solve_with
+from flarewright.design.trials import Trial
 from flarewright.errors import ProjectError
 from flarewright.model.design import Bounds
 
@@ -132,7 +133,8 @@ def test_every_pattern_can_be_said():
 
 @pytest.mark.parametrize("case", ["heliar", "canon"])
 def test_a_lens_becomes_genes_and_back(case):
-    problem, structure, vector = problem_of_case(case, 13.4)
+    task = task_of(Trial(case, 13.4))
+    problem, (structure, vector) = task.problem, task.lens
     genes = genes_of(problem, "algorithm1")
     coded = genes.encode(structure, vector)[None]
     found = genes.candidates(coded, genes.fitness(coded))[0]

@@ -5,15 +5,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from flarewright.design.benchmark import problem_of_case
+from flarewright.design.benchmark import task_of
 from flarewright.design.objective import algorithm_1, algorithm_2, fitness, fitness_thesis, misfits, own_objective
 from flarewright.design.prescription import structure_of, vector_of
+from flarewright.design.trials import Trial
 from flarewright.model.design import Bounds
 from flarewright.render.prepare import load_lens
 
 
+def heliar():
+    task = task_of(Trial("heliar"))
+    return task.problem, *task.lens
+
+
 def test_a_lens_meets_its_own_ghosts():
-    problem, structure, vector = problem_of_case("heliar", 5.45)
+    problem, structure, vector = heliar()
     assert fitness(problem.objective, structure, vector) == 0.0
     assert fitness_thesis(problem.objective, structure, vector) == 0.0
     assert len(problem.objective.targets) == 13
@@ -42,7 +48,7 @@ def test_algorithm_2_by_hand():
 
 
 def test_a_swap_of_equal_sizes_costs_nothing_in_ours_and_much_in_algorithm_1():
-    problem, structure, vector = problem_of_case("heliar", 5.45)
+    problem, structure, vector = heliar()
     aim = problem.objective
     by_size = np.argsort(np.abs(aim.targets[:, 1]))
     one, other = by_size[6], by_size[7]
@@ -59,7 +65,7 @@ def test_a_swap_of_equal_sizes_costs_nothing_in_ours_and_much_in_algorithm_1():
 
 
 def test_signs_and_extra_ghosts_count():
-    problem, structure, vector = problem_of_case("heliar", 5.45)
+    problem, structure, vector = heliar()
     aim = problem.objective
     turned = aim.targets.copy()
     turned[0, 1] = -turned[0, 1]

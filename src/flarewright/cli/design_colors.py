@@ -9,11 +9,10 @@ import typer
 
 from ..errors import ProjectError
 from .common import check_place, console, interruptible, print_json, tell
-from .design_solve import check_time
+from .design_checks import check_color_fitness, check_films, check_time
 
 if TYPE_CHECKING:
-    from ..design.color_genes import ColorMeasure
-    from ..design.colors import Coatings, ColorProblem, Floats, Kind
+    from ..design.colors import Coatings, ColorProblem, Floats
 
 EPILOG = (
     'Example, in the project:\n\n[[design.wishes]]\n\nghost = "4-1"\n\ncolor = [1.0, 0.4, 0.1]\n\n'
@@ -93,24 +92,6 @@ def colors(
         print_json(_data(problem, found, names))
     else:
         _print(problem, found, names)
-
-
-def check_films(text: str) -> tuple[Kind, int]:
-    """Return what `--films` says: the kind, and how many on a surface at most."""
-    if text == "quarter-wave":
-        return "quarter-wave", 1
-    if text in ("free", "1", "2", "3"):
-        return "film", 1 if text == "free" else int(text)
-    raise ProjectError(f"--films {text!r} is unknown; choose quarter-wave or free, or 2 or 3 for up to so many")
-
-
-def check_color_fitness(text: str) -> ColorMeasure:
-    """Return what `--fitness` says of colours, checked."""
-    if text == "ours":
-        return "ours"
-    if text == "algorithm2":
-        return "algorithm2"
-    raise ProjectError(f"there is no fitness {text!r} of colours; choose ours or algorithm2")
 
 
 def _data(problem: ColorProblem, found: Coatings, names: list[str]) -> dict[str, object]:

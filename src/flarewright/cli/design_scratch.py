@@ -8,8 +8,8 @@ import typer
 
 from ..errors import OutputError, ProjectError
 from .common import field_angles, pair
-from .design_benchmark import check_fitness
-from .design_solve import Fitness, Json, Lenses, Output, Searches, Seed, Solver, Threads, Time, check_time, search
+from .design_checks import check_fitness, check_time
+from .design_solve import Fitness, Json, Lenses, Output, Searches, Seed, Solver, Threads, Time, search
 
 EPILOG = (
     "Examples:\n\nflarewright design scratch --light 10,5 --ghost 4,1.5 --ghost -6,0.8 --ghost -11,3 -o found\n\n"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -13,7 +12,7 @@ import typer
 
 from ..errors import OutputError, ProjectError
 from .common import interruptible, print_json, tell
-from .design_benchmark import check_fitness
+from .design_checks import check_fitness, check_time
 
 if TYPE_CHECKING:
     from ..design.genes import Measure
@@ -87,12 +86,6 @@ def resume(
 
     state = read_state(folder / "search.json")
     search(read_project(folder / "project.toml"), folder, time_s, state, lenses, searches, threads, as_json)
-
-
-def check_time(time_s: float) -> None:
-    """Refuse a time that is none."""
-    if not (math.isfinite(time_s) and time_s > 0.0):
-        raise ProjectError(f"--time {time_s:g} is no time; give seconds above 0")
 
 
 def search(

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,45 +15,14 @@ from .hunt import Limits, Solution
 from .objective import diagonal_slope, fitness, fitness_thesis, own_objective
 from .picture import GAIN, grey_picture, psnr, psnr_with_gain, ssim
 from .prescription import Structure, structure_of, structures, vector_of
-from .search import STEPS, Candidate, Problem, State, polish
+from .scratch import random_wishes, scratch_project, wanted_picture
+from .search import STEPS, Candidate, Problem, polish
 from .solvers import Choice, chosen, make_ready, solve_with
+from .target import problem_of
+from .trials import CASES, Trial
 
 Floats = NDArray[np.float64]
 
-
-@dataclass(frozen=True)
-class Case:
-    """A lens of the thesis and how its program draws it.
-
-    Attributes
-    ----------
-    lens : str
-        Shipped name.
-    stop_diameter : float
-        mm.
-    blades : int
-    gain : float
-        For `picture.grey_picture`: the thesis does not tell the light's intensity, so that of each test makes a black
-        picture as far from the target as its own is.
-    """
-
-    lens: str
-    stop_diameter: float
-    blades: int
-    gain: float
-
-
-CASES = {
-    "heliar": Case("heliar-tronnier", 4.5, 6, GAIN),
-    "canon": Case("canon-28-80", 10.5, 8, 0.76),
-}
-
-# what the thesis reached, best run: PSNR in dB, SSIM, seconds on eight cores
-THESIS = {
-    ("heliar", 5.45): (25.89, 0.9146, 600.0),
-    ("heliar", 13.40): (30.38, 0.8512, 600.0),
-    ("canon", 5.45): (27.20, 0.8898, 3600.0),
-}
 
 # points of a trace
 TOLD = 60
@@ -113,78 +81,95 @@ class BenchmarkRun:
     trace: tuple[TracePoint, ...] = ()
 
 
-def problem_of_case(
-    name: str, angle_deg: float, *, unsigned: bool = False, fresnel: bool = False
-) -> tuple[Problem, Structure, Floats]:
+@dataclass(frozen=True)
+class Task:
+    """A test set up: what is searched, and how pictures of it are drawn.
+
+    Attributes
+    ----------
+    problem : Problem
+    slope : float
+        Of the light.
+    blades : int
+    gain : float
+    lens : (Structure, ndarray) or None
+        Whose ghosts are to be found; None: those of nobody.
+    """
+
+    problem: Problem
+    slope: float
+    blades: int
+    gain: float
+    lens: tuple[Structure, Floats] | None
+
+    def pictures(self, structure: Structure, vector: Floats) -> tuple[Floats, Floats]:
+        """Draw the target and a lens, each of shape (512, 512)."""
+        entrance = self.problem.objective.entrance
+        found = grey_picture(structure, vector, self.slope, entrance=entrance, blades=self.blades, gain=self.gain)
+        if self.lens is None:
+            # wanted ghosts have no light of their own: that of the lens which is to make them
+            wanted = wanted_picture(self.problem.objective, float(vector[0]), ghosts=len(structure.pairs))
+            return wanted, found
+        return grey_picture(*self.lens, self.slope, entrance=entrance, blades=self.blades, gain=self.gain), found
+
+
+def task_of(trial: Trial, seed: int = 0) -> Task:
     """Set a test up.
 
     Parameters
     ----------
-    name : {"heliar", "canon"}
-    angle_deg : float
-        Yaw and pitch of the light.
-    unsigned : bool
-        Neither signs nor brightness, as the thesis.
-    fresnel : bool
-        The irradiance of bare surfaces is known as well.
+    trial : Trial
+        Of a lens.
+    seed : int
+        Scatters the ghosts where there is no lens.
 
     Returns
     -------
-    problem : Problem
-        The lens itself is not in it.
-    structure : Structure
-    vector : ndarray
-        The lens, to compare with.
+    Task
+        The lens itself is not in its problem.
     """
+    if trial.name == "scratch":
+        wishes = random_wishes(trial.ghosts, seed)
+        project = scratch_project(wishes, (trial.angle_deg, trial.angle_deg), signed=not trial.unsigned)
+        problem, _ = problem_of(project)
+        return Task(problem, float(problem.objective.slopes[0]), 6, GAIN, None)
+    case, slope = CASES[trial.name], diagonal_slope(trial.angle_deg)
     # the thesis' lenses have no rims
-    case, bounds = CASES[name], Bounds(hard=())
-    lens = load_lens(case.lens)
+    bounds, lens = Bounds(hard=()), load_lens(case.lens)
     structure = structure_of(lens)
     vector = vector_of(lens, case.stop_diameter, lens.rows[-1].thickness)
     aim = own_objective(
-        structure, vector, np.array([diagonal_slope(angle_deg)]), bounds=bounds, signed=not unsigned,
-        brightness="fresnel" if fresnel else "none", extra=500.0,
+        structure, vector, np.array([slope]), bounds=bounds, signed=not trial.unsigned,
+        brightness="fresnel" if trial.fresnel else "none", extra=500.0,
     )  # fmt: skip
     found = structures(structure.rows - 1, len(structure.pairs))
     # the grey picture's levels are stop over ghost height, so brightness tells the stop's diameter
-    return Problem(aim, found, bounds, stop_diameter=None if unsigned else case.stop_diameter), structure, vector
+    problem = Problem(aim, found, bounds, stop_diameter=None if trial.unsigned else case.stop_diameter)
+    return Task(problem, slope, case.blades, case.gain, (structure, vector))
 
 
-def run_case(
-    name: str,
-    angle_deg: float,
+def run_trial(
+    trial: Trial,
     *,
     seed: int = 0,
-    time_limit: float | None = 10.0,
-    most: int | None = None,
+    limits: Limits | None = None,
     choice: Choice | None = None,
     measure: Measure = "algorithm1",
-    unsigned: bool = False,
-    fresnel: bool = False,
     threads: int | None = None,
-    progress: Callable[[str], None] | None = None,
-    cancelled: Callable[[], bool] | None = None,
 ) -> tuple[BenchmarkRun, Floats, Floats]:
-    """Run one seed of a test.
+    """Run one seed of a test of a lens.
 
     Parameters
     ----------
-    name, angle_deg, unsigned, fresnel
-        As in `problem_of_case`.
+    trial : Trial
     seed : int
-    time_limit : float, optional
-        Seconds; None: no limit.
-    most : int, optional
-        End after about so many local searches or evaluations.
+    limits : Limits, optional
+        None: 10 seconds.
     choice : Choice, optional
         None: pools of local minima.
     measure : {"ours", "algorithm1"}
         The fitness that a solver sees that evolves.
     threads : int, optional
-    progress : callable, optional
-        Gets a line now and then.
-    cancelled : callable, optional
-        Asked now and then.
 
     Returns
     -------
@@ -192,38 +177,31 @@ def run_case(
     target, found : ndarray, shape (512, 512)
         Grey pictures.
     """
-    problem, structure, vector = problem_of_case(name, angle_deg, unsigned=unsigned, fresnel=fresnel)
+    task = task_of(trial, seed)
     solver = chosen("pools") if choice is None else choice
-    make_ready(solver, problem, measure)
-
-    def tell(now: State) -> None:
-        if progress is not None:
-            progress(f"{solver.label}, seed {seed}: {now.searches} {solver.unit}")
-
+    make_ready(solver, task.problem, measure)
     cpu = time.process_time()
-    limits = Limits(time_limit, most, tell, cancelled)
-    solution = solve_with(solver, problem, limits=limits, seed=seed, measure=measure, threads=threads)
+    solution = solve_with(
+        solver, task.problem, limits=limits or Limits(10.0), seed=seed, measure=measure, threads=threads
+    )
     cpu = time.process_time() - cpu
-    return _measured(name, angle_deg, problem, (structure, vector), solution, solver, cpu, measure)
+    return _measured(task, solution, solver, cpu, measure)
 
 
 def _measured(
-    name: str, angle_deg: float, problem: Problem, lens: tuple[Structure, Floats], solution: Solution, solver: Choice,
-    cpu: float, measure: Measure,
-) -> tuple[BenchmarkRun, Floats, Floats]:  # fmt: skip
-    """Compare what a solver found with the lens."""
-    best, state = _best(problem, solution, solver), solution.state
+    task: Task, solution: Solution, solver: Choice, cpu: float, measure: Measure
+) -> tuple[BenchmarkRun, Floats, Floats]:
+    """Compare what a solver found with what it should find."""
+    problem, state = task.problem, solution.state
+    best = _best(problem, solution, solver)
     found = problem.variables(best.structure).prescription(best.x)
-    case, slope = CASES[name], diagonal_slope(angle_deg)
-    pictures = [
-        grey_picture(s, v, slope, entrance=problem.objective.entrance, blades=case.blades, gain=case.gain)
-        for s, v in (lens, (best.structure, found))
-    ]
+    pictures = task.pictures(best.structure, found)
+    lens = task.lens
     run = BenchmarkRun(
         solver.label, measure if solver.evolves else "ours", state.seed, state.seconds, cpu, state.searches,
         fitness_thesis(problem.objective, best.structure, found), fitness(problem.objective, best.structure, found),
         psnr(*pictures), ssim(*pictures), psnr(pictures[0], np.zeros_like(pictures[0])), psnr_with_gain(*pictures),
-        best.structure == lens[0] and same_lens(lens[1], found), _trace(problem, solution),
+        lens is not None and best.structure == lens[0] and same_lens(lens[1], found), _trace(problem, solution),
     )  # fmt: skip
     return run, pictures[0], pictures[1]
 
@@ -266,8 +244,3 @@ def same_lens(one: Floats, other: Floats) -> bool:
     return bool(
         np.abs(one[lengths] - other[lengths]).max() < 0.01 and np.abs(one[indices] - other[indices]).max() < 1e-3
     )
-
-
-def as_data(runs: list[BenchmarkRun]) -> dict[str, list[dict[str, object]]]:
-    """Return runs ready for JSON."""
-    return {"runs": [asdict(run) for run in runs]}

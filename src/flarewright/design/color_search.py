@@ -42,6 +42,8 @@ SWEEPS = 30
 FINISHING_STEPS = 200
 # descents that do not know of each other; not the number of threads, for results must not depend on that
 ROUND = 8
+# a cost at which the colours are met
+ENOUGH = 1e-16
 # ends from which others begin
 POOL = 8
 
@@ -100,7 +102,7 @@ def solve_colors(
     found: list[Coatings] = []
     with ThreadPoolExecutor(min(workers, starts)) as threads_pool:
         for first in range(0, starts, ROUND):
-            if found and over():
+            if found and (found[0].cost <= ENOUGH or over()):
                 break
             pool = tuple(found[:POOL]) if 2 * first >= starts else ()
             ends = threads_pool.map(partial(one_more, pool=pool), range(first, min(first + ROUND, starts)))
