@@ -135,6 +135,7 @@ def test_a_click_chooses_among_all_ghosts_there(tab):
     assert row.get_attribute("data-ghost") == stack[1]
     # its rays are in the cross-section
     tab.until(f"document.querySelector('#section .head').textContent.includes({json.dumps(stack[1])})")
+    assert tab.page.locator("#section polyline[stroke='#c8313b']").count() >= 3
     before = tab.shown()
     tab.page.keyboard.press("s")
     tab.rest()

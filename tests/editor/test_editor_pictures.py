@@ -6,6 +6,10 @@ import numpy as np
 import pytest
 
 from flarewright.editor import studio
+from flarewright.editor.drawings import section
+from flarewright.editor.edit_shot import move_light
+from flarewright.editor.files import project_for_lens
+from flarewright.editor.hand import Hand
 from flarewright.editor.screen import Screen
 from flarewright.editor.seen import Seen, SeenGhost, alone, is_there, outline, see, under
 from flarewright.editor.session import begin
@@ -13,7 +17,7 @@ from flarewright.editor.shown import FALSE_COLOURS, jpeg, pixels_of, plate_for
 from flarewright.editor.view import View
 from flarewright.editor.viewing import outline_png, picked, shown_jpeg, target_jpeg
 from flarewright.errors import ProjectError
-from flarewright.model import Camera, Everywhere, Light, Output, Quality, QuarterWave
+from flarewright.model import Camera, Everywhere, Iris, Light, Output, Quality, QuarterWave
 from flarewright.optics.color import luminance_weights
 from flarewright.render.render import render
 from flarewright.render.working import GREY_R, working_ghosts
@@ -236,14 +240,16 @@ def test_a_hand_is_followed_and_let_go(project):
     screen.start()
     screen.wait(60.0)
     before, exposure = screen.picture, screen.exposure_stops
-    data, seconds = screen.moving(0, 3.0, 1.0, session.revision)
+    hand = Hand(screen)
+    found = hand.picture(lambda now: move_light(now, 0, 3.0, 1.0), session.revision)
+    data, seconds = found.jpeg, found.seconds
     assert data[:2] == b"\xff\xd8"
     assert seconds > 0.0
     # nothing is decided while the hand holds the light
     assert session.project == before.project
     session.do("move_light", {"light": 0, "x": 3.0, "y": 1.0})
     # what the hand asked for before it let go neither ends the final picture nor is drawn any more
-    assert screen.moving(0, 2.9, 1.0, session.revision - 1) is None
+    assert hand.picture(lambda now: move_light(now, 0, 2.9, 1.0), session.revision - 1) is None
     assert screen.wait(60.0)
     assert screen.picture.grade == "final"
     assert screen.picture.project.lights[0].field_deg == (3.0, 1.0)
@@ -261,3 +267,17 @@ def test_a_hand_is_followed_and_let_go(project):
     assert screen.seen.ghosts[0].name in names
     assert outline_png(screen, names[0])[:4] == b"\x89PNG"
     assert target_jpeg(screen)[:2] == b"\xff\xd8"
+
+
+def test_every_ghost_of_the_picture_has_rays_in_the_cross_section():
+    """Also those that fill little of the entrance, or that only a corner of the blades lets through."""
+    project = project_for_lens("canon-28-80")
+    for name in ("8-6", "18-10", "27-5"):
+        drawn = section(project, name)
+        assert (name, drawn.told) == (name, "")
+        assert drawn.svg.count('stroke="#c8313b" stroke-width="1.3"') >= 3, name
+    near = project.replace(lights=(Light(field_deg=(1.0, 0.5)),))
+    assert section(near, "sensor-21").told == ""
+    # a round iris has no corners
+    assert section(project.replace(iris=Iris(blades=0)), "18-10").told
+    assert section(project, "8-6-7-2").told

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import threading
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -35,15 +36,28 @@ THUMB_SCALE = 0.25
 _THUMBS = threading.Lock()
 
 
-def section_svg(project: Project, ghost: str | None) -> str:
+@dataclass(frozen=True)
+class Section:
+    """A cross-section as SVG; `told` says why rays of the ghost are missing, where they are."""
+
+    svg: str
+    told: str = ""
+
+
+def section(project: Project, ghost: str | None) -> Section:
     """Draw the lens with the light's rays, or with those of a ghost."""
     settled = settle(project)
+    names = () if ghost is None else tuple(ghost.split("-"))
     pair = None
-    if ghost and ghost.count("-") == 1 and "sensor" not in ghost:
-        j, i = ghost.split("-")
-        pair = int(j), int(i)
+    if len(names) == 2:
+        j, i = names
+        pair = len(settled.lens.rows) if j == "sensor" else int(j), int(i)
     angle = max(project.lights, key=lambda light: light.intensity).field_deg
-    return cross_section(settled.lens, settled.order, field_deg=angle, ghost=pair).svg
+    drawn = cross_section(settled.lens, settled.order, field_deg=angle, ghost=pair, iris=settled.iris)
+    if len(names) > 2:
+        return Section(drawn.svg, "rays are drawn of ghosts that reflect twice")
+    missing = pair is not None and any("the ghost" in remark for remark in drawn.remarks)
+    return Section(drawn.svg, "none of its rays crosses the lens in this plane" if missing else "")
 
 
 def coating_svg(project: Project, row: int) -> str:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import threading
 import time
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -16,13 +16,10 @@ from . import studio
 from .jobs import Check, Lane, Overtaken
 from .seen import Seen, see
 from .session import Session
-from .shown import jpeg, pixels_of, plate_for
+from .shown import pixels_of, plate_for
 from .studio import Match, Picture
 from .view import View
 
-# pictures of a dragging hand: their sides as parts of the viewport's, and the time that one may take
-SCALES = (1.0, 2.0 / 3.0, 0.5)
-SLOW_S, FAST_S = 0.036, 0.02
 # a lens whose final picture takes less needs no draft in front of it
 SOON_S = 0.35
 TELL_S = 0.12
@@ -43,10 +40,10 @@ class Screen:
         self.match = Match()
         self.problem = ""
         self.number = 0
-        self._scale = 0
+        # called when all is drawn and measured
+        self.idle: Callable[[], None] | None = None
         self._final_s = 10.0
         self._lane = Lane("pictures")
-        self._hand = threading.Lock()
         self._busy: tuple[Project, View] | None = None
         session.listeners.append(self._heard)
 
@@ -127,6 +124,8 @@ class Screen:
         self.session.tell({"type": "ghosts"})
         if not working:
             self._match_ghosts(project, view, self.seen, check)
+        if self.idle is not None:
+            self.idle()
 
     def _match_ghosts(self, project: Project, view: View, seen: Seen, check: Check) -> None:
         """Learn from the final picture how bright each ghost of the next drafts shall be."""
@@ -172,47 +171,14 @@ class Screen:
             self.session.remember(self.match.exposure_stops)
         self.session.set_view({"exposure_stops": None})
 
-    def moving(self, light: int, x: float, y: float, revision: int) -> tuple[bytes, float] | None:
-        """Draw the picture with a light elsewhere, as sharp as a dragging hand has patience for.
-
-        Parameters
-        ----------
-        light : int
-        x, y : float
-            Field angles, degrees.
-        revision : int
-            Of the session that the hand sees.
-
-        Returns
-        -------
-        picture : bytes
-            JPEG.
-        seconds : float
-            None in place of both where the hand has let go already.
-        """
-        from .edit_shot import move_light
-
+    def interrupt(self, revision: int) -> bool:
+        """Stop drawing for a hand that sees this revision of the session; False when it is not the newest."""
         with self.session.lock:
             if revision != self.session.revision:
-                return None
-            # the final picture of a place that the hand has left is of no use
+                return False
             self._lane.cancel()
             self._busy = None
-        with self._hand:
-            if revision != self.session.revision:
-                return None
-            begun = time.perf_counter()
-            project = move_light(self.session.project, light, x, y)
-            picture = studio.take(
-                project, "moving", self.session.view, scale=SCALES[self._scale], levels=self.match.levels
-            )
-            if picture.seconds > SLOW_S and self._scale + 1 < len(SCALES):
-                self._scale += 1
-            elif picture.seconds < FAST_S and self._scale > 0:
-                self._scale -= 1
-        # the next one is drawn while this one is packed
-        data = jpeg(pixels_of_picture(self, picture), 80)
-        return data, time.perf_counter() - begun
+            return True
 
     def rest(self) -> None:
         """Go on with the final picture after a drag that changed nothing."""

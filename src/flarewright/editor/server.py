@@ -23,7 +23,9 @@ from ..errors import FlarewrightError, ProjectError
 from . import drawings, files, viewing
 from .autosave import state_folder
 from .edit_lens import choose_lens
+from .edit_shot import move_light
 from .guard import Application, Guard
+from .hand import Hand
 from .screen import Screen
 from .session import Session
 from .shown import plate_for
@@ -71,6 +73,8 @@ class Desk:
     def __init__(self, session: Session, greeting: str = "") -> None:
         self.session, self.greeting = session, greeting
         self.screen, self.solver = Screen(session), Solver(session)
+        self.hand = Hand(self.screen)
+        self.screen.idle = self.hand.prepare
         self._tabs: set[asyncio.Queue[dict[str, Any]]] = set()
         self._loop: asyncio.AbstractEventLoop | None = None
         session.listeners.append(self._heard)
@@ -160,8 +164,11 @@ def _picture(desk: Desk, _request: Request, _body: Any) -> Any:
 def _moving(desk: Desk, request: Request, _body: Any) -> Any:
     asked = request.query_params
     revision = int(asked.get("revision", desk.session.revision))
-    found = desk.screen.moving(int(asked["light"]), float(asked["x"]), float(asked["y"]), revision)
-    return Response(status_code=204) if found is None else _jpeg(found[0], {"X-Seconds": f"{found[1]:.4f}"})
+    light, x, y = int(asked["light"]), float(asked["x"]), float(asked["y"])
+    found = desk.hand.picture(lambda project: move_light(project, light, x, y), revision)
+    if found is None:
+        return Response(status_code=204)
+    return _jpeg(found.jpeg, {"X-Seconds": f"{found.seconds:.4f}"})
 
 
 def _target(desk: Desk, _request: Request, _body: Any) -> Any:
@@ -184,8 +191,8 @@ def _ghosts(desk: Desk, _request: Request, _body: Any) -> Any:
 
 
 def _section(desk: Desk, request: Request, _body: Any) -> Any:
-    svg = drawings.section_svg(desk.session.project, request.query_params.get("ghost"))
-    return Response(svg, media_type="image/svg+xml", headers=_FRESH)
+    drawn = drawings.section(desk.session.project, request.query_params.get("ghost"))
+    return {"svg": drawn.svg, "told": drawn.told}
 
 
 def _coating(desk: Desk, request: Request, _body: Any) -> Any:

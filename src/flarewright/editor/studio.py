@@ -149,6 +149,13 @@ def take(
     return Picture(project, grade, ghosts, rest, time.perf_counter() - begun, rendering.remarks)
 
 
+def moving_stage(project: Project, scale: float, levels: Levels) -> Project:
+    """Return the project as pictures of a moving hand are drawn."""
+    stage = staged(project, "moving", scale)
+    found: Project = stage.replace(art=_levelled(stage.art, levels))
+    return found
+
+
 def spread(layers: list[Layer], size_px: tuple[int, int]) -> Floats:
     """Add layers on a sheet of the picture's size."""
     sheet = np.zeros((size_px[1], size_px[0], 3), dtype=np.float32)

@@ -162,10 +162,11 @@ def draw_matrix_ghosts(
     through the middle of the iris or, where the entrance bounds the ghost, of the entrance.
     """
     height, width = plane.shape[0], plane.shape[1]
-    polygon, other = np.empty((MAX_VERTICES, PSTOP + 6)), np.empty((MAX_VERTICES, PSTOP + 6))
+    polygon, other = np.zeros((MAX_VERTICES, PSTOP + 6)), np.zeros((MAX_VERTICES, PSTOP + 6))
     values = np.empty(MAX_VERTICES)
     to_stop = np.empty((3, 2, 2))
     across = to_stop if curvature_x is None else np.empty((3, 2, 2))
+    rim = _rim(entrance)
     for p in range(starts.size - 1):
         path_rows, path_actions = rows[starts[p] : starts[p + 1]], actions[starts[p] : starts[p + 1]]
         for w in range(n_gap.shape[0]):
@@ -180,9 +181,7 @@ def draw_matrix_ghosts(
                 to_stop[c, 0, 0] += nearness * to_stop[c, 0, 1]
                 if curvature_x is not None:
                     across[c, 0, 0] += nearness * across[c, 0, 1]
-            count = _project_entrance(
-                polygon, entrance, slope, slope_x, a, b, ax, bx, to_stop, across, crossings[p], axes
-            )
+            count = _project_entrance(polygon, rim, slope, slope_x, a, b, ax, bx, to_stop, across, crossings[p], axes)
             count = cut_by_blades(polygon, count, crossings[p], edges, other, values)
             if count == 0:
                 continue
@@ -232,19 +231,27 @@ def _centre(to_stop, slope, iris_radius, entrance):
 
 
 @inner
-def _project_entrance(polygon, entrance, slope, slope_x, a, b, ax, bx, to_stop, across, crossings, axes):
-    """Fill a polygon with the rim of the entrance: its images on the sensor and at each crossing of the stop."""
+def _rim(entrance):
+    """Return the rim of the entrance as a polygon, shape (RIM, 2)."""
     # circumscribed a little, so that the polygon has the area of the circle
     radius = entrance * sqrt(2.0 * np.pi / (RIM * np.sin(2.0 * np.pi / RIM)))
+    rim = np.empty((RIM, 2))
     for k in range(RIM):
         angle = 2.0 * np.pi * k / RIM
-        x, y = radius * np.cos(angle), radius * np.sin(angle)
+        rim[k, 0], rim[k, 1] = radius * np.cos(angle), radius * np.sin(angle)
+    return rim
+
+
+@inner
+def _project_entrance(polygon, rim, slope, slope_x, a, b, ax, bx, to_stop, across, crossings, axes):
+    """Fill a polygon with the rim of the entrance: its images on the sensor and at each crossing of the stop."""
+    for k in range(RIM):
+        x, y = rim[k, 0], rim[k, 1]
         polygon[k, PX], polygon[k, PY] = ax * x + bx * slope_x, a * y + b * slope
         polygon[k, PREL], polygon[k, PW] = 0.0, 1.0
         polygon[k, PP], polygon[k, PQ] = x, y
-        for c in range(3):
-            m = min(c, crossings - 1)
-            u, v = across[m, 0, 0] * x + across[m, 0, 1] * slope_x, to_stop[m, 0, 0] * y + to_stop[m, 0, 1] * slope
+        for c in range(crossings):
+            u, v = across[c, 0, 0] * x + across[c, 0, 1] * slope_x, to_stop[c, 0, 0] * y + to_stop[c, 0, 1] * slope
             polygon[k, PSTOP + 2 * c] = u * axes[0, 0] + v * axes[1, 0]
             polygon[k, PSTOP + 2 * c + 1] = u * axes[0, 1] + v * axes[1, 1]
     # a bare constant would be a type of its own and compile what it is given to twice

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..kernels.trace import REFLECT, REFRACT, STOP
-from ..model import Lens, Stop
+from ..model import Lens
 
 
 @dataclass(frozen=True)
@@ -21,7 +21,7 @@ class LightPath:
     first_reflection, second_reflection : int or None
         Rows of the first two mirrors (j, then i < j); None for the direct path.
     rows, actions : ndarray, shape (S,), int64
-        Row of each step; REFRACT, REFLECT or STOP.
+        Row of each step; REFRACT, REFLECT or STOP. Shared by all who ask for the path: never changed.
     sensor : bool
         One of the mirrors is the sensor, which stands as one row more behind the lens' own.
     later_reflections : tuple of int
@@ -42,7 +42,7 @@ class LightPath:
             return ()
         return (self.first_reflection, self.second_reflection, *self.later_reflections)
 
-    @property
+    @cached_property
     def name(self) -> str:
         """Name of the path: "j-i", "j-i-k-l", with "sensor" for the sensor's row, or "direct"."""
         if self.first_reflection is None:
@@ -67,14 +67,19 @@ class LightPath:
 
 def _path(lens: Lens, mirrors: tuple[int, ...]) -> LightPath:
     """Go to and fro between mirrors; row len(lens.rows) is the sensor."""
-    count = len(lens.rows)
+    return _steps(len(lens.rows), lens.stop_row, mirrors)
+
+
+# pictures of a moving hand ask for the same hundreds of paths each time
+@lru_cache(maxsize=8192)
+def _steps(count: int, stop: int, mirrors: tuple[int, ...]) -> LightPath:
     rows: list[int] = []
     actions: list[int] = []
     start, heading = 0, 1
     for end in (*mirrors, None):
         leg = range(start, count if end is None else end + heading, heading)
         rows += leg
-        actions += [STOP if row < count and isinstance(lens.rows[row], Stop) else REFRACT for row in leg]
+        actions += [STOP if row == stop else REFRACT for row in leg]
         # every leg but the last ends at a mirror
         if end is not None:
             actions[-1] = REFLECT

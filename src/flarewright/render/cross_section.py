@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import html
 from dataclasses import dataclass, field
-from math import cos, hypot, radians, sin, tan
+from math import cos, hypot, radians, sin, sqrt, tan
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ProjectError
-from ..model import Lens, Row, Surface
+from ..model import Iris, Lens, Row, Surface
+from ..optics.iris import outline
 from ..optics.paraxial import FirstOrder, vertex_positions
 from ..optics.shape import places, sag
 
@@ -22,7 +23,8 @@ _HEAD_PX = 62.0
 _FOOT_PX = 44.0
 _TALLEST_PX = 460.0
 _RAYS = 7
-_CANDIDATES = 401
+# rays that are tried; where fewer than `_RAYS` of them get through, as of a ghost that fills little of the entrance
+_CANDIDATES, _MORE_CANDIDATES = 401, 8001
 
 _INK, _FAINT, _PAPER = "#22313f", "#8796a5", "#fbfcfd"
 _AXIS_RAYS, _FIELD_RAYS, _GHOST_RAYS = "#2f7fd1", "#e08a1e", "#c8313b"
@@ -63,6 +65,7 @@ def cross_section(
     *,
     field_deg: tuple[float, float] | None = None,
     ghost: tuple[int, int] | None = None,
+    iris: Iris | None = None,
 ) -> Drawing:
     """Draw a lens from the side, light from the left.
 
@@ -76,6 +79,8 @@ def cross_section(
         A light whose rays are drawn beside those of the axis; None: the lens' own field, if it is known.
     ghost : tuple of int, optional
         Rows (j, i) of a ghost path whose rays are drawn; j = len(lens.rows) is the sensor.
+    iris : Iris, optional
+        Rays that only the corners of its opening let through are drawn too, where there are no others; None: round.
 
     Returns
     -------
@@ -107,7 +112,7 @@ def cross_section(
         _draw_glass(sheet, lens, z, semi, k)
     # Steep rays come from far above; only what lies between head and foot is shown of them.
     sheet.parts.append('<g clip-path="url(#sheet)">')
-    remarks = _draw_fans(sheet, lens, order, lead, angle, ghost)
+    remarks = _draw_fans(sheet, lens, order, lead, angle, ghost, _corner(iris))
     sheet.parts.append("</g>")
     _draw_surfaces(sheet, lens, z, semi)
     _draw_stop(sheet, float(z[lens.stop_row]), order.stop_semi_diameter, _blade_reach(lens, semi, order))
@@ -207,8 +212,24 @@ def _draw_stop(sheet: _Sheet, z: float, opening: float, reach: float) -> None:
         )
 
 
+def _corner(iris: Iris | None) -> float:
+    """Return how far out the opening goes, as a part of the round one's radius."""
+    if iris is None:
+        return 1.0
+    if iris.mask is not None:
+        # a mask is a square around the round opening
+        return sqrt(2.0)
+    return float(np.hypot(*outline(iris, 1.0).T).max())
+
+
 def _draw_fans(
-    sheet: _Sheet, lens: Lens, order: FirstOrder, lead: float, angle: float, ghost: tuple[int, int] | None
+    sheet: _Sheet,
+    lens: Lens,
+    order: FirstOrder,
+    lead: float,
+    angle: float,
+    ghost: tuple[int, int] | None,
+    corner: float,
 ) -> list[str]:
     """Draw the rays of the axis, of the field and of a ghost; return remarks on what no ray passes."""
     remarks: list[str] = []
@@ -220,6 +241,8 @@ def _draw_fans(
         fans.append((angle, None, _FIELD_RAYS))
     for angle_deg, path, colour in fans:
         rays = _fan(lens, order, angle_deg, path)
+        if not len(rays) and path is not None and corner > 1.0:
+            rays = _fan(lens, order, angle_deg, path, corner)
         if not len(rays):
             what = f"the ghost {_name(lens, path)}" if path else "the direct path"
             remarks.append(f"no ray of {what} gets through at {angle_deg:g} degrees, so none is drawn")
@@ -233,8 +256,25 @@ def _draw_fans(
     return remarks
 
 
-def _fan(lens: Lens, order: FirstOrder, angle_deg: float, ghost: tuple[int, int] | None) -> list[Floats]:
+def _fan(
+    lens: Lens, order: FirstOrder, angle_deg: float, ghost: tuple[int, int] | None, corner: float = 1.0
+) -> list[Floats]:
     """Return the polylines (z, y) of a few rays that get through, spread over the opening."""
+    for tried in (_CANDIDATES, _MORE_CANDIDATES):
+        hits = _passing(lens, order, angle_deg, ghost, corner, tried)
+        if len(hits) >= _RAYS:
+            break
+    if not len(hits):
+        return []
+    chosen = np.unique(np.linspace(0, len(hits) - 1, _RAYS).round().astype(int))
+    # The plane of the first vertex is not a place where anything happens: begin at the first hit.
+    return [np.stack([hits[k, 1:, 2], hits[k, 1:, 1]], axis=1) for k in chosen]
+
+
+def _passing(
+    lens: Lens, order: FirstOrder, angle_deg: float, ghost: tuple[int, int] | None, corner: float, tried: int
+) -> Floats:
+    """Trace rays side by side and return the places, (x, y, z) of each hit, of those that no rim stops."""
     from ..optics.paths import direct_path, ghost_path, sensor_path
     from ..optics.trace import trace_polylines
 
@@ -246,18 +286,15 @@ def _fan(lens: Lens, order: FirstOrder, angle_deg: float, ghost: tuple[int, int]
     limit = _semi(first, order)
     # Rays start on the plane of the first vertex; a bulging front lets oblique ones in from further out.
     reach = limit * (1.0 + abs(tan(radians(angle_deg))))
-    y = np.linspace(-reach, reach, _CANDIDATES)
+    y = np.linspace(-reach, reach, tried)
     hits = trace_polylines(lens, ghost, np.zeros_like(y), y, -radians(angle_deg), sensor_distance=order.sensor_distance)
     # the sensor, unbounded here, clips nothing
     semi = np.array([np.inf if row == sensor else _semi(lens.rows[row], order) for row in path.rows])
+    semi[path.rows == lens.stop_row] *= corner
     radius = np.hypot(hits[:, 1:-1, 0], hits[:, 1:-1, 1])
     with np.errstate(invalid="ignore"):
-        through = np.flatnonzero((radius <= semi * (1 + 1e-9)).all(axis=1) & np.isfinite(hits).all(axis=(1, 2)))
-    if not len(through):
-        return []
-    chosen = np.unique(through[np.linspace(0, len(through) - 1, _RAYS).round().astype(int)])
-    # The plane of the first vertex is not a place where anything happens: begin at the first hit.
-    return [np.stack([hits[k, 1:, 2], hits[k, 1:, 1]], axis=1) for k in chosen]
+        through = (radius <= semi * (1 + 1e-9)).all(axis=1) & np.isfinite(hits).all(axis=(1, 2))
+    return np.asarray(hits[through])
 
 
 def _label(

@@ -6,6 +6,7 @@ Rec.709's triangle) are clamped to 0 and what is brighter than white is clipped 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import Literal
 
@@ -79,6 +80,45 @@ def view(
     elif transform != "srgb":
         raise FlarewrightError(f"the view {transform!r} is unknown; known are srgb and filmic")
     return _encoded(np.minimum(light, 1.0))
+
+
+def view_sum(
+    ghosts: NDArray[np.float32],
+    rest: NDArray[np.float32],
+    exposure_stops: float,
+    *,
+    ghost_gain: Sequence[float] = (1.0, 1.0, 1.0),
+    rest_gain: Sequence[float] = (1.0, 1.0, 1.0),
+    corner: tuple[int, int] = (0, 0),
+) -> NDArray[np.uint8]:
+    """Return `view` of a sum by the sRGB curve, in a fraction of its time: for pictures of a moving hand.
+
+    Parameters
+    ----------
+    ghosts : ndarray, shape (height, width, 3)
+        Linear Rec.709.
+    rest : ndarray, shape (height', width', 3)
+        At least as large; all C-contiguous.
+    exposure_stops : float
+    ghost_gain, rest_gain : sequence of float
+        Red, green and blue.
+    corner : tuple of int
+        Row and column of `rest` that lie on the first pixel.
+
+    Returns
+    -------
+    ndarray, shape (height, width, 3), uint8
+        sRGB-encoded; as `view(ghosts * ghost_gain + rest * rest_gain, exposure_stops)`.
+    """
+    # compiled code is loaded where it is called
+    from ..kernels.screen import encode_sum
+
+    exposure = 2.0**exposure_stops
+    gains = (np.array(gain, dtype=np.float64) * exposure for gain in (ghost_gain, rest_gain))
+    first, second = (np.minimum(gain, np.finfo(np.float32).max).astype(np.float32) for gain in gains)
+    out = np.empty(ghosts.shape, dtype=np.uint8)
+    encode_sum(ghosts, first, rest, second, corner, *_tables(), out)
+    return out
 
 
 def _encoded(light: NDArray[np.floating]) -> NDArray[np.uint8]:

@@ -37,6 +37,8 @@ Progress = Callable[[float, str], None]
 # pictures drawn side by side before they are added: fixed by size, never by threads, so sums round alike everywhere
 _CHUNKS = ((1_100_000, 8), (2_500_000, 4))
 _GHOSTS_A_CHUNK = 16
+# of drafts, whose ghosts are drawn in less time than a picture more is added in
+_DRAFT_CHUNKS = 4
 # and of ghosts that are spread together
 _MOST_CHUNKS = 8
 # of so many lights, the faintest ghosts are left out that carry together no more than this part of all ghost light
@@ -243,13 +245,14 @@ def _draft(
     order = list(range(len(paths))) if singles == 0 else _rank_draft(shots, paths, art)
     alone = set(order if singles is None else order[:singles])
     plain = [k for k in range(len(paths)) if paths[k].name not in art]
+    unchanged = set(plain)
     coarse = draft_details(points, [paths[k] for k in plain]) if len(points) >= MANY_LIGHTS else None
 
     def draw(group: list[int]) -> list[Plane | None]:
         width, height = shots[0].size_px
         sheets: list[NDArray[np.float64] | None] = [None] * DETAILS
         sheets[0] = picture = np.zeros((height, width, 3))
-        mine = [k for k in plain if k in group]
+        mine = sorted(unchanged.intersection(group))
         by_hand = [(paths[k], art[paths[k].name]) for k in group if paths[k].name in art]
         # those that are only graded or moved alike are drawn together
         graded: dict[object, list[LightPath]] = {}
@@ -287,7 +290,7 @@ def _draft(
         return list(sheets)
 
     named = [paths[k] for k in order]
-    total, layers = _collect(shots, order, named, singles, art, draw, pool)
+    total, layers = _collect(shots, order, named, singles, art, draw, pool, most=_DRAFT_CHUNKS)
     return GhostPass(total, layers, len(paths), None, 0, 0.0, 0)
 
 
@@ -402,6 +405,7 @@ def _collect(
     pool: ThreadPoolExecutor,
     jobs: Sequence[Callable[[], list[Plane | None]]] = (),
     ghosts_each: int = 1,
+    most: int = _MOST_CHUNKS,
 ) -> tuple[Layer, tuple[Layer, ...]]:
     """Draw the first `singles` items by themselves, the others in a fixed number of groups, then jobs; add in order.
 
@@ -412,7 +416,7 @@ def _collect(
     pixel_area = 1.0 / float(shot.to_pixels[2] * shot.to_pixels[3])
     luminance = luminance_weights(shot.colorspace)
     alone = len(items) if singles is None else min(singles, len(items))
-    most = next((n for size, n in _CHUNKS if width * height <= size), 2)
+    most = min(most, next((n for size, n in _CHUNKS if width * height <= size), 2))
     chunks = max(1, min(most, (len(items) - alone) * ghosts_each // _GHOSTS_A_CHUNK))
     rest = [items[alone + c :: chunks] for c in range(chunks)]
     totals: list[Plane | None] = [None] * DETAILS

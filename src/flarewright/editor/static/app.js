@@ -101,10 +101,15 @@ const fold = button('', () => { shut = !shut; localStorage.setItem('section', sh
 function folded() { $('section').classList.toggle('shut', shut); fold.textContent = shut ? 'show section' : 'hide'; app.view.redraw(); }
 const drawSection = latest(async () => {
   if (!app.state) return;
-  told.replaceChildren(...facts(app.state));
-  if (shut) return;
-  const answer = await fetch(`/api/section${app.ghost ? `?ghost=${encodeURIComponent(app.ghost)}` : ''}`);
-  if (answer.ok) { drawing.innerHTML = await answer.text(); trim(drawing.firstElementChild); }
+  if (shut) { told.replaceChildren(...facts(app.state)); return; }
+  const { ghost } = app;
+  const answer = await fetch(`/api/section${ghost ? `?ghost=${encodeURIComponent(ghost)}` : ''}`);
+  // a lens that makes no image keeps the drawing of before
+  if (!answer.ok) { told.replaceChildren(...facts(app.state)); return; }
+  const found = await answer.json();
+  drawing.innerHTML = found.svg;
+  trim(drawing.firstElementChild);
+  told.replaceChildren(...facts(app.state), ...(ghost ? [h('span', {}, found.told ? 'ghost ' : 'rays of ghost ', h('b', {}, ghost), found.told ? `: ${found.told}` : '')] : []));
 });
 // The drawing's own headline and foot stand in the head of this strip already.
 function trim(svg) {
@@ -127,8 +132,7 @@ function trim(svg) {
 export function facts(state) {
   const { facts: f, name } = state.lens;
   const say = (label, value, digits, unit = '') => (value === undefined ? [] : [h('span', {}, `${label} `, h('b', {}, `${Number(value.toPrecision(digits))}${unit}`))]);
-  return [h('b', {}, name), ...say('focal length', f.efl, 5, ' mm'), ...say('f/', f.f_number, 3), ...say('back focus', f.bfl, 5, ' mm'),
-    ...(app.ghost ? [h('span', {}, 'rays of ghost ', h('b', {}, app.ghost))] : [])];
+  return [h('b', {}, name), ...say('focal length', f.efl, 5, ' mm'), ...say('f/', f.f_number, 3), ...say('back focus', f.bfl, 5, ' mm')];
 }
 
 // ------------------------------------------------------------------------------------------------------------- header

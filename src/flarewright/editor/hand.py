@@ -1,0 +1,126 @@
+"""Pictures of a hand that moves a light, or of a path that is played: as sharp as there is time for."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..model import Project
+from ..render.display import view_sum
+from ..render.moving import Sheet, Still, moving_picture
+from . import studio
+from .screen import Screen, pixels_of_picture
+from .shown import jpeg
+from .studio import Picture
+from .view import View
+
+# sides of a picture as parts of the viewport's, and the time that one may take
+SCALES = (1.0, 2.0 / 3.0, 0.5)
+SLOW_S, FAST_S = 0.04, 0.024
+# so many in a row decide: one that another program delayed does not
+STEADY = 4
+QUALITY = 80
+
+
+@dataclass(frozen=True)
+class Moved:
+    """A picture of a project that nobody has kept yet.
+
+    Attributes
+    ----------
+    project : Project
+    jpeg : bytes
+    seconds : float
+        It took.
+    """
+
+    project: Project
+    jpeg: bytes
+    seconds: float
+
+
+class Hand:
+    """Draws what the hand does, one picture after the other.
+
+    Parameters
+    ----------
+    screen : Screen
+    """
+
+    def __init__(self, screen: Screen) -> None:
+        self.screen = screen
+        self._one = threading.Lock()
+        self._scale = 0
+        self._leaning = 0
+        self._sheet: Sheet | None = None
+
+    def picture(self, moved: Callable[[Project], Project], revision: int) -> Moved | None:
+        """Draw the project as the hand has it.
+
+        Parameters
+        ----------
+        moved : callable
+            What the hand does to the project.
+        revision : int
+            Of the session that the hand sees.
+
+        Returns
+        -------
+        Moved or None
+            None where the hand has let go already.
+        """
+        session = self.screen.session
+        # the final picture of a place that the hand has left is of no use
+        if not self.screen.interrupt(revision):
+            return None
+        with self._one:
+            if revision != session.revision:
+                return None
+            begun = time.perf_counter()
+            project = moved(session.project)
+            drawn = self._drawn(project, session.view)
+            self._lean(time.perf_counter() - begun)
+        # the next one is drawn while this one is packed
+        data = jpeg(self._pixels(drawn), QUALITY)
+        return Moved(project, data, time.perf_counter() - begun)
+
+    def prepare(self) -> None:
+        """Draw once what all pictures of a hand share, before it moves."""
+        with self._one:
+            self._drawn(self.screen.session.project, self.screen.session.view)
+
+    def _drawn(self, project: Project, view: View) -> Picture | Still:
+        scale, levels = SCALES[self._scale], self.screen.match.levels
+        if not view.grey and not view.unclipped:
+            still = moving_picture(studio.moving_stage(project, scale, levels), self._sheet)
+            if still is not None:
+                self._sheet = still.sheet
+                return still
+        return studio.take(project, "moving", view, scale=scale, levels=levels)
+
+    def _pixels(self, drawn: Picture | Still) -> NDArray[np.uint8]:
+        screen = self.screen
+        view = screen.session.view
+        if isinstance(drawn, Picture):
+            return pixels_of_picture(screen, drawn)
+        if view.look == "srgb" and view.plate is None:
+            gain = screen.match.gain
+            return view_sum(
+                drawn.ghosts, drawn.sheet.pixels, screen.exposure_stops, ghost_gain=gain, rest_gain=drawn.gain,
+                corner=drawn.corner,
+            )  # fmt: skip
+        return pixels_of_picture(screen, Picture(screen.session.project, "moving", drawn.ghosts, drawn.rest, 0.0))
+
+    def _lean(self, seconds: float) -> None:
+        """Draw smaller where pictures take too long again and again, larger where there is time."""
+        slow, fast = seconds > SLOW_S, seconds < FAST_S
+        self._leaning = max(self._leaning, 0) + 1 if slow else min(self._leaning, 0) - 1 if fast else 0
+        if self._leaning >= STEADY and self._scale + 1 < len(SCALES):
+            self._scale, self._leaning = self._scale + 1, 0
+        elif self._leaning <= -STEADY and self._scale > 0:
+            self._scale, self._leaning = self._scale - 1, 0
