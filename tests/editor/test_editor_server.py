@@ -83,7 +83,7 @@ def test_the_page_and_every_question_it_asks(desk):
     assert len(told(desk, "/api/library")[1]["lenses"]) >= 12
     assert told(desk, "/api/ghosts")[1]["ghosts"][0]["share"] == 1.0
     spoken = {path.split("?")[0] for path in asked} | {"/api/state", "/api/pick", "/api/places", "/api/glasses"}
-    spoken |= {"/api/library", "/api/ghosts", "/api/command"}
+    spoken |= {"/api/library", "/api/ghosts", "/api/command", "/api/section"}
     missing = {path for path in _GET if "{" not in path} - spoken
     assert not missing
 
