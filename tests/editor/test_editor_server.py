@@ -12,8 +12,9 @@ pytest.importorskip("starlette", reason="the extra ui is not installed")
 pytest.importorskip("uvicorn", reason="the extra ui is not installed")
 
 from flarewright.cli.app import run
+from flarewright.editor.desk import Desk
 from flarewright.editor.guard import Guard
-from flarewright.editor.server import _GET, _POST, Desk, make_app
+from flarewright.editor.server import _GET, _POST, make_app
 from flarewright.editor.session import begin
 from flarewright.io.lens_file import read_lens
 

@@ -90,7 +90,7 @@ def test_a_session_goes_on_where_it_was_cut_off(project):
     session.do("move_light", {"light": 0, "x": 3.0, "y": 2.0})
     session.do("set_iris", {"values": {"blades": 8}})
     session.set_view({"look": "filmic"})
-    session.flush()
+    session.keeper.close()
     # the process is killed here: nothing of it is asked again
     again, told = begin(None)
     assert again.history == session.history
@@ -105,14 +105,14 @@ def test_saving_makes_the_autosave_clean_and_the_file_wins(project, tmp_path):
     session, _ = begin("tessar-brendel")
     session.do("move_light", {"light": 0, "x": 4.0, "y": 2.0})
     path = session.save(str(tmp_path / "shot"))
-    session.flush()
+    session.keeper.close()
     assert path.name == "shot.toml"
     assert read_project(path) == session.project
     again, _ = begin(str(path))
     assert again.project == session.project
     assert again.clean
     again.do("move_light", {"light": 0, "x": 9.0, "y": 2.0})
-    again.flush()
+    again.keeper.close()
     third, _ = begin(str(path))
     assert third.project.lights[0].field_deg == (9.0, 2.0)
     assert third.file == str(path)
@@ -122,8 +122,9 @@ def test_without_a_name_the_last_file_is_opened_again(tmp_path):
     session, _ = begin(None)
     session.do("move_light", {"light": 0, "x": 4.0, "y": 2.0})
     path = session.save(str(tmp_path / "shot.toml"))
-    session.flush()
+    session.keeper.close()
     again, _ = begin(None)
+    again.keeper.close()
     assert (again.file, again.project, again.history.undo_label) == (str(path), session.project, "Move the light")
     path.write_text(path.read_text().replace("f_number = 16.0", "f_number = 11.0"))
     changed, _ = begin(None)
@@ -158,7 +159,7 @@ def test_every_deed_is_tried_here():
         "move_light set_light add_light remove_light set_camera set_quality set_fields set_iris set_dirt set_starburst "
         "set_pass_gain set_coating set_row_wavelengths set_cell add_row duplicate_row remove_row move_stop choose_lens "
         "set_lens_facts set_ghost set_solo reset_art set_wish add_ghost remove_wish set_new_wish set_design "
-        "clear_wishes"
+        "clear_wishes set_key move_key remove_key clear_keys go_to set_holdout"
     )
     assert sorted(tried.split()) == sorted(DEEDS)
 

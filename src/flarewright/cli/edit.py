@@ -38,7 +38,8 @@ def edit(
     if token is not None and len(token) < 8:
         raise ProjectError("--token is too short to keep anyone out; give at least 8 characters")
     try:
-        from ..editor.server import Desk, serve
+        from ..editor.desk import Desk
+        from ..editor.server import serve
     except ModuleNotFoundError as error:
         if (error.name or "").split(".")[0] not in ("starlette", "uvicorn", "websockets"):
             raise

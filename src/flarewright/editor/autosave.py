@@ -54,10 +54,13 @@ def state_folder() -> Path:
     return Path(os.environ.get("XDG_STATE_HOME", str(Path.home() / ".local" / "state"))) / "flarewright"
 
 
-def autosave_path(what: str | None) -> Path:
-    """Return the autosave of a project file or a lens; None: of the session without either."""
+def autosave_path(what: str | None, number: int = 1) -> Path:
+    """Return the autosave of a project file or a lens; None: of the session without either.
+
+    `number` counts the editors that have it open at once.
+    """
     name = "session" if what is None else hashlib.sha256(what.encode()).hexdigest()[:16]
-    return state_folder() / f"{name}.autosave.json"
+    return state_folder() / f"{name}{'' if number == 1 else f'-{number}'}.autosave.json"
 
 
 def write_autosave(path: Path, saved: Saved) -> None:

@@ -9,7 +9,7 @@ from pydantic import ValidationError
 
 from ..errors import FlarewrightError, ProjectError
 from ..model import Project
-from . import edit_ghosts, edit_lens, edit_shot, edit_wishes
+from . import edit_ghosts, edit_lens, edit_path, edit_shot, edit_wishes
 
 Deed = Callable[..., Project]
 
@@ -18,6 +18,12 @@ DEEDS: dict[str, tuple[str, Deed]] = {
     "set_light": ("Change the light", edit_shot.set_light),
     "add_light": ("Add a light", edit_shot.add_light),
     "remove_light": ("Remove a light", edit_shot.remove_light),
+    "set_key": ("Key the light", edit_path.set_key),
+    "move_key": ("Move a key", edit_path.move_key),
+    "remove_key": ("Remove a key", edit_path.remove_key),
+    "clear_keys": ("Remove the path", edit_path.clear_keys),
+    "go_to": ("Go along the path", edit_path.go_to),
+    "set_holdout": ("Change what hides the lights", edit_shot.set_holdout),
     "set_camera": ("Change the camera", edit_shot.set_camera),
     "set_quality": ("Change the quality", edit_shot.set_quality),
     "set_fields": ("Change the opening", edit_shot.set_fields),

@@ -251,7 +251,10 @@ def choose_lens(project: Project, lens: str | Lens) -> Project:
     except FlarewrightError:
         old = efl
     lights = tuple(
-        light.replace(field_deg=tuple(_kept_place(angle, old / efl) for angle in light.field_deg))
+        light.replace(
+            field_deg=_kept_angles(light.field_deg, old / efl),
+            keyframes=tuple(k.replace(field_deg=_kept_angles(k.field_deg, old / efl)) for k in light.keyframes),
+        )
         for light in project.lights
     )
     stopped = None if project.f_number is None else max(project.f_number, known.f_number)
@@ -269,8 +272,8 @@ def first_coating(lens: Lens) -> CoatingChoice:
     return AsLens() if name is None else Preset(name=name)
 
 
-def _kept_place(angle_deg: float, zoom: float) -> float:
-    return round(degrees(atan(tan(radians(angle_deg)) * zoom)), 4)
+def _kept_angles(field_deg: tuple[float, float], zoom: float) -> tuple[float, ...]:
+    return tuple(round(degrees(atan(tan(radians(angle)) * zoom)), 4) for angle in field_deg)
 
 
 def set_lens_facts(project: Project, values: dict[str, Any]) -> Project:

@@ -7,7 +7,7 @@ from typing import Any
 from ..errors import ProjectError
 from ..io.project_file import parse_coating_choice
 from ..io.spectrum_text import parse_spectrum
-from ..model import BlackBody, Everywhere, Light, PerRow, Project, QuarterWave, Surface
+from ..model import BlackBody, Everywhere, Holdout, Light, PerRow, Project, QuarterWave, Surface
 from ..render.prepare import as_lens, settle
 
 # a drag goes no further out than this: beyond it a flat picture has no place for the light
@@ -77,6 +77,35 @@ def set_iris(project: Project, values: dict[str, Any]) -> Project:
         # the slider passes over numbers that no iris has
         changes["blades"] = 3 if iris.blades < 3 else 0
     return _with(project, iris=iris.replace(**changes))
+
+
+def set_holdout(project: Project, light: int | None, values: dict[str, Any] | None) -> Project:
+    """Change what hides all lights, or one light more; None takes it away.
+
+    Parameters
+    ----------
+    project : Project
+    light : int or None
+        None: all of them.
+    values : dict or None
+        Fields of `Holdout`; an image takes the place of a depth plate, and the other way round.
+
+    Returns
+    -------
+    Project
+    """
+    if light is not None and not 0 <= light < len(project.lights):
+        raise ProjectError(f"there is no light {light}; they count from 0 to {len(project.lights) - 1}")
+    old = project.holdout if light is None else project.lights[light].holdout
+    new: Holdout | None = None
+    if values is not None:
+        changes = dict(values)
+        if changes.get("image"):
+            changes["depth"] = None
+        elif changes.get("depth"):
+            changes |= {"image": None, "invert": False}
+        new = Holdout(**changes) if old is None else old.replace(**changes)
+    return _with(project, holdout=new) if light is None else set_light(project, light, {"holdout": new})
 
 
 def set_dirt(project: Project, values: dict[str, Any]) -> Project:

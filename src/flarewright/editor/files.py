@@ -161,6 +161,14 @@ def _write_bytes(path: Path, data: bytes) -> None:
     path.write_bytes(data)
 
 
+def project_path(text: str) -> Path:
+    """Return the project file that a person means; `.toml` is added where it is missing."""
+    if not text.strip():
+        raise OutputError("the project needs a file name, like shot.toml")
+    path = Path(text.strip()).expanduser()
+    return (path if path.suffix.lower() == ".toml" else path.with_name(f"{path.name}.toml")).resolve()
+
+
 def save_project(project: Project, text: str) -> Path:
     """Write a project file.
 
@@ -179,14 +187,10 @@ def save_project(project: Project, text: str) -> Path:
     OutputError
         It cannot be written.
     """
-    if not text.strip():
-        raise OutputError("the project needs a file name, like shot.toml")
-    path = Path(text.strip()).expanduser()
-    if path.suffix.lower() != ".toml":
-        path = path.with_name(f"{path.name}.toml")
-    written = project_text(project, folder=path.resolve().parent)
+    path = project_path(text)
+    written = project_text(project, folder=path.parent)
     write_atomically(path, lambda temporary: _write_bytes(temporary, written.encode()))
-    return path.resolve()
+    return path
 
 
 def command_line(file: str, project: Project) -> str:

@@ -60,7 +60,7 @@ class Screen:
             return
         project, view = self.session.project, self.session.view
         wanted = (
-            project,
+            studio.pictured(project),
             view.replace(exposure_stops=None, found_stops=None, look="srgb", plate=None, plate_stops=0.0),
         )
         if wanted == self._busy and not self.problem:

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import asyncio
 import json
 import tempfile
 from collections.abc import Awaitable, Callable
-from functools import wraps
+from functools import partial, wraps
 from pathlib import Path
 from typing import Any
 
@@ -17,28 +16,22 @@ from starlette.requests import Request
 from starlette.responses import FileResponse, JSONResponse, Response
 from starlette.routing import Mount, Route, WebSocketRoute
 from starlette.staticfiles import StaticFiles
-from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from ..errors import FlarewrightError, ProjectError
+from ..model import Project
 from . import drawings, files, viewing
-from .autosave import state_folder
-from .edit_lens import choose_lens
+from .desk import Desk
+from .edit_path import go_to
 from .edit_shot import move_light
 from .guard import Application, Guard
-from .hand import Hand
-from .screen import Screen
-from .session import Session
-from .shown import plate_for
-from .snapshot import ghosts_of, picture_of, solve_of, state_of
-from .solving import Solver
-from .view import View
+from .imports import take_in
+from .snapshot import ghosts_of
 
 STATIC = Path(__file__).parent / "static"
-MOST_BYTES = 256 * 2**20
 MOST_SECONDS = 3600.0
 
 Answer = Callable[[Request], Awaitable[Response]]
-Work = Callable[["Desk", Request, Any], Any]
+Work = Callable[[Desk, Request, Any], Any]
 
 
 def told(work: Work) -> Callable[[Desk], Answer]:
@@ -65,63 +58,6 @@ def told(work: Work) -> Callable[[Desk], Answer]:
         return answer
 
     return bind
-
-
-class Desk:
-    """A session with its screen and its solver, and the tabs that look at it."""
-
-    def __init__(self, session: Session, greeting: str = "") -> None:
-        self.session, self.greeting = session, greeting
-        self.screen, self.solver = Screen(session), Solver(session)
-        self.hand = Hand(self.screen)
-        self.screen.idle = self.hand.prepare
-        self._tabs: set[asyncio.Queue[dict[str, Any]]] = set()
-        self._loop: asyncio.AbstractEventLoop | None = None
-        session.listeners.append(self._heard)
-
-    def _heard(self, event: dict[str, Any]) -> None:
-        """Pass on what happens, from whichever thread, to all tabs."""
-        kind = event["type"]
-        if kind == "changed":
-            event = {"type": kind, "revision": self.session.revision}
-        elif kind == "picture":
-            event = {"type": kind, **picture_of(self.screen)}
-        elif kind == "solve":
-            event = {"type": kind, **solve_of(self.solver)}
-        if self._loop is not None and not self._loop.is_closed():
-            self._loop.call_soon_threadsafe(self._post, event)
-
-    def _post(self, event: dict[str, Any]) -> None:
-        for tab in self._tabs:
-            tab.put_nowait(event)
-
-    async def socket(self, socket: WebSocket) -> None:
-        """Tell a tab what happens for as long as it is open."""
-        self._loop = asyncio.get_running_loop()
-        await socket.accept()
-        tab: asyncio.Queue[dict[str, Any]] = asyncio.Queue()
-        self._tabs.add(tab)
-        if self.greeting:
-            tab.put_nowait({"type": "message", "kind": "info", "text": self.greeting})
-            self.greeting = ""
-        sender = asyncio.create_task(_send(socket, tab))
-        try:
-            while True:
-                await socket.receive_text()
-        except WebSocketDisconnect:
-            pass
-        finally:
-            self._tabs.discard(tab)
-            sender.cancel()
-
-    def state(self) -> dict[str, Any]:
-        """Return what the page is made of."""
-        return state_of(self.screen, self.solver)
-
-
-async def _send(socket: WebSocket, tab: asyncio.Queue[dict[str, Any]]) -> None:
-    while True:
-        await socket.send_text(json.dumps(await tab.get()))
 
 
 def _state(desk: Desk, _request: Request, _body: Any) -> Any:
@@ -162,13 +98,19 @@ def _picture(desk: Desk, _request: Request, _body: Any) -> Any:
 
 
 def _moving(desk: Desk, request: Request, _body: Any) -> Any:
+    """Draw the project with a light elsewhere, or at a time of its path."""
     asked = request.query_params
     revision = int(asked.get("revision", desk.session.revision))
-    light, x, y = int(asked["light"]), float(asked["x"]), float(asked["y"])
-    found = desk.hand.picture(lambda project: move_light(project, light, x, y), revision)
+    moved: Callable[[Project], Project]
+    if "at" in asked:
+        moved = partial(go_to, at_s=float(asked["at"]))
+    else:
+        moved = partial(move_light, light=int(asked["light"]), x=float(asked["x"]), y=float(asked["y"]))
+    found = desk.hand.picture(moved, revision)
     if found is None:
         return Response(status_code=204)
-    return _jpeg(found.jpeg, {"X-Seconds": f"{found.seconds:.4f}"})
+    places = [light.field_deg for light in found.project.lights]
+    return _jpeg(found.jpeg, {"X-Seconds": f"{found.seconds:.4f}", "X-Lights": json.dumps(places)})
 
 
 def _target(desk: Desk, _request: Request, _body: Any) -> Any:
@@ -228,26 +170,10 @@ def _glasses(_desk: Desk, request: Request, _body: Any) -> Any:
 
 
 def _import(desk: Desk, request: Request, body: Any) -> Any:
-    name = request.query_params["name"]
-    if len(body) > MOST_BYTES:
-        raise ProjectError(f"{name} is larger than {MOST_BYTES // 2**20} MB, which no lens or background is")
-    kept = state_folder() / "imports"
-    found = files.imported(name, body, kept)
-    if (picture := found.picture) is not None:
-        if request.query_params.get("as") == "mask":
-            from ..io.mask_image import read_mask
-
-            read_mask(picture)
-            desk.session.do("set_iris", {"mask": picture})
-        else:
-            # what is no picture is refused here, not when it is shown
-            plate_for(View(plate=picture), (16, 16))
-            desk.session.set_view({"plate": picture})
-    elif found.project is not None:
-        desk.session.put(found.project, f"Import {name}")
-    elif found.lens is not None:
-        desk.session.put(choose_lens(desk.session.project, found.lens), f"Import {name}")
-    return desk.state() | {"told": list(found.remarks)}
+    asked = request.query_params
+    light = int(asked["light"]) if asked.get("light") else None
+    remarks = take_in(desk.session, asked["name"], body, asked.get("as", ""), light)
+    return desk.state() | {"told": list(remarks)}
 
 
 def _open(desk: Desk, _request: Request, body: Any) -> Any:
@@ -417,4 +343,4 @@ def serve(desk: Desk, host: str, port: int, token: str | None, ready: Callable[[
         config = uvicorn.Config(make_app(desk, token), log_level="warning", lifespan="off", ws="websockets-sansio")
         ready(place.getsockname()[1])
         uvicorn.Server(config).run([place])
-    desk.session.flush()
+    desk.session.keeper.close()

@@ -10,14 +10,14 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from ..errors import FlarewrightError, ProjectError
+from ..errors import ProjectError
 from ..model import Project
 from . import history as past
-from .autosave import Saved, autosave_path, read_autosave, write_autosave
+from .autosave import Saved, autosave_path, read_autosave
 from .deeds import done
 from .edit_lens import sentence
-from .files import open_any, sample_project, save_project
-from .jobs import Lane
+from .files import open_any, project_path, sample_project, save_project
+from .keeper import Keeper, claim
 from .view import View
 
 Listener = Callable[[dict[str, Any]], None]
@@ -29,18 +29,18 @@ class Session:
     Parameters
     ----------
     saved : Saved
-    keep : Path
-        The autosave.
+    keeper : Keeper
+        Of the autosave.
     """
 
-    def __init__(self, saved: Saved, keep: Path) -> None:
+    def __init__(self, saved: Saved, keeper: Keeper) -> None:
         self.lock = threading.RLock()
         self.history, self.view, self.file = saved.history, saved.view, saved.file
         self.clean = saved.clean
         self.revision = 0
         self.listeners: list[Listener] = []
-        self._keep = keep
-        self._saver = Lane("autosave")
+        self.keeper = keeper
+        self._stamp = _changed_ns(self.file)
 
     @property
     def project(self) -> Project:
@@ -89,10 +89,24 @@ class Session:
             self._keep_it()
 
     def save(self, text: str) -> Path:
-        """Write the project file and go on with it."""
+        """Write the project file and go on with it.
+
+        Raises
+        ------
+        FlarewrightError
+            It cannot be written, or another program has changed it since it was read; then the next try overwrites.
+        """
         with self.lock:
+            place = project_path(text)
+            if str(place) == self.file and (now := _changed_ns(self.file)) not in (None, self._stamp):
+                self._stamp = now
+                raise ProjectError(
+                    f"{place.name} was changed by another program since it was opened here; save again to overwrite "
+                    "it, or save under another name"
+                )
             path = save_project(self.project, text)
             self.file, self.clean = str(path), True
+            self._stamp = _changed_ns(self.file)
             self._changed()
             return path
 
@@ -102,11 +116,8 @@ class Session:
             project, file = open_any(text)
             self.history = past.committed(self.history, project, f"Open {Path(text).name}")
             self.file, self.clean = file, file is not None
+            self._stamp = _changed_ns(file)
             self._changed()
-
-    def flush(self, timeout_s: float = 5.0) -> None:
-        """Wait until the autosave is written."""
-        self._saver.wait(timeout_s)
 
     def _move(self, history: past.History) -> None:
         if history is not self.history and history != self.history:
@@ -120,13 +131,16 @@ class Session:
 
     def _keep_it(self) -> None:
         saved = Saved(self.history, self.view, self.file, self.clean)
-        self._saver.submit(lambda _: self._autosave(saved))
+        warning = {"type": "message", "kind": "warning"}
+        self.keeper.keep(saved, lambda why: self.tell(warning | {"text": f"The autosave failed: {why}"}))
 
-    def _autosave(self, saved: Saved) -> None:
-        try:
-            write_autosave(self._keep, saved)
-        except (FlarewrightError, OSError) as error:
-            self.tell({"type": "message", "kind": "warning", "text": f"The autosave failed: {error}"})
+
+def _changed_ns(file: str | None) -> int | None:
+    """Return when a file was last changed; None where there is none."""
+    try:
+        return None if file is None else Path(file).stat().st_mtime_ns
+    except OSError:
+        return None
 
 
 def begin(what: str | None) -> tuple[Session, str]:
@@ -150,16 +164,26 @@ def begin(what: str | None) -> tuple[Session, str]:
     """
     given: tuple[Project, str | None] | None = None if what is None else open_any(what)
     key = None if what is None else str(Path(what).resolve()) if Path(what).exists() else what
-    keep = autosave_path(key)
-    saved = read_autosave(keep)
+    keeper = claim(key)
+    saved = read_autosave(keeper.path)
+    if saved is None and what is None and keeper.number > 1:
+        # an editor beside another one begins with what that one shows
+        saved = read_autosave(autosave_path(None))
+    session, told = _begun(saved, given, keeper)
+    if keeper.number > 1:
+        told = f"Another editor has this open too; this one keeps an autosave of its own. {told}".strip()
+    return session, told
+
+
+def _begun(saved: Saved | None, given: tuple[Project, str | None] | None, keeper: Keeper) -> tuple[Session, str]:
     if saved is not None and not saved.clean and (given is None or given[0] != saved.history.present):
         told = "Went on where the last session ended; undo leads back." if len(saved.history.moments) > 1 else ""
-        return Session(saved, keep), told
+        return Session(saved, keeper), told
     if given is None and saved is not None and saved.file is not None and Path(saved.file).is_file():
         # what was saved may have been changed by other programs since
         project, file = open_any(saved.file)
-        return Session(replace(saved, history=past.committed(saved.history, project, "Open")), keep), ""
+        return Session(replace(saved, history=past.committed(saved.history, project, "Open")), keeper), ""
     project, file = (sample_project(), None) if given is None else given
     view = View() if saved is None else saved.view.replace(found_stops=None)
     fresh = Saved(past.begun(project), view, file, clean=file is not None)
-    return Session(fresh, keep), ""
+    return Session(fresh, keeper), ""

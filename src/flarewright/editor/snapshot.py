@@ -10,12 +10,13 @@ from ..model import Project
 from ..render.prepare import as_lens
 from .edit_ghosts import hand, soloed
 from .edit_lens import prescription
+from .edit_path import length_s
 from .edit_shot import coating_text
 from .edit_wishes import direction
 from .screen import Screen
 from .shown import aces_available
 from .solving import Solver
-from .studio import view_size
+from .studio import pictured, view_size
 
 
 def state_of(screen: Screen, solver: Solver) -> dict[str, Any]:
@@ -48,6 +49,8 @@ def state_of(screen: Screen, solver: Solver) -> dict[str, Any]:
         "iris": _iris(project),
         "dirt": project.dirt.model_dump(mode="json"),
         "starburst": project.starburst.model_dump(mode="json"),
+        "holdout": None if project.holdout is None else project.holdout.model_dump(mode="json"),
+        "path_s": length_s(project),
         "coating": coating_text(project),
         "quality": project.quality.model_dump(mode="json"),
         "pass_gain": dict(project.art.gain),
@@ -72,7 +75,7 @@ def _picture(screen: Screen) -> dict[str, Any]:
         "seconds": 0.0 if shown is None else round(shown.seconds, 3),
         "problem": screen.problem,
         # whether it shows the project as it stands
-        "current": shown is not None and shown.project == screen.session.project,
+        "current": shown is not None and pictured(shown.project) == pictured(screen.session.project),
     }
 
 
@@ -112,6 +115,8 @@ def _light(project: Project, k: int) -> dict[str, Any]:
         "name": light.name, "field_deg": list(light.field_deg), "intensity": light.intensity,
         "spectrum": spectrum_text(light.spectrum) or light.spectrum.kind, "diameter_deg": light.diameter_deg,
         "distance": light.distance, "shape": None if light.shape is None else light.shape.kind,
+        "keys": [{"at_s": key.at_s, "field_deg": list(key.field_deg)} for key in light.keyframes],
+        "holdout": None if light.holdout is None else light.holdout.model_dump(mode="json"),
     }  # fmt: skip
 
 
@@ -147,4 +152,4 @@ def ghosts_of(screen: Screen) -> dict[str, Any]:
                 "centre": list(ghost.centre), "muted": mine.muted, "gain": mine.gain, "tint": list(mine.tint),
             }
         )  # fmt: skip
-    return {"fresh": seen.project == project, "ghosts": rows}
+    return {"fresh": pictured(seen.project) == pictured(project), "ghosts": rows}

@@ -264,6 +264,13 @@ def lens_name(project: Project) -> str:
     return lens.name
 
 
+def pictured(project: Project) -> Project:
+    """Return what of a project its picture shows: neither what is wished for, nor the paths of its lights."""
+    lights = tuple(light.replace(keyframes=()) if light.keyframes else light for light in project.lights)
+    found: Project = project.replace(lights=lights, design=None)
+    return found
+
+
 def same_scene(one: Project, other: Project) -> bool:
     """Tell whether two projects differ by their lights, art and design alone, so that they have the same ghosts."""
     kept = other.replace(lights=one.lights, art=one.art, design=one.design, quality=one.quality)

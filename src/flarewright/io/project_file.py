@@ -349,6 +349,7 @@ _SECTIONS: Sections = {
     "quality": (Quality,),
     "output": (Output,),
     "lights": (lights.Light,),
+    "keyframes": (lights.LightKey,),
     "shape": (lights.Rectangle, lights.Polygon),
     "filter": (Plate,),
     "cover_glass": (Plate,),

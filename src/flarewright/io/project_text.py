@@ -143,6 +143,8 @@ def project_text(project: Project, *, folder: Path | None = None, comments: bool
         data["design"] = _without_none(project.design.model_dump(mode="json", exclude_defaults=True))
     for written, light in zip(data["lights"], project.lights, strict=True):
         written["spectrum"] = spectrum_text(light.spectrum) or written["spectrum"]
+        if not light.keyframes:
+            del written["keyframes"]
     nothing = _left_out(project) if comments else {}
     out: list[str] = []
     _emit_table(out, data, (), nothing, ABOUT if comments else {})

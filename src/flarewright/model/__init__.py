@@ -12,7 +12,7 @@ from .imperfection import Imperfection
 from .iris import Iris
 from .layer import Layer
 from .lens import Element, Lens, Position, Row, Stop, Surface
-from .light import D65, BlackBody, EqualEnergy, Light, Lines, Polygon, Rectangle, Rgb, Spectrum, Tabulated
+from .light import D65, BlackBody, EqualEnergy, Light, LightKey, Lines, Polygon, Rectangle, Rgb, Spectrum, Tabulated
 from .plate import Plate
 from .project import AsLens, CoatingChoice, Everywhere, Output, PerRow, Preset, Project, Quality
 from .scatter import RowScatter, Scatter
@@ -43,6 +43,7 @@ __all__ = [
     "Layer",
     "Lens",
     "Light",
+    "LightKey",
     "Lines",
     "Medium",
     "Output",

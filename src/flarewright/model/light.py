@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
@@ -105,7 +106,19 @@ class Polygon(Frozen):
     corners_deg: tuple[tuple[float, float], ...] = Field(min_length=3, max_length=256)
 
 
+FieldAngles = tuple[
+    Annotated[float, Field(gt=-90.0, lt=90.0)],
+    Annotated[float, Field(gt=-90.0, lt=90.0)],
+]
+
 Shape = Annotated[Rectangle | Polygon, Field(discriminator="kind")]
+
+
+class LightKey(Frozen):
+    """Where a light stands at one time, seconds."""
+
+    at_s: float = Field(ge=0.0, le=86400.0)
+    field_deg: FieldAngles
 
 
 class Light(Frozen):
@@ -129,22 +142,26 @@ class Light(Frozen):
         What else the light is than a point or a disc. Its radiance is even, and `intensity` is all of it together.
     holdout : Holdout or None
         What hides this light, besides the project's.
+    keyframes : tuple of LightKey
+        A path that the editor plays: rising in time, straight lines in field angles between. A render draws the light
+        where `field_deg` says.
     """
 
     name: str = "light"
-    field_deg: tuple[
-        Annotated[float, Field(gt=-90.0, lt=90.0)],
-        Annotated[float, Field(gt=-90.0, lt=90.0)],
-    ]
+    field_deg: FieldAngles
     distance: float | None = Field(None, gt=0.0, le=1e9)
     intensity: float = Field(1.0, ge=0.0)
     spectrum: Spectrum = D65()
     diameter_deg: float = Field(0.0, ge=0.0, le=60.0)
     shape: Shape | None = None
     holdout: Holdout | None = None
+    keyframes: tuple[LightKey, ...] = Field((), max_length=1000)
 
     @model_validator(mode="after")
     def _one_shape(self) -> Light:
+        for before, after in pairwise(key.at_s for key in self.keyframes):
+            if after <= before:
+                raise ValueError(f"keyframes must rise in time: {after:g} s follows {before:g} s")
         if self.shape is not None and self.diameter_deg > 0.0:
             raise ValueError("a light is a disc (diameter_deg) or has a shape, not both; keep one")
         return self

@@ -220,7 +220,7 @@ def _fingerprints(settled: Settled, shots: Sequence[Shot], rays: ReferenceRays) 
         "lens": [settled.lens.model_dump(mode="json"), settled.order.stop_semi_diameter, packed.sensor_z],
         "iris": [settled.iris.model_dump(mode="json", exclude={"mask"}), _digest(opening.mask)],
         "coating": project.coating.model_dump(mode="json"),
-        "light": [light.model_dump(mode="json", exclude={"holdout"}) for light in project.lights],
+        "light": [light.model_dump(mode="json", exclude={"holdout", "keyframes"}) for light in project.lights],
         # whatever files say it
         "holdout": [[shot.light.field_deg, shot.share, _digest(shot.border)] for shot in shots] if hidden else None,
         "picture": [project.camera.size_px, project.camera.sensor, project.output.colorspace],

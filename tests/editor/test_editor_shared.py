@@ -1,0 +1,139 @@
+"""The path of a light, what hides lights, chosen pictures, and two editors beside each other; without a browser."""
+
+import numpy as np
+import pytest
+
+from flarewright.editor.deeds import done
+from flarewright.editor.edit_path import length_s
+from flarewright.editor.imports import take_in
+from flarewright.editor.session import begin
+from flarewright.editor.shown import png
+from flarewright.editor.studio import pictured
+from flarewright.errors import FlarewrightError, ProjectError
+from flarewright.io.project_file import read_project
+from flarewright.model import Holdout, LightKey
+
+
+def do(project, deed, /, **values):
+    return done(project, deed, values)[0]
+
+
+def test_a_path_of_keys(project):
+    keyed = do(project, "set_key", light=0, at_s=0.0)
+    assert keyed.lights[0].keyframes == (LightKey(at_s=0.0, field_deg=(6.0, 3.0)),)
+    keyed = do(do(keyed, "move_light", light=0, x=-2.0, y=1.0), "set_key", light=0, at_s=2.0)
+    keyed = do(keyed, "set_key", light=0, at_s=3.0, field_deg=[-2.0, -3.0])
+    assert length_s(keyed) == 3.0
+    # straight lines between, and rest before and behind
+    places = {at: do(keyed, "go_to", at_s=at).lights[0].field_deg for at in (0.0, 0.5, 1.0, 2.5, 9.0)}
+    assert places == {0.0: (6.0, 3.0), 0.5: (4.0, 2.5), 1.0: (2.0, 2.0), 2.5: (-2.0, -1.0), 9.0: (-2.0, -3.0)}
+    # a key at the time of another takes its place; one that is moved keeps the order
+    again = do(keyed, "set_key", light=0, at_s=2.004)
+    assert len(again.lights[0].keyframes) == 3
+    moved = do(keyed, "move_key", light=0, number=0, at_s=2.5)
+    assert [key.at_s for key in moved.lights[0].keyframes] == [2.0, 2.5, 3.0]
+    with pytest.raises(ProjectError, match="there is a key at 2 s already"):
+        do(keyed, "move_key", light=0, number=0, at_s=2.0)
+    assert len(do(keyed, "remove_key", light=0, number=1).lights[0].keyframes) == 2
+    cleared = do(keyed, "clear_keys", light=0)
+    assert cleared.lights[0].keyframes == ()
+    # the picture is that of the light where it is; its path draws nothing
+    assert pictured(keyed) == pictured(cleared)
+    for name, values in (("set_key", {"light": 5, "at_s": 0.0}), ("remove_key", {"light": 0, "number": 3})):
+        with pytest.raises(ProjectError, match="there is no"):
+            do(keyed, name, **values)
+
+
+def test_a_path_is_kept_in_the_project_file(project, tmp_path):
+    keyed = do(do(project, "set_key", light=0, at_s=0.5), "set_key", light=0, at_s=1.5, field_deg=[1.0, 2.0])
+    session, _ = begin("tessar-brendel")
+    session.put(keyed, "Key")
+    path = session.save(str(tmp_path / "path.toml"))
+    assert "[[lights.keyframes]]" in path.read_text()
+    assert read_project(path).lights[0].keyframes == keyed.lights[0].keyframes
+    path.write_text(path.read_text().replace("at_s = 1.5", "at_s = 0.5"))
+    with pytest.raises(ProjectError, match=r"keyframes must rise in time: 0.5 s follows 0.5 s"):
+        read_project(path)
+    # another lens sees the light at the same places of the picture all the way
+    other = do(keyed, "choose_lens", lens="biotar-50-f1.4").lights[0]
+    assert other.keyframes[0].field_deg == other.field_deg
+    session.keeper.close()
+
+
+def test_what_hides_lights(project):
+    hidden = do(project, "set_holdout", light=None, values={"image": "matte.png", "invert": True})
+    assert hidden.holdout == Holdout(image="matte.png", invert=True)
+    deep = do(hidden, "set_holdout", light=None, values={"depth": "depth.exr"})
+    assert deep.holdout == Holdout(depth="depth.exr")
+    assert do(deep, "set_holdout", light=None, values={"depth_unit_mm": 1.0}).holdout.depth_unit_mm == 1.0
+    one = do(project, "set_holdout", light=0, values={"image": "leaves.png"})
+    assert one.lights[0].holdout == Holdout(image="leaves.png")
+    assert one.holdout is None
+    assert do(one, "set_holdout", light=0, values=None) == project
+    with pytest.raises(ProjectError, match="give one of them"):
+        do(project, "set_holdout", light=None, values={"invert": True})
+
+
+def test_pictures_are_taken_for_what_they_were_chosen_for(tmp_path):
+    session, _ = begin(None)
+    grey = png(np.full((8, 8, 3), 255, dtype=np.uint8))
+    take_in(session, "hole.png", grey, "mask")
+    assert session.project.iris.mask.endswith("hole.png")
+    take_in(session, "dirt.png", grey, "dirt")
+    assert session.project.dirt.image.endswith("dirt.png")
+    take_in(session, "leaves.png", grey, "image", 0)
+    assert session.project.lights[0].holdout.image.endswith("leaves.png")
+    take_in(session, "sky.png", grey)
+    assert session.view.plate.endswith("sky.png")
+    before = session.project
+    for name, data, use in (
+        ("lens.toml", b"schema_version = 1\n", "mask"), ("dark.png", png(np.zeros((8, 8, 3), np.uint8)), "mask"),
+        ("hole.png", grey, "depth"), ("broken.png", b"nothing", "image"),
+    ):  # fmt: skip
+        with pytest.raises(FlarewrightError):
+            take_in(session, name, data, use)
+    assert session.project == before
+    session.keeper.close()
+
+
+def test_two_editors_of_one_project_do_not_fight(tmp_path):
+    first, told = begin("tessar-brendel")
+    assert told == ""
+    second, told = begin("tessar-brendel")
+    assert told.startswith("Another editor has this open too")
+    assert first.keeper.path != second.keeper.path
+    first.do("set_iris", {"values": {"blades": 8}})
+    second.do("set_iris", {"values": {"blades": 5}})
+    path = first.save(str(tmp_path / "shot.toml"))
+    # the second one saved over it under the same name, which the first is told once
+    second.save(str(path))
+    first.do("set_iris", {"values": {"blades": 9}})
+    with pytest.raises(ProjectError, match=r"shot.toml was changed by another program .* save again to overwrite it"):
+        first.save(str(path))
+    assert read_project(path).iris.blades == 5
+    first.save(str(path))
+    assert read_project(path).iris.blades == 9
+    # what is not saved in a file is kept for each by itself
+    first.do("set_iris", {"values": {"blades": 11}})
+    second.do("set_iris", {"values": {"blades": 7}})
+    first.keeper.close()
+    second.keeper.close()
+    # each goes on where it was
+    again, _ = begin("tessar-brendel")
+    beside, _ = begin("tessar-brendel")
+    assert [one.history.present.iris.blades for one in (again, beside)] == [11, 7]
+    again.keeper.close()
+    beside.keeper.close()
+
+
+def test_without_a_place_for_its_state_the_editor_works_all_the_same(tmp_path, monkeypatch):
+    blocked = tmp_path / "file"
+    blocked.write_text("no folder")
+    monkeypatch.setenv("FLAREWRIGHT_STATE", str(blocked))
+    session, _ = begin(None)
+    heard = []
+    session.listeners.append(heard.append)
+    session.do("set_iris", {"values": {"blades": 8}})
+    session.keeper.close()
+    assert session.project.iris.blades == 8
+    assert any("The autosave failed" in event.get("text", "") for event in heard)
