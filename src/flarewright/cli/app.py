@@ -21,6 +21,7 @@ from . import (
     design_identify,
     design_scratch,
     design_solve,
+    design_target,
     edit,
     ghosts,
     lens_check,
@@ -84,6 +85,7 @@ scene_app.command("schema")(scene_schema.schema)
 
 design_app.command("solve", epilog=design_solve.EPILOG)(design_solve.solve)
 design_app.command("resume")(design_solve.resume)
+design_app.command("target", epilog=design_target.EPILOG)(design_target.target)
 design_app.command("scratch", epilog=design_scratch.EPILOG)(design_scratch.scratch)
 design_app.command("colors", epilog=design_colors.EPILOG)(design_colors.colors)
 design_app.command("resize")(design_edit.resize)

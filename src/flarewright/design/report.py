@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import html
+import os
 from math import atan2, cos, sin
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,8 @@ from ..errors import FlarewrightError
 from ..io.atomic import write_atomically
 from ..io.lens_writer import write_lens
 from ..io.project_file import project_text
-from ..model import Output, Project, Quality
+from ..model import AsLens, Output, Project, Quality
+from ..model.design import Design, GhostWish
 from .candidate import Outcome
 from .ghosts import evaluate
 from .impossible import Obstacle
@@ -134,12 +136,33 @@ def write_folder(
     sections: list[str] = []
     for number, one in enumerate(found, 1):
         write_lens(one.lens, folder / f"lens-{number}.toml")
+        hued = _color_project(project, problem, one, folder / f"lens-{number}.toml")
+        if hued is not None:
+            path = folder / f"lens-{number}.colors.toml"
+            _write_text(path, project_text(hued, folder=folder))
+            remarks.append(f"{path.name} wants the wished colours of lens-{number}: flarewright design colors {path}")
         pictures = found_pictures(one, problem, project)
         draft = _draft(folder / f"lens-{number}.png", one, project, remarks)
         sections.append(_section(number, one, problem, wanted, png_bytes(pictures[0]), draft))
     data = summary(state, found, problem, proven)
     _write_text(folder / "report.html", _page(data, "".join(sections), wanted))
     return remarks
+
+
+def _color_project(project: Project, problem: Problem, one: Outcome, path: Path) -> Project | None:
+    """Return a project that wants the colours of new ghosts, of the lens that makes them; None where none has any."""
+    wishes = () if project.design is None else project.design.wishes
+    found: dict[str, GhostWish] = {}
+    for name, (j, i) in zip(problem.objective.names, one.ghosts, strict=True):
+        parts = name.split()
+        color = wishes[int(parts[1])].color if parts[0] == "wish" else None
+        if color is not None:
+            found.setdefault(f"{j}-{i}", GhostWish(ghost=f"{j}-{i}", color=color))
+    if not found or project.design is None:
+        return None
+    design = Design(wishes=tuple(found.values()), bounds=project.design.bounds)
+    changed: Project = project.replace(lens=os.fspath(path), design=design, coating=AsLens(), f_number=None, zoom=None)
+    return changed
 
 
 def target_pictures(problem: Problem, project: Project) -> list[Floats]:

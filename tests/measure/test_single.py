@@ -1,0 +1,92 @@
+"""Ghosts of one picture, and of a model at one light."""
+
+import numpy as np
+import pytest
+
+from flarewright.errors import FlarewrightError
+from flarewright.measure.single import spots_of_model, spots_of_picture
+from flarewright.model.ghost_model import AberrationGhost, BezierGhost, Channel, GhostModel
+
+SIZE = (480, 320)
+AXIS = (236.0, 165.0)
+# place on the line and radius in pixels, radiance
+DISCS = ((60.0, 22.0, (1.0, 0.8, 0.5)), (-80.0, 40.0, (0.3, 0.4, 0.6)), (130.0, 9.0, (2.0, 2.0, 2.0)),
+         (10.0, 70.0, (0.2, 0.2, 0.2)))  # fmt: skip
+
+
+def picture(discs=DISCS, toward_deg=30.0, noise=0.01, seed=0):
+    """Even discs along a line, anti-aliased, with noise."""
+    x, y = np.arange(SIZE[0]) + 0.5 - AXIS[0], np.arange(SIZE[1]) + 0.5 - AXIS[1]
+    cosine, sine = np.cos(np.radians(toward_deg)), np.sin(np.radians(toward_deg))
+    out = np.random.default_rng(seed).normal(0.0, noise, (SIZE[1], SIZE[0], 3))
+    for place, radius, rgb in discs:
+        away = np.hypot(x[None, :] - place * cosine, y[:, None] + place * sine)
+        out += np.clip(radius + 0.5 - away, 0.0, 1.0)[..., None] * np.array(rgb)
+    return out.astype(np.float32)
+
+
+@pytest.mark.parametrize("toward_deg", [30.0, -135.0])
+def test_discs_along_the_line_are_found(toward_deg):
+    found = spots_of_picture(picture(toward_deg=toward_deg), AXIS, toward_deg)
+    assert len(found) == len(DISCS)
+    for place, radius, rgb in DISCS:
+        one = min(found, key=lambda spot: abs(spot.place_px - place) + abs(spot.radius_px - radius))
+        assert one.place_px == pytest.approx(place, abs=0.7)
+        assert one.radius_px == pytest.approx(radius, abs=0.7)
+        assert one.rgb == pytest.approx(rgb, rel=0.1, abs=0.02)
+
+
+def test_noise_has_no_ghosts_and_neither_has_what_lies_beside_the_line():
+    assert spots_of_picture(picture(()), AXIS, 30.0) == ()
+    assert spots_of_picture(picture(((90.0, 20.0, (1.0, 1.0, 1.0)),)), AXIS, 120.0) == ()
+
+
+def test_what_is_hidden_is_not_looked_for():
+    hidden = np.zeros((SIZE[1], SIZE[0]), bool)
+    hidden[:, 300:] = True
+    places = [one.place_px for one in spots_of_picture(picture(), AXIS, 30.0, hidden=hidden)]
+    assert all(place < 70.0 for place in places)
+    assert len(places) >= 2
+
+
+def model(*ghosts):
+    return GhostModel(
+        size_px=(600, 400), axis_px=(300.0, 200.0), focal_px=800.0, largest_deg=20.0, constellation_deg=(0.0, 20.0),
+        ghosts=ghosts,
+    )  # fmt: skip
+
+
+def aberrated(f, g, visible=(0.0, 20.0)):
+    zero = (0.0,) * 9
+    channel = Channel(f=(f, *zero), g=(g, *zero), intensity=(50.0, *zero))
+    return AberrationGhost(name="a", red=channel, green=channel, blue=channel, visible_deg=visible)
+
+
+def test_a_model_at_one_light_is_discs():
+    (one,) = spots_of_model(model(aberrated(150.0, -30.0)), 10.0)
+    s = np.tan(np.radians(10.0)) / np.tan(np.radians(20.0))
+    assert one.place_px == pytest.approx(150.0 * s)
+    assert one.radius_px == pytest.approx(30.0)
+    # a disc of pi r^2 pixels holds the pupil's 50 pi
+    assert one.rgb == pytest.approx((50.0 / 900.0,) * 3)
+    assert spots_of_model(model(aberrated(150.0, -30.0, (12.0, 20.0))), 10.0) == ()
+    with pytest.raises(FlarewrightError, match="0 to 20 degrees"):
+        spots_of_model(model(aberrated(150.0, -30.0)), 25.0)
+
+
+def test_aberrations_move_and_widen_the_disc():
+    # x = s f + p g with g = g0 + g1 u: the mean of u^2 over that of u is 2/3 on the unit disc
+    zero = (0.0,) * 8
+    channel = Channel(f=(100.0, *zero, 0.0), g=(20.0, 6.0, *zero), intensity=(1.0, *zero, 0.0))
+    ghost = AberrationGhost(name="a", red=channel, green=channel, blue=channel, visible_deg=(0.0, 20.0))
+    (one,) = spots_of_model(model(ghost), 20.0)
+    assert one.radius_px == pytest.approx(20.0 + 6.0 * 2.0 / 3.0, rel=0.01)
+    assert one.place_px == pytest.approx(100.0)
+
+
+def test_a_bezier_ghost_is_a_disc_too():
+    numbers = [0.0] * 19
+    numbers[0], numbers[2], numbers[3], numbers[4], numbers[16] = 40.0, 12.0, 10.0, 14.0, 0.5
+    ghost = BezierGhost(name="b", numbers=tuple((value,) for value in numbers), visible_deg=(0.0, 20.0))
+    (one,) = spots_of_model(model(ghost), 5.0)
+    assert (one.place_px, one.radius_px, one.rgb[0]) == pytest.approx((42.0, 12.0, 0.5))
