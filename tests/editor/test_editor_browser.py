@@ -376,3 +376,103 @@ def test_readable_at_1280x720(tab):
         assert wide[1] <= wide[2]
     bar = tab.js("[...document.getElementById('bar').children].map(e => e.getBoundingClientRect().right)")
     assert max(bar) <= 1280
+
+
+def test_a_path_is_keyed_played_and_undone(tab, tmp_path):
+    def go(at):
+        tab.page.fill("input[name=path_time]", at)
+        tab.page.press("input[name=path_time]", "Enter")
+        tab.rest()
+
+    first = tab.state()["lights"][0]["field_deg"]
+    tab.page.click("#path-key")
+    tab.until("flarewright.state.lights[0].keys.length === 1")
+    go("1")
+    tab.drag(tab.light(), tab.at(0.4, 0.6))
+    tab.rest()
+    tab.page.locator("#view").focus()
+    tab.page.keyboard.press("k")
+    tab.until("flarewright.state.lights[0].keys.length === 2")
+    last = tab.state()["lights"][0]["field_deg"]
+    steps = tab.state()["steps"]["at"]
+    # it loops, and nothing is changed until it stops
+    shown = tab.js("flarewright.view.stats.shown.length")
+    tab.page.keyboard.press("t")
+    tab.until("flarewright.view.shownGrade === 'moving'")
+    tab.page.wait_for_timeout(1600)
+    assert tab.js("flarewright.player.playing")
+    assert tab.js("flarewright.view.stats.shown.length") - shown >= 4
+    assert tab.state()["steps"]["at"] == steps
+    tab.page.keyboard.press("t")
+    tab.rest()
+    at = tab.js("flarewright.player.at")
+    wanted = [a + (b - a) * at for a, b in zip(first, last, strict=True)]
+    assert tab.state()["lights"][0]["field_deg"] == pytest.approx(wanted, abs=0.02)
+    assert tab.state()["steps"]["at"] == steps + 1
+    assert judged(tab, project_of(tab, tmp_path)) < 1.5
+    # along the path by hand: one step more of the same kind
+    bar = tab.page.locator("input[name=path_at]")
+    bar.focus()
+    bar.press("Home")
+    tab.rest()
+    assert tab.state()["lights"][0]["field_deg"] == first
+    assert tab.state()["steps"]["at"] == steps + 1
+    tab.page.locator("#view").focus()
+    tab.page.keyboard.press("Control+z")
+    tab.until(f"flarewright.state.steps.at === {steps}")
+    tab.rest()
+    assert tab.state()["lights"][0]["field_deg"] == last
+    # the project file has it
+    keys = project_of(tab, tmp_path).lights[0].keyframes
+    assert [key.at_s for key in keys] == [0.0, 1.0]
+    tab.page.click("#path-clear")
+    tab.until("flarewright.state.lights[0].keys.length === 0")
+    assert tab.page.locator("#path-play").is_disabled()
+
+
+def test_a_zmx_file_is_dropped_and_its_repairs_are_told(tab):
+    lines = ["MODE SEQ", "NAME Dropped doublet", "UNIT MM", "ENPD 20", "SURF 0", "  DISZ INFINITY", "SURF 1", "  STOP",
+             "  CURV 0.01627", "  DISZ 6", "  GLAS N-BK7", "  DIAM 12.5 1", "SURF 2", "  CURV -0.0224", "  DISZ 2.5",
+             "  GLAS SF5", "  DIAM 12.5 1", "SURF 3", "  CURV -0.0077", "  DISZ 90", "  DIAM 12.5 1", "SURF 4", "  DISZ 0"]  # fmt: skip
+    drop(tab, "doublet.zmx", "\r\n".join(lines).encode("utf-16"))
+    tab.until("flarewright.state.lens.name === 'Dropped doublet'")
+    assert "the stop stands in front of it" in tab.page.locator("dialog").inner_text()
+    tab.page.keyboard.press("Escape")
+    tab.rest()
+    assert tab.state()["picture"]["problem"] == ""
+    before = tab.state()["lens"]
+    drop(tab, "mirror.zmx", "\n".join(lines).replace("GLAS SF5", "GLAS MIRROR").encode())
+    tab.until(told("surface 2 is a mirror"))
+    assert tab.state()["lens"] == before
+
+
+def test_an_iris_is_drawn_and_a_matte_hides_the_light(tab, tmp_path):
+    from PIL import Image
+
+    before = tab.shown()
+    sheet = Image.new("L", (192, 108), 255)
+    sheet.paste(0, (96, 0, 192, 54))
+    sheet.save(tmp_path / "matte.png")
+    tab.page.set_input_files("input[name=holdout_image]", str(tmp_path / "matte.png"))
+    tab.until("flarewright.state.holdout")
+    tab.rest()
+    # the light stands up right, behind the black part
+    assert tab.shown().max() == 0
+    tab.page.click("input[name=holdout_invert]")
+    tab.until("flarewright.state.holdout.invert")
+    tab.rest()
+    assert np.abs(tab.shown().astype(float) - before.astype(float)).mean() < 0.5
+    tab.page.click("#holdout-none")
+    tab.until("!flarewright.state.holdout")
+    tab.page.set_input_files("input[name=holdout_depth]", str(tmp_path / "matte.png"))
+    tab.until(told("matte.png: this cannot be read as a depth plate"))
+    tab.tab("iris")
+    tab.page.click("#mask-draw")
+    tab.page.click("[data-shape=Slit]")
+    tab.page.click("#mask-use")
+    tab.until("(flarewright.state.iris.mask ?? '').endsWith('drawn.png')")
+    mask = np.asarray(Image.open(tab.state()["iris"]["mask"]).convert("L"))
+    assert mask.mean() / 255.0 == pytest.approx(0.88 * 0.12, rel=0.02)
+    tab.page.locator("#view").focus()
+    tab.page.keyboard.press("Control+z")
+    tab.until("flarewright.state.iris.mask === null")

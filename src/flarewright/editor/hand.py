@@ -119,6 +119,8 @@ class Hand:
     def _lean(self, seconds: float) -> None:
         """Draw smaller where pictures take too long again and again, larger where there is time."""
         slow, fast = seconds > SLOW_S, seconds < FAST_S
+        if seconds > 3.0 * SLOW_S:
+            self._leaning = STEADY
         self._leaning = max(self._leaning, 0) + 1 if slow else min(self._leaning, 0) - 1 if fast else 0
         if self._leaning >= STEADY and self._scale + 1 < len(SCALES):
             self._scale, self._leaning = self._scale + 1, 0

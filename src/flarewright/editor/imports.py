@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from ..errors import ProjectError
+from pathlib import Path
+
+from ..errors import FlarewrightError, ProjectError
 from ..io.mask_image import read_mask
 from ..io.plate_image import read_depth, read_matte
 from .autosave import state_folder
@@ -43,7 +45,11 @@ def take_in(session: Session, name: str, data: bytes, use: str = "", light: int 
         raise ProjectError(f"{name} is larger than {MOST_BYTES // 2**20} MB, which no lens or background is")
     found = imported(name, data, state_folder() / "imports")
     if found.picture is not None:
-        _use_picture(session, found.picture, use, light)
+        try:
+            _use_picture(session, found.picture, use, light)
+        except FlarewrightError as error:
+            # where it is kept means nothing to a person
+            raise type(error)(str(error).replace(found.picture, Path(name).name)) from None
     elif use:
         raise ProjectError(f"{name} is no picture; give a PNG, JPEG or EXR file")
     elif found.project is not None:

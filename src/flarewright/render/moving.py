@@ -28,6 +28,9 @@ from .starburst_pass import OUT_OF_FOCUS_PX, read_soil, starburst_of
 
 Floats = NDArray[np.float32]
 
+# texels a side of an iris that is an image, in ghosts
+MASK_PX = 64
+
 __all__ = ["Sheet", "Still", "moving_picture"]
 
 
@@ -110,8 +113,7 @@ def moving_picture(project: Project, kept: Sheet | None) -> Still | None:
         return None
     art = resolve_art(settled)
     mask = _mask(settled.iris)
-    opening = make_opening(settled, mask)
-    (shot,) = make_shots(settled, opening)
+    (shot,) = make_shots(settled, make_opening(settled, mask))
     if defocus_mm(settled.lens, shot) >= OUT_OF_FOCUS_PX / float(shot.to_pixels[2:].max()):
         return None
     image = direct_image(settled.lens, shot)
@@ -127,7 +129,8 @@ def moving_picture(project: Project, kept: Sheet | None) -> Still | None:
             return None
         kept = Sheet(scene, _drawn(settled, shot, image, mask, (column, row)), strength)
     paths = ghost_paths(settled.lens, project.quality.paths, sensor=settled.sensor is not None)
-    layer = render_ghosts((shot,), paths, project.quality, art=art.paths).total
+    seen = shot if mask is None else replace(shot, opening=make_opening(settled, _coarse(mask)))
+    layer = render_ghosts((seen,), paths, project.quality, art=art.paths).total
     ghosts = layer.pixels * np.float32(art.gain.get("ghosts", 1.0))
     if ghosts.shape[:2] != (height, width):
         x, y, w, h = layer.window
@@ -172,6 +175,15 @@ def _mask(iris: Iris) -> NDArray[np.float64] | None:
 def _read_mask(path: str, _: int) -> NDArray[np.float64]:
     """Read a mask once, and anew when its file has changed."""
     return read_mask(path)
+
+
+def _coarse(mask: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Average a mask over cells, for each texel of it is a piece of every ghost."""
+    cell = -(-max(mask.shape) // MASK_PX)
+    rows, columns = (-(-side // cell) * cell for side in mask.shape)
+    # the border goes on
+    whole = np.pad(mask, ((0, rows - mask.shape[0]), (0, columns - mask.shape[1])), mode="edge")
+    return np.asarray(whole.reshape(rows // cell, cell, columns // cell, cell).mean(axis=(1, 3)))
 
 
 def _drawn(

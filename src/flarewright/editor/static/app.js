@@ -8,10 +8,12 @@ import { irisPanel } from './panel_iris.js';
 import { lensPanel } from './panel_lens.js';
 import { libraryPanel } from './panel_library.js';
 import { lightPanel } from './panel_light.js';
+import { player } from './player.js';
 import { targetPanel } from './panel_target.js';
 
 const app = { state: null, light: 0, ghost: null, wish: null, ghosts: { fresh: false, ghosts: [] }, tab: 'light', row: null };
 window.flarewright = app;
+app.player = player(app);
 app.under = under;
 const $ = (id) => document.getElementById(id);
 
@@ -74,7 +76,14 @@ app.choose = (name, walking = false) => {
 };
 app.chooseWish = (number) => { app.wish = number; app.ghost = null; app.view.outline = null; panels[app.tab].update?.(app.state); app.view.redraw(); };
 app.chooseLight = (k) => { if (app.light !== k) { app.light = k; panels[app.tab].update?.(app.state); } };
-app.lightMoved = (k, angles) => { app.light = k; panels.light.moved?.(angles); };
+// writing numbers costs a layout of the panel: some ten times a second is enough for the eye
+let wrote = 0;
+app.lightsMoved = (lights) => {
+  const now = performance.now();
+  if (app.tab !== 'light' || now - wrote < 90) return;
+  wrote = now;
+  panels.light.moved?.(lights[app.light]);
+};
 app.hint = () => {
   const { stack, at } = app.view;
   const place = stack.length > 1 && stack[at] === app.ghost ? ` – ${at + 1} of ${stack.length} here, scroll to walk through them` : '';
@@ -273,6 +282,7 @@ const KEYS = [
   ['Arrows', 'move the light by 0.1°, Shift 1°'], ['F', 'fit the frame'], ['Z', 'zoom to 1:1'], ['A', 'exposure found anew'], ['+  −', 'exposure by half a stop'],
   ['V', 'next view'], ['G', 'grey: every ghost reflects alike'], ['E', 'no entrance clipping'], ['H', 'safe frame'],
   ['S', 'solo the chosen ghost'], ['M', 'mute the chosen ghost'], ['N  P', 'next, previous ghost of the list'],
+  ['T', 'play the light’s path, stop'], ['K', 'key the light at this time'], [', .', 'previous, next key'],
   ['X', 'show or hide the cross-section'], ['1 – 7', 'panels'], ['W', 'physical, target, wipe, side by side'], ['Ctrl+Z', 'undo'],
   ['Ctrl+Shift+Z', 'redo'], ['Ctrl+S', 'save'], ['O', 'open'], ['Esc', 'let go of the ghost'], ['?', 'this sheet'],
 ];
@@ -311,6 +321,7 @@ addEventListener('keydown', (event) => {
     v: () => app.setView({ look: looks[(looks.indexOf(view.look) + 1) % looks.length] }), g: () => app.setView({ grey: !view.grey }),
     e: () => app.setView({ unclipped: !view.unclipped }), h: () => app.setView({ safe_frame: !view.safe_frame }),
     s: () => panels.ghosts.solo(), m: () => panels.ghosts.mute(), n: () => panels.ghosts.step(1), p: () => panels.ghosts.step(-1),
+    t: () => app.player.toggle(), k: () => app.player.key(), ',': () => app.player.step(-1), '.': () => app.player.step(1),
     x: () => fold.click(), w: () => { app.open('target'); panels.target.next(); }, o: openFile, '?': help, Escape: () => app.choose(null),
   }[event.key.length === 1 ? event.key.toLowerCase() : event.key];
   if (work) { event.preventDefault(); work(); return; }
@@ -319,8 +330,8 @@ addEventListener('keydown', (event) => {
 });
 
 // ---------------------------------------------------------------------------------------------------------- dropping
-export async function importFile(file, as = '') {
-  const answer = await app.ask(`/api/import?name=${encodeURIComponent(file.name)}${as ? `&as=${as}` : ''}`, file);
+export async function importFile(file, as = '', light = null) {
+  const answer = await app.ask(`/api/import?name=${encodeURIComponent(file.name)}${as ? `&as=${as}` : ''}${light === null ? '' : `&light=${light}`}`, file);
   if (!answer) return;
   toast(`Opened ${file.name}`, 'good');
   if (answer.told?.length) dialog(`${file.name}: what was noticed`, h('ul', { class: 'remarks' }, ...answer.told.map((words) => h('li', {}, sentence(words)))));

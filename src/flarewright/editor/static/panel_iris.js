@@ -1,5 +1,6 @@
 // The iris and what lies in it.
-import { button, group, h, row, slider, tick } from './ui.js';
+import { drawMask } from './mask_sheet.js';
+import { button, entry, group, h, number, row, slider, tick } from './ui.js';
 
 export function irisPanel(app) {
   const set = (values, held = '') => app.lively('set_iris', { values }, held, `iris${Object.keys(values)}`);
@@ -8,20 +9,28 @@ export function irisPanel(app) {
   const mask = h('span', { class: 'quietly' });
   const picker = h('input', { type: 'file', accept: '.png,.exr', hidden: true });
   picker.addEventListener('change', async () => { if (picker.files[0]) await app.importFile(picker.files[0], 'mask'); picker.value = ''; });
-  const shape = h('div', { style: 'float:right;margin:0 14px 0 0' });
+  const dirty = h('span', { class: 'quietly' });
+  const dirtPicker = h('input', { type: 'file', accept: '.png,.exr', hidden: true, name: 'dirt_image' });
+  dirtPicker.addEventListener('change', async () => { if (dirtPicker.files[0]) await app.importFile(dirtPicker.files[0], 'dirt'); dirtPicker.value = ''; });
+  const sizes = [0, 1].map((k) => h('input', { class: 'number', type: 'text', style: 'width:58px', name: `dust_um_${k}`, 'aria-label': k ? 'Largest speck, micrometres' : 'Least speck, micrometres' }));
+  for (const box of sizes) box.addEventListener('change', () => { const both = sizes.map((each) => number(each.value)); if (both.every((each) => each !== null)) dirt({ dust_um: both }); });
   const parts = [
     group('Blades', [
       slider({ label: 'Blades', tip: 'They make the ghosts polygons and the starburst spikes: as many for an even number, twice as many for an odd one. 0 is a round opening.', min: 0, max: 24, step: 1, digits: 0, name: 'blades', get: (s) => s.iris.blades, set: (blades, held) => set({ blades }, held) }),
       slider({ label: 'Rotation', tip: 'Turns the opening; ghosts and spikes turn with it, mirrored ones the other way up.', min: -180, max: 180, step: 1, digits: 0, unit: '°', name: 'rotation', get: (s) => s.iris.rotation_deg, set: (rotation_deg, held) => set({ rotation_deg }, held) }),
       slider({ label: 'Rounding', tip: 'Curved blades: 0 has straight edges and sharp spikes, 1 is a full circle without any.', min: 0, max: 1, step: 0.01, name: 'rounding', get: (s) => s.iris.rounding, set: (rounding, held) => set({ rounding }, held) }),
       slider({ label: 'Rough edges', tip: 'Micrometres by which the edges are off their line: they fray the spikes of the starburst.', min: 0, max: 100, step: 1, digits: 0, curve: 2, unit: 'µm', get: (s) => s.iris.roughness_um, set: (roughness_um, held) => set({ roughness_um }, held) }),
-      row('Mask', 'A grey picture instead of the blades, white lets light through: every ghost becomes an image of it.', [button('Load…', () => picker.click()), button('None', () => set({ mask: null })), mask, picker], (s) => { mask.textContent = s.iris.mask ? s.iris.mask.split(/[\\/]/).pop() : ''; }),
+      row('Mask', 'A grey picture instead of the blades, white lets light through: every ghost becomes an image of it.', [button('Draw…', () => drawMask((file) => app.importFile(file, 'mask')), { id: 'mask-draw' }), button('Load…', () => picker.click(), { id: 'mask-load' }), button('None', () => set({ mask: null })), mask, picker], (s) => { mask.textContent = s.iris.mask ? s.iris.mask.split(/[\\/]/).pop() : ''; }),
     ]),
     group('Dirt', [
       slider({ label: 'Dust', tip: 'Opaque specks per mm² in the plane of the stop: each diffracts light into a wide, faint disc.', min: 0, max: 20, step: 0.05, curve: 2, get: (s) => s.dirt.dust_per_mm2, set: (dust_per_mm2, held) => dirt({ dust_per_mm2 }, held) }),
       slider({ label: 'Scratches', tip: 'Per cm²: each sends a thin streak across its own direction.', min: 0, max: 50, step: 0.1, curve: 2, digits: 1, get: (s) => s.dirt.scratches_per_cm2, set: (scratches_per_cm2, held) => dirt({ scratches_per_cm2 }, held) }),
+      row('Dust from, to', 'Least and largest diameter of the specks: small ones spread light farther.', [sizes[0], sizes[1], h('span', { class: 'unit' }, 'µm')], (s) => sizes.forEach((box, k) => { if (document.activeElement !== box) box.value = s.dirt.dust_um[k]; })),
+      entry({ label: 'Scratch width', tip: 'The thinner, the longer its streak.', unit: 'µm', name: 'scratch_um', get: (s) => s.dirt.scratch_um, set: (scratch_um) => scratch_um && dirt({ scratch_um }) }),
+      entry({ label: 'Scratch length', tip: 'Mean length; short ones make wide streaks.', unit: 'mm', name: 'scratch_mm', get: (s) => s.dirt.scratch_mm, set: (scratch_mm) => scratch_mm && dirt({ scratch_mm }) }),
       slider({ label: 'Fingerprint', tip: 'Part of the light that the ridges of one fingerprint take.', min: 0, max: 1, step: 0.01, get: (s) => s.dirt.fingerprint, set: (fingerprint, held) => dirt({ fingerprint }, held) }),
       slider({ label: 'Seed', tip: 'Another number lays other dirt.', min: 0, max: 100, step: 1, digits: 0, get: (s) => s.dirt.seed, set: (seed, held) => dirt({ seed }, held) }),
+      row('Drawing', 'A grey picture of dirt over the opening, white lets light through.', [button('Load…', () => dirtPicker.click(), { id: 'dirt-load' }), button('None', () => dirt({ image: null })), dirty, dirtPicker], (s) => { dirty.textContent = s.dirt.image ? s.dirt.image.split(/[\\/]/).pop() : ''; }),
       tick({ label: 'Also in ghosts', tip: 'Dirt at the stop also shows as shadows inside the ghosts, for each is an image of the stop.', get: (s) => s.dirt.in_ghosts, set: (in_ghosts) => dirt({ in_ghosts }) }),
     ]),
     group('Starburst', [
@@ -31,7 +40,7 @@ export function irisPanel(app) {
     ]),
   ];
   return {
-    element: h('div', {}, shape, ...parts.map((part) => part.element)),
+    element: h('div', {}, ...parts.map((part) => part.element)),
     update(state) { parts.forEach((part) => part.update(state)); },
   };
 }

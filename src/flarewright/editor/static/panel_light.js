@@ -1,4 +1,6 @@
 // Lights, camera, view.
+import { holdoutGroup } from './group_holdout.js';
+import { pathGroup } from './group_path.js';
 import { button, choice, entry, group, h, slider, tick } from './ui.js';
 
 const SPECTRA = [['d65', 'Daylight D65'], ['equal-energy', 'Equal energy'], ['black-body:3200', 'Tungsten 3200 K'], ['black-body:5600', 'Black body 5600 K'], ['black-body:2000', 'Candle 2000 K'], ['lines:589.0,589.6', 'Sodium lamp'], ['rgb:1,0.25,0.1', 'Red light'], ['rgb:0.15,0.4,1', 'Blue light']];
@@ -18,6 +20,8 @@ export function lightPanel(app) {
     slider({ label: 'Disc', tip: 'Angle across the light: 0 is a point, 0.53° the sun. A wide light softens every ghost by its own image of it.', min: 0, max: 10, step: 0.01, curve: 2, unit: '°', get: (s) => one(s).diameter_deg, set: (diameter_deg, held) => set({ diameter_deg }, held) }),
     entry({ label: 'Distance', tip: 'From the first vertex; left empty the light is so far away that its rays are parallel.', unit: 'mm', placeholder: 'far', name: 'distance', get: (s) => one(s).distance, set: (distance) => set({ distance }) }),
   ]);
+  const path = pathGroup(app);
+  const hiding = holdoutGroup(app);
   const view = (values) => app.setView(values);
   const plate = h('span', { class: 'quietly' });
   const picker = h('input', { type: 'file', accept: '.exr,.png,.jpg,.jpeg', hidden: true });
@@ -47,12 +51,12 @@ export function lightPanel(app) {
     slider({ label: 'Starburst ×', tip: 'Artist’s factor on the direct image and its diffraction; 1 is physics.', min: 0, max: 10, step: 0.01, curve: 2, get: (s) => s.pass_gain.starburst ?? 1, set: (gain, held) => app.lively('set_pass_gain', { name: 'starburst', gain }, held, 'gain starburst') }),
   ]);
   return {
-    element: h('div', {}, lights.element, shot.element, seeing.element, work.element),
+    element: h('div', {}, lights.element, path.element, shot.element, seeing.element, hiding.element, work.element),
     update(state) {
       choose.replaceChildren(...state.lights.map((light, k) => button(light.name === 'light' ? `Light ${k + 1}` : light.name, () => { app.chooseLight(k); app.panels.light.update(app.state); app.view.redraw(); }, { kind: k === app.light ? 'on' : '' })),
         button('+', () => app.deed('add_light', {}).catch(() => {}), { kind: 'quiet', tip: 'Add a light.' }),
         button('Remove', () => app.deed('remove_light', { light: app.light }).catch(() => {}), { kind: 'quiet', disabled: state.lights.length < 2 }));
-      for (const part of [lights, shot, seeing, work]) part.update(state);
+      for (const part of [lights, path, shot, seeing, hiding, work]) part.update(state);
     },
     moved(angles) {
       across.element.querySelector('input').value = angles[0].toFixed(2);

@@ -38,8 +38,8 @@ export function group(title, controls, extra = []) {
 }
 
 export function row(label, tip, fields, update) {
-  const id = `c${strokes++}`;
-  fields[0].id = id;
+  fields[0].id ||= `c${strokes++}`;
+  const { id } = fields[0];
   const element = h('div', { class: 'row', tip }, h('label', { for: id }, label), h('div', { class: 'fields' }, ...fields));
   return { element, update };
 }

@@ -1,5 +1,6 @@
 // The picture: light and ghosts are touched here. All pixels come from the server; this file only places them.
 import { complain, get, latest, post } from './api.js';
+import { mover } from './mover.js';
 import { stroke } from './ui.js';
 
 const FADE_MS = 160;
@@ -13,7 +14,6 @@ export function viewport(canvas, app) {
   const self = {
     image: null, before: null, fadeFrom: 0, target: null, outline: null, hover: null, compare: 'physical', wipe: 0.5,
     zoom: 1, panX: 0, panY: 0, drag: null, stack: [], at: 0, spot: null, annotate: false, places: [], preview: null,
-    stats: { shown: [], latency: [], server: [] },
   };
   let wanted = false;
 
@@ -37,7 +37,7 @@ export function viewport(canvas, app) {
   const toMm = (px, py, f = frame()) => [(px - f.x - f.w / 2) / f.mm, -(py - f.y - f.h / 2) / (f.mm * stretch(f))];
   const angle = (mm) => Math.max(-STEEPEST, Math.min(STEEPEST, Math.atan(mm / efl()) * 180 / Math.PI));
   const place = (light) => light.field_deg.map((deg) => efl() * Math.tan(deg * Math.PI / 180));
-  const lightAt = (k) => (self.drag?.kind === 'light' && self.drag.light === k && self.shownLight) || app.state.lights[k].field_deg;
+  const lightAt = (k) => (self.mover.live && self.mover.lights?.[k]) || app.state.lights[k].field_deg;
   const lightPage = (k) => toPage(...place({ field_deg: lightAt(k) }));
   // a handle far outside is held at the border, so that it can always be taken
   function handle(k) {
@@ -69,12 +69,13 @@ export function viewport(canvas, app) {
     if (!app.state) return;
     const f = frame();
     pen.imageSmoothingEnabled = self.zoom < 3;
-    pen.imageSmoothingQuality = self.drag?.kind === 'light' ? 'low' : 'high';
+    pen.imageSmoothingQuality = self.mover.live ? 'low' : 'high';
     picture(f, now);
     border(f);
     if (doubled()) { pen.save(); pen.translate(f.shift, 0); border(f); pen.restore(); }
     if (app.state.view.safe_frame) safe(f);
     overlays(f);
+    paths(f);
     lights();
     if (self.measure) { self.measure(now); }
   }
@@ -130,7 +131,7 @@ export function viewport(canvas, app) {
     pen.stroke();
   }
   function overlays(f) {
-    if (self.drag?.kind !== 'light') {
+    if (!self.mover.live) {
       if (self.hover) { pen.globalAlpha = 0.55; pen.drawImage(self.hover, f.x, f.y, f.w, f.h); pen.globalAlpha = 1; }
       // it is the physical ghost's
       const part = self.compare === 'wipe' ? self.wipe : self.compare === 'target' ? 0 : 1;
@@ -156,6 +157,24 @@ export function viewport(canvas, app) {
       if (one.removed) label('removed', x, y - 6, 'center');
     }
     pen.lineWidth = 1;
+  }
+  // the way of a keyed light: straight in field angles, so a little bent in the picture
+  function paths(f) {
+    pen.strokeStyle = 'rgba(240,176,84,.45)';
+    pen.fillStyle = INK;
+    app.state.lights.forEach((light, k) => {
+      if (light.keys.length < 1) return;
+      pen.globalAlpha = k === app.light ? 1 : 0.4;
+      const at = (deg) => toPage(...place({ field_deg: deg }), f);
+      pen.beginPath();
+      light.keys.forEach((key, n) => {
+        const before = light.keys[n - 1]?.field_deg ?? key.field_deg;
+        for (let step = n ? 1 : 12; step <= 12; step++) pen.lineTo(...at(before.map((deg, axis) => deg + (key.field_deg[axis] - deg) * step / 12)));
+      });
+      pen.stroke();
+      for (const key of light.keys) { const [x, y] = at(key.field_deg); pen.fillRect(x - 2.5, y - 2.5, 5, 5); }
+    });
+    pen.globalAlpha = 1;
   }
   function lights() {
     app.state.lights.forEach((light, k) => {
@@ -183,7 +202,7 @@ export function viewport(canvas, app) {
   self.refresh = latest(async (fade) => {
     const answer = await fetch(`/api/picture?n=${app.state.picture.number}`);
     if (!answer.ok) throw new Error((await answer.json()).error);
-    if (self.drag?.kind === 'light') return;
+    if (self.mover.live) return;
     const grade = app.state.picture.grade;
     const bitmap = await createImageBitmap(await answer.blob());
     self.show(bitmap, fade);
@@ -213,66 +232,37 @@ export function viewport(canvas, app) {
   });
 
   // ----------------------------------------------------------------------------------------------------- the light
-  // As many pictures as the server makes, and always of the newest place; two are under way, so that neither side waits.
-  let under = 0;
-  let next = null;
-  let sent = 0;
-  let received = 0;
-  let asked = 0;
-  let usual = 30;
-  let waiting = 0;
-  function pump() {
-    if (!next || under >= 2) return;
-    // the second one leaves shortly before the first is done, so that it asks for the newest place
-    const early = under === 1 ? asked + 0.6 * usual - performance.now() : 0;
-    if (early > 1) {
-      waiting ||= setTimeout(() => { waiting = 0; pump(); }, early);
-      return;
-    }
-    const now = next;
-    next = null;
-    under += 1;
-    asked = performance.now();
-    ask(now, ++sent).finally(() => { under -= 1; pump(); });
-  }
-  async function ask(now, number) {
-    try {
-      const answer = await fetch(`/api/moving?light=${now.light}&x=${now.x}&y=${now.y}&revision=${app.state.revision}`);
-      if (answer.status === 204) return;
-      if (!answer.ok) throw new Error((await answer.json()).error);
-      const bitmap = await createImageBitmap(await answer.blob());
-      if (number < received || self.drag?.kind !== 'light') return;
-      received = number;
-      self.shownLight = [Number(now.x), Number(now.y)];
-      app.lightMoved(now.light, self.shownLight);
-      self.show(bitmap, false);
-      self.shownGrade = 'moving';
-      const seconds = Number(answer.headers.get('X-Seconds'));
-      usual += 0.2 * (1000 * seconds - usual);
-      self.stats.server.push(seconds);
-      requestAnimationFrame((time) => { self.stats.shown.push(time); self.stats.latency.push(performance.now() - now.time); });
-    } catch (error) { complain(error); }
-  }
+  self.mover = mover(app, (bitmap, lights) => {
+    self.show(bitmap, false);
+    self.shownGrade = 'moving';
+    app.lightsMoved(lights);
+  });
+  self.stats = self.mover.stats;
   function moveLight(px, py, time) {
     const drag = self.drag;
     const [mx, my] = toMm(px - drag.offX, py - drag.offY);
     drag.now = [angle(mx), angle(my)];
-    next = { light: drag.light, x: drag.now[0].toFixed(4), y: drag.now[1].toFixed(4), time };
     // the handle moves with the picture: painting costs more than all else here
-    pump();
-    if (!under) redraw();
+    self.mover.want(`light=${drag.light}&x=${drag.now[0].toFixed(4)}&y=${drag.now[1].toFixed(4)}`, time);
+    if (!self.mover.busy()) redraw();
   }
+  // What moved is kept by a deed, and the final picture follows; also where nothing has changed after all.
+  self.settle = async (name, values, group) => {
+    self.released = performance.now();
+    self.mover.stop();
+    const { revision } = app.state;
+    try { await app.deed(name, values, group); } catch { return; } finally { self.mover.lights = null; redraw(); }
+    if (app.state.revision !== revision) return;
+    await self.mover.idle();
+    await post('/api/rest');
+    self.refresh(true);
+  };
   async function dropLight() {
     const { light, now, group } = self.drag;
-    next = null;
-    self.released = performance.now();
-    try {
-      if (now) {
-        app.state.lights[light].field_deg = now.map((deg) => Number(deg.toFixed(4)));
-        self.drag = null;
-        await app.deed('move_light', { light, x: now[0], y: now[1] }, group);
-      } else { self.drag = null; await post('/api/rest'); }
-    } finally { self.drag = null; redraw(); }
+    const place = now ?? app.state.lights[light].field_deg;
+    app.state.lights[light].field_deg = place.map((deg) => Number(deg.toFixed(4)));
+    self.drag = null;
+    await self.settle('move_light', { light, x: place[0], y: place[1] }, group);
   }
 
   // ---------------------------------------------------------------------------------------------------- annotating
@@ -376,7 +366,7 @@ export function viewport(canvas, app) {
     if (drag.kind === 'pan') { self.panX = drag.x + px - drag.px; self.panY = drag.y + py - drag.py; redraw(); return; }
     if (drag.kind === 'wipe') { const f = frame(); self.wipe = Math.max(0, Math.min(1, (px - f.x) / f.w)); redraw(); return; }
     if (drag.kind === 'ghost' || drag.kind === 'rim') { pull(px, py); return; }
-    if (drag.kind === 'maybe' && Math.hypot(px - drag.px, py - drag.py) >= CLICK_PX) { drag.kind = 'light'; self.hover = null; self.shownLight = null; }
+    if (drag.kind === 'maybe' && Math.hypot(px - drag.px, py - drag.py) >= CLICK_PX) { drag.kind = 'light'; self.hover = null; self.mover.lights = null; }
     if (drag.kind === 'light') moveLight(px, py, performance.now());
   });
   canvas.addEventListener('pointerup', async (event) => {

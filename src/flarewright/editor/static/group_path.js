@@ -1,0 +1,90 @@
+// The timeline of a light's path.
+import { button, h, number } from './ui.js';
+
+export function pathGroup(app) {
+  const { player } = app;
+  const span = () => Math.max(5, Math.ceil(app.state?.path_s ?? 0), Math.ceil(player.at));
+  const keys = () => app.state.lights[app.light].keys;
+  const bar = h('input', { type: 'range', min: 0, step: 0.01, value: 0, name: 'path_at', 'aria-label': 'Time on the path, seconds' });
+  const box = h('input', { class: 'number', type: 'text', inputmode: 'decimal', name: 'path_time', 'aria-label': 'Time, seconds', style: 'width:56px' });
+  const marks = h('div', { class: 'marks' });
+  const body = h('tbody');
+  const table = h('table', { class: 'keys' }, h('thead', {}, h('tr', {}, h('th', { scope: 'col' }, 'Seconds'), h('th', { scope: 'col' }, 'Right °'), h('th', { scope: 'col' }, 'Up °'), h('th'))), body);
+  const play = button('▶ Play', () => player.toggle(), { id: 'path-play', tip: 'Plays the light along its path; where it stops the light stays, which undo takes back (T).' });
+  const key = button('Key', () => player.key(), { id: 'path-key', tip: 'Where the light is now is where it shall be at this time (K).' });
+  const loop = h('input', { type: 'checkbox', name: 'path_loop' });
+  const clear = button('Remove path', () => app.deed('clear_keys', { light: app.light }).catch(() => {}), { kind: 'quiet', id: 'path-clear' });
+  const told = h('p', { class: 'quietly' });
+  loop.addEventListener('change', () => player.setLoop(loop.checked));
+  bar.addEventListener('input', () => player.scrub(Number(bar.value)));
+  bar.addEventListener('change', () => player.rest());
+  box.addEventListener('change', () => { const value = number(box.value); box.classList.toggle('bad', value === null); if (value !== null) player.go(value); });
+  box.addEventListener('keydown', (event) => { if (event.key === 'Enter') box.blur(); });
+  let drawn = '';
+
+  function mark(each, k) {
+    const place = `calc(8px + (100% - 16px) * ${each.at_s / span()})`;
+    const element = h('button', { type: 'button', class: 'mark', style: `left:${place}`, 'aria-label': `Key at ${each.at_s} s`, tip: `${each.at_s} s. Click to go there, drag to another time.` });
+    let held = null;
+    let dragged = false;
+    element.addEventListener('pointerdown', (event) => { element.setPointerCapture(event.pointerId); dragged = false; held = { x: event.clientX }; });
+    element.addEventListener('pointermove', (event) => {
+      if (!held || (!dragged && Math.abs(event.clientX - held.x) < 4)) return;
+      dragged = true;
+      const room = marks.getBoundingClientRect();
+      held.at = Math.max(0, Math.min(span(), (event.clientX - room.left - 8) / (room.width - 16) * span()));
+      element.style.left = `${event.clientX - room.left}px`;
+    });
+    element.addEventListener('pointerup', () => {
+      if (dragged) app.deed('move_key', { light: app.light, number: k, at_s: Number(held.at.toFixed(2)) }).catch(() => { drawn = ''; });
+      held = null;
+    });
+    element.addEventListener('click', () => { if (!dragged) player.go(each.at_s); });
+    return element;
+  }
+  function line(each, k) {
+    const cell = (value, name, set) => {
+      const field = h('input', { type: 'text', value: String(Number(value.toFixed(3))), 'aria-label': `${name} of key ${k + 1}`, name: `key_${name}_${k}` });
+      field.addEventListener('change', () => { field.defaultValue = field.value; const found = number(field.value); field.classList.toggle('bad', found === null); if (found !== null) set(found); });
+      field.addEventListener('keydown', (event) => { if (event.key === 'Enter') field.blur(); if (event.key === 'Escape') { field.value = String(value); field.blur(); event.stopPropagation(); } });
+      return h('td', {}, field);
+    };
+    const [x, y] = each.field_deg;
+    const place = (field_deg) => app.deed('set_key', { light: app.light, at_s: each.at_s, field_deg }).catch(() => { drawn = ''; });
+    return h('tr', {}, cell(each.at_s, 'seconds', (at_s) => app.deed('move_key', { light: app.light, number: k, at_s }).catch(() => { drawn = ''; })),
+      cell(x, 'right', (value) => place([value, y])), cell(y, 'up', (value) => place([x, value])),
+      h('td', {}, button('×', () => app.deed('remove_key', { light: app.light, number: k }).catch(() => {}), { kind: 'quiet', 'aria-label': `Remove key ${k + 1}` })));
+  }
+  function tick() {
+    play.textContent = player.playing ? '■ Stop' : '▶ Play';
+    play.classList.toggle('on', player.playing);
+    loop.checked = player.loop;
+    bar.max = span();
+    if (!bar.matches(':active')) bar.value = player.at;
+    if (document.activeElement !== box) { box.value = player.at.toFixed(2); box.classList.remove('bad'); }
+  }
+  player.heard = tick;
+  const element = h('div', { class: 'group path' }, h('h3', {}, 'Path of the light'),
+    h('div', { class: 'buttons' }, play, key, h('label', { tip: 'From the last key on to the first time again.' }, loop, ' Loop'), box, h('span', { class: 'quietly' }, 's'), h('span', { class: 'gap' }), clear),
+    marks, bar, told, table);
+  return {
+    element,
+    update(state) {
+      const mine = keys();
+      play.disabled = !(state.path_s > 0);
+      clear.disabled = !mine.length;
+      table.hidden = !mine.length;
+      told.textContent = mine.length > 1 ? '' : mine.length ? 'Choose another time, move the light, and press Key again.' : 'Put the light where its path begins and press Key.';
+      tick();
+      const now = JSON.stringify([app.light, mine, span()]);
+      if (now === drawn) return;
+      const active = body.contains(document.activeElement) ? document.activeElement : null;
+      // what is being typed is never taken away
+      if (active && active.value !== active.defaultValue) return;
+      drawn = now;
+      marks.replaceChildren(...mine.map(mark));
+      body.replaceChildren(...mine.map(line));
+      if (active) body.querySelector(`[name=${active.name}]`)?.focus();
+    },
+  };
+}
