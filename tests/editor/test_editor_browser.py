@@ -431,9 +431,13 @@ def test_a_path_is_keyed_played_and_undone(tab, tmp_path):
 
 
 def test_a_zmx_file_is_dropped_and_its_repairs_are_told(tab):
-    lines = ["MODE SEQ", "NAME Dropped doublet", "UNIT MM", "ENPD 20", "SURF 0", "  DISZ INFINITY", "SURF 1", "  STOP",
-             "  CURV 0.01627", "  DISZ 6", "  GLAS N-BK7", "  DIAM 12.5 1", "SURF 2", "  CURV -0.0224", "  DISZ 2.5",
-             "  GLAS SF5", "  DIAM 12.5 1", "SURF 3", "  CURV -0.0077", "  DISZ 90", "  DIAM 12.5 1", "SURF 4", "  DISZ 0"]  # fmt: skip
+    head = ["MODE SEQ", "NAME Dropped doublet", "UNIT MM", "ENPD 20", "SURF 0", "  DISZ INFINITY"]
+    rows = [("0.01627", "6", "N-BK7"), ("-0.0224", "2.5", "SF5"), ("-0.0077", "90", "")]
+    lines = list(head)
+    for number, (curvature, gap, glass) in enumerate(rows, start=1):
+        lines += [f"SURF {number}", f"  CURV {curvature}", f"  DISZ {gap}", "  DIAM 12.5 1"]
+        lines += ["  STOP"] * (number == 1) + [f"  GLAS {glass}"] * bool(glass)
+    lines += ["SURF 4", "  DISZ 0"]
     drop(tab, "doublet.zmx", "\r\n".join(lines).encode("utf-16"))
     tab.until("flarewright.state.lens.name === 'Dropped doublet'")
     assert "the stop stands in front of it" in tab.page.locator("dialog").inner_text()

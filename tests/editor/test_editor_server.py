@@ -185,3 +185,31 @@ def test_a_taken_port_is_told(capsys):
 
 def test_posts_are_spoken_for():
     assert {"/api/do", "/api/undo", "/api/redo", "/api/import", "/api/solve", "/api/accept"} <= set(_POST)
+
+
+def test_an_address_of_another_machine_is_told(capsys):
+    words = ["edit", "--no-browser", "--port", "0", "--host", "203.0.113.9", "--token", "long enough"]
+    assert run(words) == 2
+    assert "check --host" in " ".join(capsys.readouterr().err.split())
+
+
+def test_without_the_extra_it_says_so(capsys, monkeypatch):
+    from flarewright.cli import edit
+
+    monkeypatch.setattr(edit, "find_spec", lambda name: None if name == "websockets" else name)
+    assert run(["edit", "--no-browser"]) == 2
+    said = " ".join(capsys.readouterr().err.split())
+    assert said == "flarewright: error: the editor needs the extra ui (websockets): pip install 'flarewright[ui]'"
+
+
+def test_a_place_that_cannot_be_written_is_told(desk, tmp_path):
+    (tmp_path / "file").write_text("no folder")
+    for place in (tmp_path / "file" / "shot.toml", tmp_path / "no folder" / "shot.toml", tmp_path / "file"):
+        code, answer = told(desk, "/api/save", {"text": str(place)})
+        if place.name == "file":
+            # the ending is added
+            assert (code, Path(tmp_path / "file.toml").is_file()) == (200, True)
+        else:
+            assert (code, answer["error"].count("\n")) == (400, 0)
+            assert answer["error"].startswith("cannot write")
+    assert desk.session.file == str((tmp_path / "file.toml").resolve())

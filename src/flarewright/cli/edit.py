@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib.util import find_spec
 from typing import Annotated
 
 import typer
@@ -14,6 +15,8 @@ EPILOG = (
     "--no-browser\n\nIt needs the extra ui: pip install 'flarewright[ui]'"
 )
 
+# of the extra ui
+NEEDED = ("starlette", "uvicorn", "websockets")
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
 
 
@@ -37,13 +40,11 @@ def edit(
         raise ProjectError(f"--host {host} lets other machines in; give them a --token SECRET too, or leave --host out")
     if token is not None and len(token) < 8:
         raise ProjectError("--token is too short to keep anyone out; give at least 8 characters")
-    try:
-        from ..editor.desk import Desk
-        from ..editor.server import serve
-    except ModuleNotFoundError as error:
-        if (error.name or "").split(".")[0] not in ("starlette", "uvicorn", "websockets"):
-            raise
-        raise ProjectError("the editor needs the extra ui: pip install 'flarewright[ui]'") from None
+    missing = [name for name in NEEDED if find_spec(name) is None]
+    if missing:
+        raise ProjectError(f"the editor needs the extra ui ({', '.join(missing)}): pip install 'flarewright[ui]'")
+    from ..editor.desk import Desk
+    from ..editor.server import serve
     from ..editor.session import begin
 
     session, greeting = begin(what)

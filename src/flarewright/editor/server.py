@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import tempfile
 from collections.abc import Awaitable, Callable
@@ -333,10 +334,10 @@ def serve(desk: Desk, host: str, port: int, token: str | None, ready: Callable[[
         try:
             place.bind((host, port))
         except OSError as error:
-            raise ProjectError(
-                f"the editor cannot listen on {host}:{port} ({(error.strerror or str(error)).lower()}); choose another "
-                "--port, or 0 for any that is free"
-            ) from None
+            why = (error.strerror or str(error)).lower()
+            taken = error.errno in (errno.EADDRINUSE, errno.EACCES)
+            remedy = "choose another --port, or 0 for any that is free" if taken else "check --host"
+            raise ProjectError(f"the editor cannot listen on {host}:{port} ({why}); {remedy}") from None
         # whoever comes now waits until the server is up
         place.listen(128)
         desk.screen.start()
