@@ -29,10 +29,10 @@ from . import (
     lens_schema,
     lens_show,
     lenses,
-    measure_find,
     measure_replay,
     measure_report,
     measure_run,
+    measure_stages,
     predict,
     project_check,
     project_init,
@@ -94,8 +94,10 @@ design_app.command("benchmark", epilog=design_benchmark.EPILOG)(design_benchmark
 design_app.command("identify", epilog=design_identify.EPILOG)(design_identify.identify)
 measure_app.command("run", epilog=measure_run.RUN_EPILOG)(measure_run.run)
 measure_app.command("merge", epilog=measure_run.MERGE_EPILOG)(measure_run.merge)
-measure_app.command("find", epilog=measure_find.FIND_EPILOG)(measure_find.find)
-measure_app.command("fit", epilog=measure_find.FIT_EPILOG)(measure_find.fit)
+measure_app.command("find", epilog=measure_stages.FIND_EPILOG)(measure_stages.find)
+measure_app.command("fit", epilog=measure_stages.FIT_EPILOG)(measure_stages.fit)
+measure_app.command("track", epilog=measure_stages.TRACK_EPILOG)(measure_stages.track)
+measure_app.command("compress", epilog=measure_stages.COMPRESS_EPILOG)(measure_stages.compress)
 measure_app.command("report", epilog=measure_report.EPILOG)(measure_report.report)
 measure_app.command("replay", epilog=measure_replay.EPILOG)(measure_replay.replay)
 

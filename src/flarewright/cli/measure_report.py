@@ -18,7 +18,8 @@ def report(
         Path | None, typer.Option("-o", "--output", metavar="OUT.html", help="DIR/report.html when left out.")
     ] = None,
     model: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="A ghost model; DIR/model.json if it is there.")
+        Path | None,
+        typer.Option(metavar="FILE", help="A ghost model; DIR/compact.json or DIR/model.json if it is there."),
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
@@ -28,12 +29,15 @@ def report(
 
     run = read_run(folder)
     check_place(place, (".html", ".htm"))
-    from ..io.ghost_model_file import read_ghost_model
+    from ..io.ghost_model_file import read_ghost_model, read_tracks
     from ..measure.report import write_report
+    from .measure_stages import COMPACT, MODEL, TRACKS
 
-    given = model or (folder / "model.json" if (folder / "model.json").is_file() else None)
+    made = [folder / name for name in (COMPACT, MODEL) if (folder / name).is_file()]
+    given = model or (made[0] if made else None)
     known = None if given is None else read_ghost_model(given)
-    write_report(folder, run, known, place)
+    tracks = read_tracks(folder / TRACKS) if model is None and (folder / TRACKS).is_file() else None
+    write_report(folder, run, known, place, tracks)
     if as_json:
         print_json({"report": str(place), "ghosts": None if known is None else len(known.ghosts)})
     else:

@@ -21,7 +21,7 @@ MERGE_EPILOG = (
 RUN_EPILOG = "Example:\n\nflarewright measure run captures.csv -o run"
 
 # in their order; later stages need the earlier ones
-STAGES = ("merge", "find", "fit")
+STAGES = ("merge", "find", "fit", "track", "compress")
 
 Captures = Annotated[
     Path, typer.Argument(metavar="CAPTURES", help="captures.csv, or a folder of photographs with --angles.")
@@ -87,10 +87,11 @@ def run(
         facts["merge"] = summary(merged)
         if not as_json:
             print(words(merged, output))
-    if "find" in chosen or "fit" in chosen:
-        from .measure_find import run_stages
+    later = [stage for stage in chosen if stage != "merge"]
+    if later:
+        from .measure_stages import run_stages
 
-        facts.update(run_stages(output, [stage for stage in chosen if stage != "merge"], 1, None, threads, not as_json))
+        facts.update(run_stages(output, later, 1, None, threads, not as_json))
     if as_json:
         print_json(facts)
 

@@ -1,8 +1,9 @@
-"""Ghost models and replay cameras as JSON files."""
+"""Ghost models, their tracks and replay cameras as JSON files."""
 
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -12,6 +13,7 @@ from ..errors import FlarewrightError
 from ..model.base import Frozen
 from ..model.corrections import Corrections
 from ..model.ghost_model import GhostModel
+from ..model.ghost_tracks import Tracks
 from ..model.replay_camera import ReplayCamera
 from .atomic import write_atomically
 from .sentences import summary, validation_sentences
@@ -20,6 +22,7 @@ from .text_file import check_version, lower_first, read_text
 Record = TypeVar("Record", bound=Frozen)
 
 _NEWEST = 1
+_NUMBERS = re.compile(r"\[([-+.eE\d,\s]+)\]")
 
 
 def _read(path: str | Path, what: str, record: type[Record]) -> Record:
@@ -84,7 +87,23 @@ def write_ghost_model(path: str | Path, model: GhostModel) -> None:
     OutputError
         When the file cannot be written.
     """
-    text = model.model_dump_json(indent=1)
+    _write(path, model)
+
+
+def write_tracks(path: str | Path, tracks: Tracks) -> None:
+    """Write ghosts' tracks as JSON, whole or not at all; raises as `write_ghost_model`."""
+    _write(path, tracks)
+
+
+def read_tracks(path: str | Path) -> Tracks:
+    """Read ghosts' tracks; raises as `read_ghost_model`."""
+    return _read(path, "tracks of ghosts", Tracks)
+
+
+def _write(path: str | Path, record: Frozen) -> None:
+    text = json.dumps(record.model_dump(mode="json", exclude_none=True), indent=1)
+    # a row of numbers is read as a row
+    text = _NUMBERS.sub(lambda found: f"[{', '.join(found[1].replace(',', ' ').split())}]", text)
 
     def write(part: Path) -> None:
         part.write_text(text + "\n", encoding="utf-8")

@@ -163,7 +163,7 @@ def patches_of(
     return found
 
 
-def _evaluate(
+def evaluate(
     shape: Shape, free: Indices, patch: Patch, offset: bool, error: float
 ) -> tuple[float, int, Floats, Floats]:
     """Return cost, pixels, normal matrix and right side of one patch."""
@@ -257,7 +257,7 @@ def refine(
 
     def look(trial: Shape) -> tuple[float, int, Floats, Floats]:
         parts: list[tuple[float, int, Floats, Floats]] = list(
-            run(lambda patch: _evaluate(trial, free, patch, offset, error), patches)  # type: ignore[call-overload]
+            run(lambda patch: evaluate(trial, free, patch, offset, error), patches)  # type: ignore[call-overload]
         )
         prior = priors(shape, free, width)
         at = trial.numbers[free]
@@ -302,7 +302,7 @@ def stepped(shape: Shape, free: Indices, step: Floats) -> Shape:
 def cost_of(shape: Shape, patches: Sequence[Patch], *, offset: bool = True, error: float = MODEL_ERROR) -> float:
     """Return the cost of a shape on patches, without the priors."""
     none = np.zeros(0, np.int64)
-    return sum(_evaluate(shape, none, patch, offset, error)[0] for patch in patches)
+    return sum(evaluate(shape, none, patch, offset, error)[0] for patch in patches)
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from functools import partial
+from math import log
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +16,7 @@ from .find import Candidate, candidates, slopes_of
 from .fit import Shape, cost_of, patches_of, presence, render
 from .found import Found, darkened, rest_of
 from .grow import Growth, grow
+from .journal import Journal
 from .numbers import NUMBERS
 from .settle import touch_up
 from .views import Pixels, View
@@ -57,6 +60,8 @@ def pursue(
     known: Sequence[Found] = (),
     pool: ThreadPoolExecutor | None = None,
     tell: Callable[[str], None] = lambda _: None,
+    progress: Callable[[float, str], None] = lambda _part, _words: None,
+    journal: Journal | None = None,
 ) -> list[Found]:
     """Find all ghosts of a run, brightest votes first.
 
@@ -74,6 +79,10 @@ def pursue(
     pool : executor, optional
     tell : callable
         Gets a line for each ghost.
+    progress : callable
+        Gets the finished part, estimated by how far the best votes have fallen, and words.
+    journal : Journal, optional
+        Of the dear steps.
 
     Returns
     -------
@@ -89,18 +98,18 @@ def pursue(
     found: list[Found] = []
     refused: list[Candidate] = []
     waiting = list(first)
+    steps = journal or Journal()
+    fallen = _Fallen(progress)
     while len(found) < most:
-        slopes = slopes_of(_doubted(shown, rest), rest, masks, pool=pool)
-        trials = [
-            each for each in candidates(slopes, shown[0].size_px[0], most=12 + len(refused), pool=pool)
-            if each.score > SCORE and not any(_same(each, other) for other in refused)
-        ]  # fmt: skip
+        votes = steps.step(partial(_candidates, shown, rest, masks, 12 + len(refused), pool))
+        trials = [each for each in votes if each.score > SCORE and not any(_same(each, other) for other in refused)]
+        fallen(trials[0].score if trials else SCORE, len(found))
         taken = 0
         trials, waiting = [*waiting[:4], *trials], waiting[4:]
         for trial in trials[:4]:
             if taken and trial.score < 0.6 * trials[0].score:
                 break
-            ghost = _try(trial, shown, rest, pool)
+            ghost = steps.step(partial(_try, trial, shown, rest, pool))
             if ghost is None:
                 refused.append(trial)
                 continue
@@ -115,8 +124,32 @@ def pursue(
         if not trials:
             break
         if taken:
-            found = touch_up(found, shown, rest, steps=4, pool=pool)
+            found = touch_up(found, shown, rest, steps=4, pool=pool, journal=steps)
     return found
+
+
+class _Fallen:
+    """Tells the finished part of a search by its best votes, which fall until only chance is left."""
+
+    def __init__(self, progress: Callable[[float, str], None]) -> None:
+        self._progress, self._first, self._part = progress, 0.0, 0.0
+
+    def __call__(self, score: float, found: int) -> None:
+        self._first = max(self._first, score)
+        if self._first > SCORE:
+            self._part = max(self._part, 1.0 - log(score / SCORE) / log(self._first / SCORE))
+        self._progress(self._part, f"{found} ghosts, votes {score:.1f} of at least {SCORE:g}")
+
+
+def _candidates(
+    views: Sequence[View],
+    rest: Sequence[Pixels],
+    masks: Sequence[NDArray[np.bool_]],
+    most: int,
+    pool: ThreadPoolExecutor | None,
+) -> list[Candidate]:
+    slopes = slopes_of(_doubted(views, rest), rest, masks, pool=pool)
+    return candidates(slopes, views[0].size_px[0], most=most, pool=pool)
 
 
 def _doubted(views: Sequence[View], rest: Sequence[Pixels]) -> list[View]:

@@ -12,9 +12,10 @@ from ..errors import FlarewrightError
 from ..kernels.measure_bezier import bezier_window, draw_bezier
 from ..kernels.measure_edges import sum_along_rows
 from ..kernels.measure_mesh import draw_ghosts
-from ..model.ghost_model import AberrationGhost, BezierGhost, GhostModel
+from ..model.ghost_model import AberrationGhost, BezierGhost, Curves, GhostModel
 from ..model.layer import Layer
 from ..render.compose import beauty
+from .curves import pose_at, posed
 from .glow import halo_radiance, offsets, star_radiance
 from .numbers import NUMBERS, bezier_numbers, channel_numbers, field, frame, visible
 
@@ -153,6 +154,7 @@ def draw_packed(
     sigma = abs(field(constellation_deg, model.largest_deg))
     if meshes:
         there = visible(meshes, constellation_deg)
+        numbers = _posed(meshes, numbers, constellation_deg, sigma)
         for m in range(3):
             plane = np.zeros((height, width + 1))
             draw_ghosts(numbers[m], counts[m], there, sigma, placed, plane)
@@ -165,6 +167,18 @@ def draw_packed(
                 window = pixels[top : top + h, left : left + w]
                 draw_bezier(bezier_numbers(ghost, constellation_deg), placed, left, top, window, _NOTHING)
     return np.maximum(pixels, 0.0)
+
+
+def _posed(meshes: Sequence[AberrationGhost], numbers: Floats, constellation_deg: float, sigma: float) -> Floats:
+    """Return the numbers, shape (3, G, 42), as the ghosts' curves bend them at a constellation."""
+    out = numbers
+    for k, ghost in enumerate(meshes):
+        if ghost.curves != Curves():
+            out = out.copy() if out is numbers else out
+            pose = pose_at(ghost.curves, constellation_deg, ghost.visible_deg)
+            for m in range(3):
+                out[m, k] = posed(numbers[m, k], sigma, pose)
+    return out
 
 
 def _single(

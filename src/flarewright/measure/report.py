@@ -14,10 +14,12 @@ from ..io.atomic import write_atomically
 from ..io.merged import read_frame
 from ..model.capture import FrameInfo, MergedFrame, MergedRun
 from ..model.ghost_model import GhostModel
+from ..model.ghost_tracks import Tracks
 from ..render.chart import COLOURS, Series, chart, number
 from ..render.page import figures, image, page, paragraph, remark_list, section, table
 from .overview import overview_picture
 from .replay import replay
+from .report_tracks import tracks_section
 
 Floats = NDArray[np.float64]
 
@@ -40,7 +42,9 @@ class _Compared:
     off_db: float
 
 
-def write_report(folder: Path, run: MergedRun, model: GhostModel | None, path: Path) -> None:
+def write_report(
+    folder: Path, run: MergedRun, model: GhostModel | None, path: Path, tracks: Tracks | None = None
+) -> None:
     """Write the report.
 
     Parameters
@@ -52,6 +56,8 @@ def write_report(folder: Path, run: MergedRun, model: GhostModel | None, path: P
         What was learned from the run; None: nothing yet.
     path : Path
         The HTML file.
+    tracks : Tracks, optional
+        Of the model's ghosts.
 
     Raises
     ------
@@ -71,6 +77,8 @@ def write_report(folder: Path, run: MergedRun, model: GhostModel | None, path: P
         sections.append(section("Frames", paragraph(_TONE_WORDS), *frames))
     else:
         sections += [_replays(folder, chosen, model), _ghosts(model)]
+    if tracks is not None and tracks.ghosts:
+        sections.append(tracks_section(tracks))
     text = page("Measured flare", lead, sections)
 
     def write(temporary: Path) -> None:

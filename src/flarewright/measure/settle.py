@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from ..model.ghost_model import AberrationGhost
 from .fit import Fit, Shape, free_numbers, patches_of, presence, refine, render
 from .found import CHANNELS, Found, alone, by_light, exchange, gain, rest_of
 from .grow import Growth, grow
+from .journal import Journal
 from .numbers import channel_of
 from .views import Pixels, View
 
@@ -46,6 +48,8 @@ def settle(
     how: Settling = Settling(),
     pool: ThreadPoolExecutor | None = None,
     tell: Callable[[str], None] = lambda _: None,
+    progress: Callable[[float, str], None] = lambda _part, _words: None,
+    journal: Journal | None = None,
 ) -> list[Found]:
     """Fit every ghost against all others until they agree.
 
@@ -58,6 +62,10 @@ def settle(
     pool : executor, optional
     tell : callable
         Gets a line for each round.
+    progress : callable
+        Gets the finished part and words.
+    journal : Journal, optional
+        Of the dear steps.
 
     Returns
     -------
@@ -65,10 +73,15 @@ def settle(
         Those that are needed, brightest first.
     """
     ghosts = list(found)
+    steps = journal or Journal()
     rest = [rest_of(ghosts, views, m) for m in range(CHANNELS)]
     for turn in range(how.rounds):
-        for k in by_light(ghosts):
-            ghosts[k] = _again(ghosts[k], views, rest, how, pool)
+        for done, k in enumerate(by_light(ghosts)):
+            old = ghosts[k]
+            ghosts[k] = steps.step(partial(_again, old, views, rest, how, pool))
+            for m in range(CHANNELS):
+                exchange(old.shapes[m], ghosts[k].shapes[m], old, views, rest[m])
+            progress((turn + (done + 1) / len(ghosts)) / how.rounds, f"ghost {done + 1} of {len(ghosts)}")
         before = len(ghosts)
         ghosts = needed(ghosts, views, rest)
         tell(f"round {turn + 1}: {len(ghosts)} of {before} ghosts are needed")
@@ -82,7 +95,7 @@ def _again(
     how: Settling,
     pool: ThreadPoolExecutor | None,
 ) -> Found:
-    """Fit one ghost anew in all colours and put its new light in the place of the old."""
+    """Fit one ghost anew in all colours."""
     fits: list[Fit | None] = list(ghost.fits)
     shapes = list(ghost.shapes)
     for m in (1, 0, 2):
@@ -95,12 +108,17 @@ def _again(
         fit = fits[m]
         if fit is not None:
             shapes[m] = fit.shape
-        exchange(ghost.shapes[m], shapes[m], ghost, views, rest[m])
     return replace(ghost, shapes=(shapes[0], shapes[1], shapes[2]), fits=(fits[0], fits[1], fits[2]))
 
 
 def touch_up(
-    ghosts: list[Found], views: Sequence[View], rest: list[Pixels], *, steps: int, pool: ThreadPoolExecutor | None
+    ghosts: list[Found],
+    views: Sequence[View],
+    rest: list[Pixels],
+    *,
+    steps: int,
+    pool: ThreadPoolExecutor | None,
+    journal: Journal,
 ) -> list[Found]:
     """Fit the green of every ghost anew, a few steps each, against the others' newest.
 
@@ -113,6 +131,7 @@ def touch_up(
         Green beside all ghosts; brought up to date.
     steps : int
     pool : executor or None
+    journal : Journal
 
     Returns
     -------
@@ -122,14 +141,23 @@ def touch_up(
     for k in by_light(ghosts):
         ghost = out[k]
         shape = ghost.shapes[1]
-        patches = patches_of(shape, alone(ghost, 1, views, rest, 14), 1)
-        if not patches:
+        new = journal.step(partial(_touched, ghost, views, rest, steps, pool))
+        if new is None:
             continue
-        free = free_numbers(1, shape.discs, 1)
-        new = refine(shape, patches, free, width=views[0].size_px[0], steps=steps, pool=pool).shape
         exchange(shape, new, ghost, views, rest)
         out[k] = replace(ghost, shapes=(new, new, new))
     return out
+
+
+def _touched(
+    ghost: Found, views: Sequence[View], rest: list[Pixels], steps: int, pool: ThreadPoolExecutor | None
+) -> Shape | None:
+    shape = ghost.shapes[1]
+    patches = patches_of(shape, alone(ghost, 1, views, rest, 14), 1)
+    if not patches:
+        return None
+    free = free_numbers(1, shape.discs, 1)
+    return refine(shape, patches, free, width=views[0].size_px[0], steps=steps, pool=pool).shape
 
 
 def _like(green: Shape, own: Shape, alone: Sequence[View], channel: int) -> Shape:

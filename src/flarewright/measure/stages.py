@@ -22,12 +22,14 @@ from .fit import Shape, render
 from .found import Found
 from .glow import halo_radiance, offsets, star_radiance
 from .glow_fit import fit_halo, fit_star, glow, register
+from .journal import Journal
 from .numbers import channel_numbers
 from .pursuit import pursue
 from .settle import Settling, settle, to_model
 from .views import Pixels, View, halved, views_of
 
 Tell = Callable[[str], None]
+Progress = Callable[[float, str], None]
 
 # nothing is looked for nearer to the light than this, in pixels of a picture 720 wide
 AROUND_LIGHT = 40.0 / 720.0
@@ -117,6 +119,8 @@ def find_ghosts(
     most: int = 60,
     threads: int | None = None,
     tell: Tell = lambda _: None,
+    progress: Progress = lambda _part, _words: None,
+    journal: Journal | None = None,
 ) -> GhostModel:
     """Find the ghosts of a merged run.
 
@@ -133,6 +137,10 @@ def find_ghosts(
     threads : int, optional
     tell : callable
         Gets a line for each ghost.
+    progress : callable
+        Gets the finished part and words.
+    journal : Journal, optional
+        Of an earlier run that was stopped; the result is the same with and without.
 
     Returns
     -------
@@ -151,7 +159,9 @@ def find_ghosts(
     pointed = [_pointed(each, small, 2.0**times, run) for each in (corrections.add if corrections else ())]
     measured = [np.asarray(np.isfinite(view.variance).all(axis=2)) for view in small]
     with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
-        found = pursue(small, measured, most=most, first=pointed, pool=pool, tell=tell)
+        found = pursue(
+            small, measured, most=most, first=pointed, pool=pool, tell=tell, progress=progress, journal=journal
+        )
     ghosts = to_model([_sized(ghost, 2.0**times) for ghost in found], views)
     if corrections:
         ghosts = tuple(ghost for ghost in ghosts if ghost.name not in corrections.remove)
@@ -182,6 +192,8 @@ def fit_ghosts(
     most: int = 60,
     threads: int | None = None,
     tell: Tell = lambda _: None,
+    progress: Progress = lambda _part, _words: None,
+    journal: Journal | None = None,
 ) -> GhostModel:
     """Fit the ghosts that were found, all colours and all constellations.
 
@@ -199,7 +211,8 @@ def fit_ghosts(
     most : int
         Ghosts.
     threads : int, optional
-    tell : callable
+    tell, progress, journal
+        As for `find_ghosts`.
 
     Returns
     -------
@@ -217,19 +230,27 @@ def fit_ghosts(
         raise FlarewrightError("a Bezier ghost cannot be fitted over all constellations; take it out of the model")
     settling = how or Settling(rounds=1)
     with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
-        settled = settle(found, dim.views, how=settling, pool=pool, tell=tell)
+        parts = iter(_parts(2 * again + 1, progress))
+        settled = settle(found, dim.views, how=settling, pool=pool, tell=tell, progress=next(parts), journal=journal)
         for _ in range(again):
             # the quantile held ghosts too; with them known, the glow is better known and leaves more to be found
             bare = fit_halo(views, [without(settled, view, k) for k, view in enumerate(views)])
-            dim = replace(dim, halo=bare, views=_beside(views, bare, dim.star))
-            settled += _more(settled, dim.views, most - len(settled), pool, tell)
-            settled = settle(settled, dim.views, how=settling, pool=pool, tell=tell)
+            dim = replace(dim, halo=bare, views=beside(views, bare, dim.star))
+            settled += _more(settled, dim.views, most - len(settled), pool, tell, next(parts), journal)
+            settled = settle(
+                settled, dim.views, how=settling, pool=pool, tell=tell, progress=next(parts), journal=journal
+            )
     dim = replace(dim, halo=fit_halo(views, [without(settled, view, k) for k, view in enumerate(views)]))
     return _model(run, to_model(settled, views), dim, views)
 
 
-def _beside(views: Sequence[View], halo: Halo | None, star: Star | None) -> list[View]:
-    """Return what views show beside halo and star, less certain where those are bright."""
+def _parts(count: int, progress: Progress) -> list[Progress]:
+    """Divide progress evenly among parts of the work that follow each other."""
+    return [lambda part, words, k=k: progress((k + part) / count, words) for k in range(count)]  # type: ignore[misc]
+
+
+def beside(views: Sequence[View], halo: Halo | None, star: Star | None) -> list[View]:
+    """Return what views show beside halo and star, less certain where those are bright; nothing around the light."""
     out = []
     for view, mask in zip(views, masks_of(views), strict=True):
         x, y = offsets(view.light_px, view.size_px, 1.0)
@@ -244,15 +265,22 @@ def _beside(views: Sequence[View], halo: Halo | None, star: Star | None) -> list
 
 
 def _more(
-    known: Sequence[Found], views: Sequence[View], most: int, pool: ThreadPoolExecutor, tell: Tell
+    known: Sequence[Found],
+    views: Sequence[View],
+    most: int,
+    pool: ThreadPoolExecutor,
+    tell: Tell,
+    progress: Progress,
+    journal: Journal | None,
 ) -> list[Found]:
     """Look for more ghosts beside the known ones, at the search's resolution."""
     times = max(0, int(np.ceil(np.log2(views[0].size_px[0] / SEARCH_WIDTH))))
     small = [coarse(view, times) for view in views]
     measured = [np.asarray(np.isfinite(view.variance).all(axis=2)) for view in small]
     found = pursue(
-        small, measured, most=max(most, 0), known=[_sized(ghost, 0.5**times) for ghost in known], pool=pool, tell=tell
-    )
+        small, measured, most=max(most, 0), known=[_sized(ghost, 0.5**times) for ghost in known], pool=pool, tell=tell,
+        progress=progress, journal=journal,
+    )  # fmt: skip
     return [_sized(ghost, 2.0**times) for ghost in found]
 
 

@@ -63,6 +63,45 @@ class Channel(Frozen):
         return self
 
 
+class Curve(Frozen):
+    """A number over the constellation: a natural cubic spline through evenly spread knots.
+
+    Attributes
+    ----------
+    values : tuple of float
+        At knots that divide a ghost's `visible_deg` evenly; two are a straight line, one a constant.
+    error : tuple of float
+        Standard deviation of each.
+    """
+
+    values: tuple[float, ...] = Field(min_length=1, max_length=32)
+    error: tuple[float, ...] = Field(min_length=1, max_length=32)
+
+    @model_validator(mode="after")
+    def _pairs(self) -> Curve:
+        if len(self.values) != len(self.error):
+            raise ValueError("a curve needs one error for each value")
+        return self
+
+
+class Curves(Frozen):
+    """What a ghost does over the constellation that its aberrations do not foretell; None: nothing.
+
+    Attributes
+    ----------
+    brightness : Curve or None
+        Factor.
+    along_px : Curve or None
+        Pixels towards the light.
+    size : Curve or None
+        Factor.
+    """
+
+    brightness: Curve | None = None
+    along_px: Curve | None = None
+    size: Curve | None = None
+
+
 class AberrationGhost(Frozen):
     """A ghost by its aberrations: one set of numbers for all constellations.
 
@@ -72,6 +111,8 @@ class AberrationGhost(Frozen):
     red, green, blue : Channel
     visible_deg : tuple of float
         Constellations at which it appears and disappears.
+    curves : Curves
+        What `measure compress` found to differ over the constellation.
     """
 
     kind: Literal["aberration"] = "aberration"
@@ -80,6 +121,7 @@ class AberrationGhost(Frozen):
     green: Channel
     blue: Channel
     visible_deg: tuple[float, float]
+    curves: Curves = Curves()
 
 
 class BezierGhost(Frozen):

@@ -1,0 +1,244 @@
+"""`flarewright measure find`, `fit`, `track` and `compress`: from merged frames to a small ghost model."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from ..errors import FlarewrightError
+from .common import print_json, progress_bar, tell
+
+if TYPE_CHECKING:
+    from ..measure.journal import Journal
+    from ..model.capture import MergedRun
+    from ..model.ghost_model import GhostModel
+
+FIND_EPILOG = "Example:\n\nflarewright measure find run"
+FIT_EPILOG = "Example:\n\nflarewright measure fit run\n\nThen: flarewright measure replay run/model.json --help"
+TRACK_EPILOG = "Example:\n\nflarewright measure track run"
+COMPRESS_EPILOG = (
+    "Example:\n\nflarewright measure compress run\n\nThen: flarewright measure replay run/compact.json --help"
+)
+
+FOUND, MODEL, TRACKS, COMPACT = "found.json", "model.json", "tracks.json", "compact.json"
+# in their order; later stages need the earlier ones
+STAGES = ("find", "fit", "track", "compress")
+
+Folder = Annotated[Path, typer.Argument(metavar="DIR", help="A folder that `measure merge` has written.")]
+Every = Annotated[int, typer.Option(min=1, help="Use every n-th constellation only; the others never enter.")]
+Threads = Annotated[int | None, typer.Option(min=1, help="All cores when left out.")]
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
+
+
+def find(
+    folder: Folder,
+    every: Every = 1,
+    corrections: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="JSON: ghosts to add and to remove (docs/ghost-model.md).")
+    ] = None,
+    threads: Threads = None,
+    as_json: Json = False,
+) -> None:
+    """Find the ghosts in all merged frames at once, and write DIR/found.json; a stopped search goes on."""
+    _one("find", folder, every, corrections, threads, as_json)
+
+
+def fit(folder: Folder, every: Every = 1, threads: Threads = None, as_json: Json = False) -> None:
+    """Fit the ghosts of DIR/found.json to all merged frames at once, and write DIR/model.json; goes on when stopped."""
+    _one("fit", folder, every, None, threads, as_json)
+
+
+def track(folder: Folder, every: Every = 1, as_json: Json = False) -> None:
+    """Follow the ghosts of DIR/model.json from frame to frame: births, deaths and crossings, in DIR/tracks.json."""
+    _one("track", folder, every, None, None, as_json)
+
+
+def compress(folder: Folder, every: Every = 1, threads: Threads = None, as_json: Json = False) -> None:
+    """Leave out of DIR/model.json what foretells nothing, add what the tracks tell, and write DIR/compact.json."""
+    _one("compress", folder, every, None, threads, as_json)
+
+
+def _one(stage: str, folder: Path, every: int, corrections: Path | None, threads: int | None, as_json: bool) -> None:
+    facts = run_stages(folder, [stage], every, corrections, threads, not as_json)
+    if as_json:
+        print_json(facts)
+
+
+@dataclass(frozen=True)
+class _Job:
+    """What every stage is told."""
+
+    folder: Path
+    run: MergedRun
+    every: int
+    corrections: Path | None
+    threads: int | None
+    told: Callable[[str], None]
+    progress: Callable[[float, str], None]
+
+    def needed(self, name: str, stage: str) -> Path:
+        """Return the file of an earlier stage."""
+        path = self.folder / name
+        if not path.is_file():
+            raise FlarewrightError(f"{path} does not exist: run flarewright measure {stage} {self.folder} first")
+        return path
+
+
+@dataclass(frozen=True)
+class _Stage:
+    """What a stage is made from, and how it is made.
+
+    Attributes
+    ----------
+    file : str
+        That it writes.
+    given : callable
+        Returns what it is made from besides the frames, for JSON; raises when that is not there.
+    make : callable
+        Writes the file.
+    """
+
+    file: str
+    given: Callable[[_Job], dict[str, object]]
+    make: Callable[[_Job, Path, Journal], None]
+
+
+def run_stages(
+    folder: Path, stages: Sequence[str], every: int, corrections: Path | None, threads: int | None, talk: bool
+) -> dict[str, Any]:
+    """Run stages in a run's folder; one is not repeated while what it is made from is the same.
+
+    Returns
+    -------
+    dict
+        Facts for JSON by stage.
+
+    Raises
+    ------
+    FlarewrightError
+        When the run cannot be read, or an earlier stage is missing.
+    """
+    from ..io.merged import read_run
+    from ..measure.journal import journal
+    from ..measure.notes import is_current, note, run_digest
+
+    run = read_run(folder)
+    facts: dict[str, Any] = {}
+
+    def told(line: str) -> None:
+        if talk:
+            tell([line])
+
+    for name in (one for one in STAGES if one in stages):
+        stage = _STAGES[name]
+        made = folder / stage.file
+        with progress_bar() as begin:
+            job = _Job(folder, run, every, corrections, threads, told, begin(name))
+            digest = run_digest(folder, run, stage.given(job))
+            kept = is_current(folder, name, digest, made)
+            if not kept:
+                with journal(folder / f"{name}.journal", digest) as steps:
+                    if steps.remembered:
+                        told(f"{name} goes on after {steps.remembered} steps that an earlier run had done")
+                    stage.make(job, made, steps)
+                note(folder, name, digest)
+        facts[name] = {**_facts(made), "file": str(made), "kept": kept}
+        if talk:
+            words = ", ".join(f"{value} {key}" for key, value in _facts(made).items())
+            print(f"{made}: {words}" + (", as before" if kept else ""))
+    return facts
+
+
+def _facts(made: Path) -> dict[str, int]:
+    from ..io.ghost_model_file import read_ghost_model, read_tracks
+    from ..measure.compact import numbers_in
+
+    if made.name == TRACKS:
+        tracks = read_tracks(made).ghosts
+        return {"ghosts": len(tracks), "lives": sum(len(one.lives) for one in tracks)}
+    model = read_ghost_model(made)
+    return {"ghosts": len(model.ghosts), **({"numbers": numbers_in(model)} if made.name == COMPACT else {})}
+
+
+def _find_given(job: _Job) -> dict[str, object]:
+    from ..io.ghost_model_file import read_corrections
+
+    known = None if job.corrections is None else read_corrections(job.corrections)
+    return {"every": job.every, "corrections": None if known is None else known.model_dump_json()}
+
+
+def _find(job: _Job, made: Path, steps: Journal) -> None:
+    from ..io.ghost_model_file import read_corrections, write_ghost_model
+    from ..measure.stages import find_ghosts
+
+    known = None if job.corrections is None else read_corrections(job.corrections)
+    found = find_ghosts(
+        job.folder, job.run, every=job.every, corrections=known, threads=job.threads, tell=job.told,
+        progress=job.progress, journal=steps,
+    )  # fmt: skip
+    write_ghost_model(made, found)
+
+
+def _fit_given(job: _Job) -> dict[str, object]:
+    return {"every": job.every, "found": _model(job.needed(FOUND, "find")).model_dump_json()}
+
+
+def _fit(job: _Job, made: Path, steps: Journal) -> None:
+    from ..io.ghost_model_file import write_ghost_model
+    from ..measure.stages import fit_ghosts
+
+    rough = _model(job.folder / FOUND)
+    model = fit_ghosts(
+        job.folder, job.run, rough, every=job.every, threads=job.threads, tell=job.told, progress=job.progress,
+        journal=steps,
+    )  # fmt: skip
+    write_ghost_model(made, model)
+
+
+def _track_given(job: _Job) -> dict[str, object]:
+    return {"every": job.every, "model": _model(job.needed(MODEL, "fit")).model_dump_json()}
+
+
+def _track(job: _Job, made: Path, _steps: Journal) -> None:
+    from ..io.ghost_model_file import write_tracks
+    from ..measure.track_stage import track_ghosts
+
+    write_tracks(
+        made, track_ghosts(job.folder, job.run, _model(job.folder / MODEL), every=job.every, tell=job.progress)
+    )
+
+
+def _compress_given(job: _Job) -> dict[str, object]:
+    from ..io.ghost_model_file import read_tracks
+
+    tracks = read_tracks(job.needed(TRACKS, "track"))
+    return {**_track_given(job), "tracks": tracks.model_dump_json()}
+
+
+def _compress(job: _Job, made: Path, _steps: Journal) -> None:
+    from ..io.ghost_model_file import read_tracks, write_ghost_model
+    from ..measure.track_stage import compress_ghosts
+
+    small = compress_ghosts(
+        job.folder, job.run, _model(job.folder / MODEL), read_tracks(job.folder / TRACKS), every=job.every,
+        threads=job.threads, tell=job.progress,
+    )  # fmt: skip
+    write_ghost_model(made, small)
+
+
+def _model(path: Path) -> GhostModel:
+    from ..io.ghost_model_file import read_ghost_model
+
+    return read_ghost_model(path)
+
+
+_STAGES = {
+    "find": _Stage(FOUND, _find_given, _find),
+    "fit": _Stage(MODEL, _fit_given, _fit),
+    "track": _Stage(TRACKS, _track_given, _track),
+    "compress": _Stage(COMPACT, _compress_given, _compress),
+}

@@ -1,0 +1,260 @@
+"""From a fitted model and the tracks of its ghosts to a small one: fewer numbers, and curves where they are needed."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from math import ceil, isfinite, log10
+
+import numpy as np
+
+from ..kernels.measure_pupil import FIRST_G
+from ..model.ghost_model import AberrationGhost, Channel, Curve, Curves, GhostModel
+from ..model.ghost_tracks import GhostTrack, Tracks
+from .curves import Pose
+from .fit import MODEL_ERROR, Fit, Indices, Shape, cost_of, free_numbers, patches_of, refine
+from .found import CHANNELS, Found, alone, by_light, exchange, rest_of
+from .numbers import channel_numbers, channel_of
+from .orders import needed_numbers, parabola
+from .smooth import smooth_curve
+from .together import measure_together
+from .views import Pixels, View
+
+Tell = Callable[[float, str], None]
+
+# views that one ghost's numbers are judged by, at most
+_VIEWS = 48
+# fewer numbers may cost so much of what the views hold
+_WORSE = 0.002
+# numbers are written to this part of their standard deviation
+_DIGITS = 0.05
+
+
+def compact(
+    model: GhostModel,
+    tracks: Tracks,
+    views: Sequence[View],
+    *,
+    threads: int | None = None,
+    tell: Tell = lambda _part, _words: None,
+) -> GhostModel:
+    """Make a model small.
+
+    Parameters
+    ----------
+    model : GhostModel
+        As fitted: one set of numbers for each ghost.
+    tracks : Tracks
+        Of its ghosts.
+    views : sequence of View
+        By rising constellation, halo and star taken off.
+    threads : int, optional
+    tell : callable
+        Gets the finished part and words.
+
+    Returns
+    -------
+    GhostModel
+        Ghosts that are never seen are left out.
+
+    Notes
+    -----
+    Numbers of the fit that do not help to foretell left-out constellations are dropped (`orders`) and the others fitted
+    once more, all ghosts against each other. Then every frame is asked again how bright, where and how large each ghost
+    is, and what differs becomes a curve, its knots chosen by leaving frames out (`smooth`). At last numbers are rounded
+    to a twentieth of their standard deviation.
+    """
+    lived = {track.name: track for track in tracks.ghosts if track.lives}
+    kept = [ghost for ghost in model.ghosts if isinstance(ghost, AberrationGhost) and ghost.name in lived]
+    spans = [span_of(ghost, lived[ghost.name]) for ghost in kept]
+    found = [_found(ghost, span, views) for ghost, span in zip(kept, spans, strict=True)]
+    tell(0.0, f"{len(kept)} ghosts")
+    with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
+        found = _fewer(found, kept, views, pool, lambda part, words: tell(0.7 * part, words))
+    curves = curves_of(found, spans, views, lambda part, words: tell(0.7 + 0.3 * part, words))
+    ghosts = tuple(
+        _written(ghost, each, span, curve)
+        for ghost, each, span, curve in zip(kept, found, spans, curves, strict=True)
+    )  # fmt: skip
+    never = [ghost.name for ghost in model.ghosts if ghost.name not in lived]
+    remarks = (*model.remarks, f"left out, for no frame shows them: {', '.join(never)}") if never else model.remarks
+    out: GhostModel = model.replace(ghosts=ghosts, remarks=remarks)
+    return out
+
+
+def span_of(ghost: AberrationGhost, track: GhostTrack) -> tuple[float, float]:
+    """Return from where to where a ghost is drawn: all its lives, with room to fade."""
+    first, last = track.lives[0], track.lives[-1]
+    low, high = first.birth.constellation_deg, last.death.constellation_deg
+    # what a frame cannot tell, the fit's own range tells
+    if first.birth.how == "hidden":
+        low = min(low, ghost.visible_deg[0])
+    if last.death.how == "hidden":
+        high = max(high, ghost.visible_deg[1])
+    angles = [step.constellation_deg for step in track.steps]
+    below, above = [angle for angle in angles if angle < low], [angle for angle in angles if angle > high]
+    if first.birth.how in ("fade", "frame") and below:
+        low = below[-1]
+    if last.death.how in ("fade", "frame") and above:
+        high = above[0]
+    return low, high
+
+
+def _found(ghost: AberrationGhost, span: tuple[float, float], views: Sequence[View]) -> Found:
+    red, green, blue = (Shape(channel_numbers(each), len(each.discs)) for each in (ghost.red, ghost.green, ghost.blue))
+    there = [k for k, view in enumerate(views) if span[0] <= view.constellation_deg <= span[1]]
+    return Found((red, green, blue), there[0], there[-1])
+
+
+def _fewer(
+    ghosts: Sequence[Found],
+    kept: Sequence[AberrationGhost],
+    views: Sequence[View],
+    pool: ThreadPoolExecutor,
+    tell: Tell,
+) -> list[Found]:
+    """Drop numbers that do not help and fit the others, each ghost against all others, brightest first."""
+    out = list(ghosts)
+    rest = [rest_of(out, views, m) for m in range(CHANNELS)]
+    for done, k in enumerate(by_light(out)):
+        old = out[k]
+        new = _smaller(old, _fitted_numbers(kept[k]), views, rest, pool)
+        for m in range(CHANNELS):
+            exchange(old.shapes[m], new.shapes[m], old, views, rest[m])
+        out[k] = new
+        fit = new.fits[1]
+        tell((done + 1) / len(out), f"ghost {kept[k].name}: {0 if fit is None else fit.free.size} numbers a colour")
+    return out
+
+
+def _fitted_numbers(ghost: AberrationGhost) -> Indices:
+    """Return which numbers of a ghost the fit was free to choose."""
+    known = np.flatnonzero(np.array(ghost.green.uncertainty) > 0.0) if ghost.green.uncertainty else np.array([])
+    if known.size:
+        return known.astype(np.int64)
+    return free_numbers(2, len(ghost.green.discs), 2)
+
+
+def _smaller(
+    ghost: Found, free: Indices, views: Sequence[View], rest: Sequence[list[Pixels]], pool: ThreadPoolExecutor
+) -> Found:
+    width = views[0].size_px[0]
+    shown = [alone(ghost, m, views, rest[m], _VIEWS) for m in range(CHANNELS)]
+    patches = [patches_of(ghost.shapes[m], shown[m], m) for m in range(CHANNELS)]
+    if not all(patches):
+        return ghost
+    bowls = [parabola(ghost.shapes[m], patches[m], free, width, MODEL_ERROR) for m in range(CHANNELS)]
+    fewer = needed_numbers(bowls, free)
+    best: list[Fit | None] = [None, None, None]
+    shapes = list(ghost.shapes)
+    for m in range(CHANNELS):
+        before = cost_of(ghost.shapes[m], patches[m])
+        for numbers in (fewer, free):
+            start = ghost.shapes[m].numbers.copy()
+            start[np.setdiff1d(free, numbers)] = 0.0
+            fit = refine(replace(ghost.shapes[m], numbers=start), patches[m], numbers, width=width, steps=10, pool=pool)
+            best[m], shapes[m] = fit, fit.shape
+            # the parabola may have been too far off: then all numbers stay
+            if cost_of(fit.shape, patches[m]) <= before + _WORSE * before + 2.0 * numbers.size:
+                break
+    return replace(ghost, shapes=(shapes[0], shapes[1], shapes[2]), fits=(best[0], best[1], best[2]))
+
+
+@dataclass(frozen=True)
+class _Said:
+    """What one frame says of one ghost."""
+
+    constellation_deg: float
+    values: tuple[float, float, float]
+    error: tuple[float, float, float]
+
+
+def curves_of(
+    ghosts: Sequence[Found], spans: Sequence[tuple[float, float]], views: Sequence[View], tell: Tell
+) -> list[Curves]:
+    """Ask every frame again and turn what differs over the constellation into curves.
+
+    Parameters
+    ----------
+    ghosts : sequence of Found
+    spans : sequence of tuple of float
+        Where each is drawn, degrees.
+    views : sequence of View
+    tell : callable
+
+    Returns
+    -------
+    list of Curves
+    """
+    said: list[list[_Said]] = [[] for _ in ghosts]
+    for k, view in enumerate(views):
+        there = [g for g, span in enumerate(spans) if span[0] <= view.constellation_deg <= span[1]]
+        here = measure_together([ghosts[g].shapes for g in there], [Pose()] * len(there), view)
+        for g, pose, error, inside in zip(there, here.poses, here.error, here.inside, strict=True):
+            if inside > 0.0 and isfinite(error[0]):
+                values = (pose.brightness, pose.along_px, pose.size)
+                # a ghost too faint to be seen has no place
+                placed = pose.brightness > 0.35
+                told = (error[0], error[1] if placed else np.inf, error[2] if placed else np.inf)
+                said[g].append(_Said(view.constellation_deg, values, told))
+        tell((k + 1) / len(views), f"{view.constellation_deg:.1f} degrees")
+    return [_curves(each, ghost, span) for each, ghost, span in zip(said, ghosts, spans, strict=True)]
+
+
+def _curves(said: Sequence[_Said], ghost: Found, span: tuple[float, float]) -> Curves:
+    radius = abs(float(ghost.shapes[1].numbers[FIRST_G]))
+    found: list[Curve | None] = []
+    for n, (usual, spread, least) in enumerate(((1.0, 0.5, 0.01), (0.0, 0.3 * radius + 1.0, 0.05), (1.0, 0.2, 0.003))):
+        known = [one for one in said if isfinite(one.error[n])]
+        at = np.array([one.constellation_deg for one in known])
+        values, error = np.array([one.values[n] for one in known]), np.array([one.error[n] for one in known])
+        found.append(smooth_curve(at, values, error, span, usual=usual, spread=spread, least=least))
+    return Curves(brightness=_rounded_curve(found[0]), along_px=_rounded_curve(found[1]), size=_rounded_curve(found[2]))
+
+
+def _written(ghost: AberrationGhost, found: Found, span: tuple[float, float], curves: Curves) -> AberrationGhost:
+    colours: list[Channel] = []
+    for shape, fit in zip(found.shapes, found.fits, strict=True):
+        deviation = None if fit is None else fit.uncertainty
+        numbers = shape.numbers
+        if deviation is not None:
+            numbers = np.array([rounded(float(a), float(d)) for a, d in zip(numbers, deviation, strict=True)])
+            deviation = np.array([float(f"{d:.2g}") for d in deviation])
+        colours.append(channel_of(numbers, shape.discs, deviation))
+    out: AberrationGhost = ghost.replace(
+        red=colours[0], green=colours[1], blue=colours[2], curves=curves,
+        visible_deg=(round(span[0], 4), round(span[1], 4)),
+    )  # fmt: skip
+    return out
+
+
+def rounded(value: float, deviation: float) -> float:
+    """Round a number to a twentieth of its standard deviation or finer; to nine digits when it has none."""
+    if not (deviation > 0.0 and isfinite(deviation)):
+        return float(f"{value:.9g}")
+    return round(value, ceil(-log10(_DIGITS * deviation)))
+
+
+def _rounded_curve(curve: Curve | None) -> Curve | None:
+    if curve is None:
+        return None
+    values = tuple(rounded(value, error) for value, error in zip(curve.values, curve.error, strict=True))
+    return Curve(values=values, error=tuple(float(f"{error:.2g}") for error in curve.error))
+
+
+def numbers_in(model: GhostModel) -> int:
+    """Count the numbers by which a model's ghosts are drawn, curves and colours included."""
+    total = 0
+    for ghost in model.ghosts:
+        if isinstance(ghost, AberrationGhost):
+            for colour in (ghost.red, ghost.green, ghost.blue):
+                total += int(np.count_nonzero(channel_numbers(colour)))
+            curves = ghost.curves
+            total += sum(
+                len(one.values) for one in (curves.brightness, curves.along_px, curves.size) if one is not None
+            )
+        else:
+            total += sum(len(row) for row in ghost.numbers)
+    return total

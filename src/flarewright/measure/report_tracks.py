@@ -1,0 +1,60 @@
+"""The part of a measurement's report about tracks: births, deaths, and what each frame says of each ghost."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from ..model.ghost_tracks import GhostTrack, Step, Tracks, Turn
+from ..render.chart import COLOURS, Series, chart
+from ..render.figure import Figure
+from ..render.page import figures, paragraph, section, table
+
+# ghosts drawn, those that are seen in most frames first
+_DRAWN = 12
+# by how much the others may widen an error before it is told as a crossing
+_CROSSING = 1.5
+_WORDS = {"range": "where the captures end", "fade": "fades", "frame": "at the frame's border", "hidden": "hidden"}
+
+
+def tracks_section(tracks: Tracks) -> str:
+    """Return a report's section about tracks, as HTML."""
+    often = sorted(tracks.ghosts, key=lambda one: -sum(step.state == "seen" for step in one.steps))[:_DRAWN]
+    charts = [
+        _chart("Brightness over what the fit foretells", often, lambda step: step.brightness, "factor"),
+        _chart("Place, towards the light", often, lambda step: step.along_px, "pixels from what is foretold"),
+        _chart("Size over what the fit foretells", often, lambda step: step.size, "factor"),
+    ]
+    words = "Every frame was asked by itself, all its ghosts at once. A flat line at 1, or 0, is a ghost that the fit "
+    words += "describes at all constellations."
+    head = ("ghost", "born, degrees", "", "dies, degrees", "", "frames", "crossed by others at")
+    rows = [row for track in tracks.ghosts for row in _rows(track)]
+    return section("Tracks", paragraph(words), figures(*charts), table(head, rows))
+
+
+def _chart(title: str, tracks: list[GhostTrack], value: Callable[[Step], float | None], y_label: str) -> Figure:
+    lines = []
+    for k, track in enumerate(tracks):
+        at = [step.constellation_deg for step in track.steps]
+        found = [value(step) if step.state == "seen" else None for step in track.steps]
+        shown = np.array([np.nan if one is None else one for one in found])
+        lines.append(Series("", at, shown, COLOURS[k % len(COLOURS)]))
+    return chart(title, lines, x_label="constellation, degrees", y_label=y_label)
+
+
+def _rows(track: GhostTrack) -> list[tuple[str, ...]]:
+    seen = sum(step.state == "seen" for step in track.steps)
+    crossed = [step.constellation_deg for step in track.steps if step.state == "seen" and step.crossing > _CROSSING]
+    where = f"{min(crossed):.1f} to {max(crossed):.1f}" if crossed else ""
+    if not track.lives:
+        return [(track.name, "never", "", "", "", "0", "")]
+    return [
+        (track.name, _degrees(life.birth), _WORDS[life.birth.how], _degrees(life.death), _WORDS[life.death.how],
+         str(seen), where)
+        for life in track.lives
+    ]  # fmt: skip
+
+
+def _degrees(turn: Turn) -> str:
+    return f"{turn.constellation_deg:.2f} ± {turn.error_deg:.2g}" if turn.error_deg else f"{turn.constellation_deg:.2f}"

@@ -1,0 +1,121 @@
+"""The stages after the fit: follow the ghosts of a model through a run's frames, and make the model small."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from ..errors import FlarewrightError
+from ..model.capture import MergedRun
+from ..model.ghost_model import AberrationGhost, GhostModel
+from ..model.ghost_tracks import Tracks
+from .compact import compact
+from .fit import Shape
+from .numbers import channel_numbers
+from .stages import SEARCH_WIDTH, beside, coarse, enlarged, read_views
+from .together import Shapes
+from .track import follow
+from .views import View
+
+Tell = Callable[[float, str], None]
+
+
+def track_ghosts(
+    folder: Path, run: MergedRun, model: GhostModel, *, every: int = 1, tell: Tell = lambda _part, _words: None
+) -> Tracks:
+    """Follow a model's ghosts through the frames of a run.
+
+    Parameters
+    ----------
+    folder : Path
+    run : MergedRun
+    model : GhostModel
+        From `fit_ghosts`.
+    every : int
+        Only every n-th constellation is looked at.
+    tell : callable
+        Gets the finished part and words.
+
+    Returns
+    -------
+    Tracks
+        Shifts in pixels of the frames, though pictures wider than `SEARCH_WIDTH` are followed at half that.
+
+    Raises
+    ------
+    FlarewrightError
+        When frames cannot be read or are too few, or a ghost has no aberrations to be followed by.
+    """
+    views = _views(folder, run, model, every)
+    times = 0
+    while run.size_px[0] > SEARCH_WIDTH * 2**times:
+        times += 1
+    small = [coarse(view, times) for view in views]
+    ghosts = [_shapes(ghost, 0.5**times) for ghost in _checked(model)]
+    tracks = follow([ghost.name for ghost in model.ghosts], ghosts, small, tell=tell)
+    return tracks if times == 0 else _enlarged(tracks, 2.0**times)
+
+
+def compress_ghosts(
+    folder: Path,
+    run: MergedRun,
+    model: GhostModel,
+    tracks: Tracks,
+    *,
+    every: int = 1,
+    threads: int | None = None,
+    tell: Tell = lambda _part, _words: None,
+) -> GhostModel:
+    """Make a model small, judged by the frames of a run; see `compact.compact`.
+
+    Raises
+    ------
+    FlarewrightError
+        When frames cannot be read or are too few, or the tracks are of another model.
+    """
+    _checked(model)
+    names = {ghost.name for ghost in model.ghosts}
+    if names != {track.name for track in tracks.ghosts}:
+        raise FlarewrightError("the tracks are of other ghosts than the model's; run flarewright measure track again")
+    return compact(model, tracks, _views(folder, run, model, every), threads=threads, tell=tell)
+
+
+def _views(folder: Path, run: MergedRun, model: GhostModel, every: int) -> list[View]:
+    if tuple(run.size_px) != tuple(model.size_px):
+        raise FlarewrightError(
+            f"the model was fitted to pictures of {model.size_px[0]}x{model.size_px[1]} pixels and the frames have "
+            f"{run.size_px[0]}x{run.size_px[1]}; run flarewright measure fit again"
+        )
+    return beside(read_views(folder, run, every), model.halo, model.star)
+
+
+def _checked(model: GhostModel) -> list[AberrationGhost]:
+    ghosts = [ghost for ghost in model.ghosts if isinstance(ghost, AberrationGhost)]
+    if len(ghosts) < len(model.ghosts):
+        raise FlarewrightError(
+            "a Bezier ghost has its numbers over the constellation already; take it out of the model"
+        )
+    return ghosts
+
+
+def _shapes(ghost: AberrationGhost, factor: float) -> Shapes:
+    red, green, blue = (
+        enlarged(Shape(channel_numbers(each), len(each.discs)), factor) for each in (ghost.red, ghost.green, ghost.blue)
+    )
+    return red, green, blue
+
+
+def _enlarged(tracks: Tracks, factor: float) -> Tracks:
+    """Return tracks in pixels that are smaller by a factor."""
+    ghosts = []
+    for track in tracks.ghosts:
+        steps = tuple(
+            step.replace(
+                along_px=None if step.along_px is None else step.along_px * factor,
+                along_error_px=None if step.along_error_px is None else step.along_error_px * factor,
+            )
+            for step in track.steps
+        )
+        ghosts.append(track.replace(steps=steps))
+    out: Tracks = tracks.replace(ghosts=tuple(ghosts))
+    return out

@@ -1,0 +1,128 @@
+"""A model made small keeps what foretells left-out constellations, and gets curves only where they are needed."""
+
+import numpy as np
+import pytest
+from planted_run import LARGEST, SIZE, shape, views
+from scipy.interpolate import CubicSpline
+from test_track import ANGLES, drawn, thrice
+
+from flarewright.io.ghost_model_file import read_ghost_model, write_ghost_model
+from flarewright.measure.compact import compact, numbers_in, rounded
+from flarewright.measure.curves import Pose, spline_basis, value_at
+from flarewright.measure.fit import evaluate, free_numbers, patches_of, refine
+from flarewright.measure.numbers import channel_of
+from flarewright.measure.orders import needed_numbers, parabola
+from flarewright.measure.replay import replay
+from flarewright.measure.smooth import smooth_curve
+from flarewright.measure.track import follow
+from flarewright.model.ghost_model import AberrationGhost, Curves, GhostModel
+
+
+@pytest.mark.parametrize("knots", [3, 4, 7, 12])
+def test_splines_are_natural_ones(knots):
+    values = np.random.default_rng(knots).normal(size=knots)
+    at = np.linspace(2.0, 9.0, 41)
+    expected = CubicSpline(np.linspace(2.0, 9.0, knots), values, bc_type="natural")(at)
+    np.testing.assert_allclose(spline_basis(at, (2.0, 9.0), knots) @ values, expected, atol=1e-12)
+
+
+def test_a_curve_is_as_bent_as_its_values():
+    rng = np.random.default_rng(5)
+    at = np.linspace(0.0, 20.0, 40)
+    error = np.full(40, 0.02)
+
+    def curve(truth):
+        values = truth + rng.normal(0.0, 0.02, 40)
+        values[7] += 0.5  # one that is far off
+        return smooth_curve(at, values, error, (0.0, 20.0), usual=1.0, spread=0.5)
+
+    assert curve(np.ones(40)) is None
+    line = curve(1.0 + 0.02 * at)
+    assert len(line.values) == 2
+    np.testing.assert_allclose(line.values, (1.0, 1.4), atol=0.04)
+    wave = 1.0 + 0.3 * np.sin(at / 3.0)
+    bent = curve(wave)
+    assert 5 <= len(bent.values) <= 12
+    found = [value_at(bent, angle, (0.0, 20.0)) for angle in at]
+    assert np.sqrt(np.mean((found - wave) ** 2)) < 0.02
+    assert smooth_curve(at[:2], at[:2], error[:2], (0.0, 20.0), usual=1.0, spread=0.5) is None
+
+
+def fitted(seed=0):
+    """Return a planted ghost of seven numbers fitted with thirty."""
+    planted = shape(-80.0, 20.0, 0.5, bend=5.0)
+    seen = views((planted,), seed=seed, angles=np.linspace(1.0, LARGEST, 12))
+    patches = patches_of(planted, seen, 1)
+    free = free_numbers(2, 0, 2)
+    return planted, seen, patches, refine(planted, patches, free, width=SIZE[0], steps=4, error=0.0), free
+
+
+def test_the_parabola_foretells_what_a_step_costs():
+    _, _, patches, fit, free = fitted()
+    bowl = parabola(fit.shape, patches, free, SIZE[0], 0.0)
+    step = 2.0 * np.linalg.cholesky(fit.covariance) @ np.random.default_rng(2).normal(size=free.size)
+    numbers = fit.shape.numbers.copy()
+    numbers[free] += step
+    there = [evaluate(type(fit.shape)(numbers), free[:0], patch, True, 0.0)[0] for patch in patches]
+    foretold = bowl.cost - 2.0 * bowl.side @ step + np.einsum("q,kqr,r->k", step, bowl.matrix, step)
+    np.testing.assert_allclose(foretold - bowl.cost, there - bowl.cost, atol=0.15 * np.abs(there - bowl.cost).max())
+
+
+def test_numbers_that_foretell_nothing_are_left_out():
+    planted, _, patches, fit, free = fitted()
+    needed = needed_numbers([parabola(fit.shape, patches, free, SIZE[0], 0.0)], free)
+    # place and its bend, size, light and its slope are planted large
+    assert {0, 3, 10, 20} <= set(needed)
+    assert len(needed) <= 14 < len(free)
+    again = refine(planted, patches, needed, width=SIZE[0], steps=4, error=0.0)
+    assert again.cost < fit.cost + 2.0 * (len(free) - len(needed))
+
+
+def model_of(ghosts, names):
+    return GhostModel(
+        size_px=SIZE, axis_px=(0.5 * SIZE[0] + 2.3, 0.5 * SIZE[1] - 1.6), focal_px=900.0, largest_deg=LARGEST,
+        constellation_deg=(1.0, LARGEST),
+        ghosts=tuple(
+            AberrationGhost(
+                name=name, visible_deg=(1.0, LARGEST),
+                **dict.fromkeys(("red", "green", "blue"), channel_of(one.numbers, 0, 1.0 * (one.numbers != 0))),
+            )
+            for name, one in zip(names, ghosts, strict=True)
+        ),
+    )  # fmt: skip
+
+
+def test_a_small_model_replays_what_curves_it_needs_and_drops_what_nobody_sees(tmp_path):
+    ghosts = (shape(-60.0, 20.0, 1.0), shape(55.0, 14.0, 0.6))
+    unseen = shape(20.0, 8.0, 0.8)
+
+    def poses(g, angle):
+        return Pose(1.0 + 0.4 * np.sin(angle / 4.0), 0.1 * angle, 1.0) if g == 0 else Pose()
+
+    seen = drawn(ghosts, poses, angles=ANGLES[2::3])
+    every = thrice((*ghosts, unseen))
+    small = compact(model_of((*ghosts, unseen), "abc"), follow("abc", every, seen), seen)
+    assert [ghost.name for ghost in small.ghosts] == ["a", "b"]
+    assert "left out, for no frame shows them: c" in small.remarks
+    curves = small.ghosts[0].curves
+    # the fit's own numbers take up a shift in proportion to the field; the waves of light they cannot
+    assert len(curves.brightness.values) >= 4
+    assert small.ghosts[1].curves == Curves()
+    write_ghost_model(tmp_path / "compact.json", small)
+    assert read_ghost_model(tmp_path / "compact.json") == small
+    write_ghost_model(tmp_path / "model.json", model_of(ghosts, "ab"))
+    assert numbers_in(small) < 3 * 2 * 12
+    plain = small.replace(ghosts=tuple(ghost.replace(curves=Curves()) for ghost in small.ghosts))
+    for view in drawn(ghosts, poses, noise=0.0, angles=ANGLES[4:-1:4]):
+        missed, without = (
+            np.sqrt(np.mean((replay(model, view.constellation_deg)[0].pixels - view.pixels) ** 2))
+            for model in (small, plain)
+        )
+        assert missed < 0.06 * np.sqrt((view.pixels**2).mean())
+        assert missed < 0.5 * without
+
+
+def test_numbers_are_written_as_exactly_as_they_are_known():
+    assert rounded(123.456789, 2.0) == 123.5
+    assert rounded(0.00123456, 1e-4) == 0.001235
+    assert rounded(1.0 / 3.0, 0.0) == 0.333333333

@@ -1,0 +1,123 @@
+"""A stage that is stopped anywhere goes on and ends with the same bytes."""
+
+import json
+from contextlib import suppress
+
+import numpy as np
+import pytest
+from planted_run import GHOSTS
+from test_stages import write
+
+from flarewright.cli.app import run as command
+from flarewright.errors import OutputError
+from flarewright.measure import journal as journals
+from flarewright.measure.find import Candidate
+from flarewright.measure.fit import Fit, Shape
+from flarewright.measure.found import Found
+from flarewright.measure.journal import Journal, journal
+
+
+def interrupted(path, digest, results) -> int:
+    """Do steps, stop, and return how many an earlier run had done."""
+    known = -1
+    with suppress(KeyboardInterrupt), journal(path, digest) as steps:
+        known = steps.remembered
+        for one in results:
+            steps.step(lambda one=one: one)
+        raise KeyboardInterrupt
+    return known
+
+
+def test_a_journal_gives_back_every_bit(tmp_path):
+    rng = np.random.default_rng(1)
+    shape = Shape(rng.normal(size=42), 2)
+    fit = Fit(shape, np.array([0, 3, 10]), rng.normal(size=(3, 3)), 1.0 / 3.0, 7)
+    results = [
+        [Candidate(np.float64(0.1), 2.0, 0, 3, np.float64(1e-17))],
+        None,
+        Found((shape, shape, shape), 0, 5, (fit,) * 3),
+        [],
+        3.5,
+    ]
+    assert interrupted(tmp_path / "j", "d", results) == 0
+    with journal(tmp_path / "j", "d") as steps:
+        assert steps.remembered == len(results)
+        again = [steps.step(pytest.fail) for _ in results]
+        assert steps.step(lambda: "new") == "new"
+    assert again[0] == results[0]
+    assert again[1] is None
+    assert again[3:] == results[3:]
+    found = again[2]
+    for mine, its in zip(found.fits, results[2].fits, strict=True):
+        for name in ("free", "covariance"):
+            np.testing.assert_array_equal(getattr(mine, name), getattr(its, name))
+        np.testing.assert_array_equal(mine.shape.numbers, its.shape.numbers)
+        assert (mine.cost, mine.count, mine.shape.discs) == (its.cost, its.count, its.shape.discs)
+    # a stage that ended well leaves none behind
+    assert not (tmp_path / "j").exists()
+
+
+def test_a_journal_of_something_else_or_cut_short_is_not_believed(tmp_path):
+    assert interrupted(tmp_path / "j", "a", [1.0, 2.0]) == 0
+    assert interrupted(tmp_path / "j", "a", [1.0, 2.0, 3.0]) == 2
+    text = (tmp_path / "j").read_text()
+    (tmp_path / "j").write_text(text[:-3])
+    assert interrupted(tmp_path / "j", "a", []) == 2
+    assert interrupted(tmp_path / "j", "b", []) == 0
+    (tmp_path / "j").write_bytes(b"\xff\xfe")
+    assert interrupted(tmp_path / "j", "b", []) == 0
+    with pytest.raises(TypeError, match="cannot hold"), journal(tmp_path / "k", "b") as steps:
+        steps.step(object)
+
+
+def test_a_full_disk_is_told(tmp_path):
+    class Full:
+        name = "x.journal"
+
+        def write(self, _):
+            raise OSError(28, "No space left on device")
+
+    with pytest.raises(OutputError, match=r"cannot write x\.journal: no space left on device"):
+        Journal(file=Full()).step(lambda: 1.0)
+
+
+def test_find_and_fit_stopped_half_way_end_with_the_same_bytes(tmp_path, capsys, monkeypatch):
+    folder = tmp_path / "run"
+    folder.mkdir()
+    write(folder, GHOSTS[1:2])
+    made = {}
+    for stage, file in (("find", "found.json"), ("fit", "model.json")):
+        done = 0
+        real = journals.Journal.step
+
+        def counted(self, make, real=real):
+            nonlocal done
+            done += 1
+            return real(self, make)
+
+        with monkeypatch.context() as patch:
+            patch.setattr(journals.Journal, "step", counted)
+            assert command(["measure", stage, str(folder), "--every", "3"]) == 0
+        made[stage] = (folder / file).read_bytes()
+        assert done >= 2
+        (folder / file).unlink()
+        left = done // 2
+
+        def stopping(self, make, real=real):
+            nonlocal left
+            if left == 0:
+                raise KeyboardInterrupt
+            left -= 1
+            return real(self, make)
+
+        with monkeypatch.context() as patch:
+            patch.setattr(journals.Journal, "step", stopping)
+            assert command(["measure", stage, str(folder), "--every", "3"]) == 130
+        lines = (folder / f"{stage}.journal").read_text().splitlines()
+        assert len(lines) == 1 + done // 2
+        assert json.loads(lines[0])["journal"] == 1
+        capsys.readouterr()
+        assert command(["measure", stage, str(folder), "--every", "3"]) == 0
+        assert f"goes on after {done // 2} steps" in capsys.readouterr().err
+        assert (folder / file).read_bytes() == made[stage]
+        assert not (folder / f"{stage}.journal").exists()

@@ -1,0 +1,81 @@
+"""`measure track` and `compress` from the command line: files, what is kept, and every mistake in one sentence."""
+
+import json
+
+import pytest
+from planted_run import GHOSTS
+from test_compact import model_of
+from test_stages import write
+
+from flarewright.cli.app import run as command
+from flarewright.io.ghost_model_file import read_ghost_model, read_tracks, write_ghost_model
+from flarewright.model.ghost_model import BezierGhost
+
+
+@pytest.fixture
+def folder(tmp_path):
+    write(tmp_path, GHOSTS[:2])
+    write_ghost_model(tmp_path / "model.json", model_of(GHOSTS[:2], "ab"))
+    return tmp_path
+
+
+def test_track_and_compress_write_small_files_and_keep_them(folder, capsys):
+    for stage, file, kept in (("track", "tracks.json", False), ("compress", "compact.json", False)):
+        assert command(["measure", stage, str(folder), "--every", "2", "--json"]) == 0
+        told = json.loads(capsys.readouterr().out)[stage]
+        assert told["ghosts"] == 2
+        assert told["kept"] is kept
+        assert told["file"].endswith(file)
+    tracks = read_tracks(folder / "tracks.json")
+    assert [len(one.lives) for one in tracks.ghosts] == [1, 1]
+    small = read_ghost_model(folder / "compact.json")
+    assert small.schema_version == 1
+    assert all(any(one.green.uncertainty) for one in small.ghosts)
+    assert (folder / "compact.json").stat().st_size < (folder / "model.json").stat().st_size
+    for stage in ("track", "compress"):
+        assert command(["measure", stage, str(folder), "--every", "2"]) == 0
+        assert "as before" in capsys.readouterr().out
+    assert command(["measure", "report", str(folder)]) == 0
+    page = (folder / "report.html").read_text()
+    assert "Brightness over what the fit foretells" in page
+    assert "where the captures end" in page
+    capsys.readouterr()
+    # other frames, another compression
+    assert command(["measure", "track", str(folder), "--every", "3", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["track"]["kept"] is False
+
+
+def told(capsys, *words):
+    assert command([str(word) for word in words]) == 2
+    lines = [line for line in capsys.readouterr().err.splitlines() if "error:" in line]
+    assert len(lines) == 1
+    return lines[0]
+
+
+def test_mistakes_are_told_in_a_sentence(folder, tmp_path_factory, capsys):
+    assert "run flarewright measure track" in told(capsys, "measure", "compress", folder)
+    assert command(["measure", "track", str(folder), "--every", "3"]) == 0
+    model = read_ghost_model(folder / "model.json")
+    tracks = (folder / "tracks.json").read_text()
+    (folder / "tracks.json").write_text(tracks.replace('"name": "a"', '"name": "c"'))
+    assert "of other ghosts than the model's" in told(capsys, "measure", "compress", folder)
+    (folder / "tracks.json").write_text(tracks.replace('"state": "seen"', '"state": "guessed"'))
+    assert "state" in told(capsys, "measure", "compress", folder)
+    (folder / "tracks.json").write_text("{")
+    assert "is not valid JSON" in told(capsys, "measure", "compress", folder)
+    write_ghost_model(folder / "model.json", model.replace(size_px=(99, 98)))
+    assert "fitted to pictures of 99x98 pixels and the frames have 240x160" in told(capsys, "measure", "track", folder)
+    bezier = BezierGhost(name="z", numbers=((1.0,),) * 19, visible_deg=(0.0, 9.0))
+    write_ghost_model(folder / "model.json", model.replace(ghosts=(bezier,)))
+    assert "a Bezier ghost has its numbers over the constellation already" in told(capsys, "measure", "track", folder)
+    (folder / "model.json").unlink()
+    assert "run flarewright measure fit" in told(capsys, "measure", "track", folder)
+    empty = tmp_path_factory.mktemp("empty")
+    assert "merged.json cannot be read" in told(capsys, "measure", "track", empty)
+    assert "merged.json cannot be read" in told(capsys, "measure", "compress", empty)
+
+
+def test_a_file_of_another_version_is_told(folder, capsys):
+    data = json.loads((folder / "model.json").read_text())
+    (folder / "model.json").write_text(json.dumps({**data, "schema_version": 7}))
+    assert "schema_version" in told(capsys, "measure", "track", folder)
