@@ -102,3 +102,11 @@ def test_fixed_rows_keep_their_own_glass():
     found = outcomes(solve(problem, time_limit=None, most_searches=40), problem, count=1)[0]
     assert found.lens.rows[0].medium == settled.lens.rows[0].medium
     assert {row: name for row, name in found.glasses.items() if row} == dict.fromkeys((1, 3, 6, 7), "SCHOTT N-BK7")
+
+
+def test_the_schema_knows_both_ways_to_name_glasses():
+    schema = Design.model_json_schema()["properties"]["glasses"]
+    kinds = {one["type"] for one in schema["anyOf"]}
+    assert kinds == {"string", "array"}
+    assert Design(glasses="SCHOTT").glasses == ("SCHOTT",)
+    assert Design(glasses=["N-BK7", "N-SF6"]).glasses == ("N-BK7", "N-SF6")

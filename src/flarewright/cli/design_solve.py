@@ -150,6 +150,9 @@ def search(
     print(f"{words[data['verdict']]}: {len(found)} lenses in {folder}, report in "
           f"{folder / 'report.html'}")  # fmt: skip
     for number, one in enumerate(found, 1):
+        if one.fitness_traced is not None:
+            print(f"lens-{number}: weighted misfit of traced ghosts {one.fitness_traced[1]:.3g} "
+                  f"({one.fitness_traced[0]:.3g} before they were finished)")  # fmt: skip
         if one.fitness_any_index is not None:
             print(f"lens-{number}: fitness {one.fitness:.3g} mm^2 with {', '.join(one.glasses.values())} "
                   f"({one.fitness_any_index:.3g} with any index)")  # fmt: skip

@@ -24,6 +24,8 @@ from .trials import CASES, Trial
 Floats = NDArray[np.float64]
 
 
+# stop diameter, mm, by which scattered ghosts are drawn: the thesis' for the Heliar
+SCRATCH_STOP = 4.5
 # points of a trace
 TOLD = 60
 
@@ -104,13 +106,15 @@ class Task:
 
     def pictures(self, structure: Structure, vector: Floats) -> tuple[Floats, Floats]:
         """Draw the target and a lens, each of shape (512, 512)."""
-        entrance = self.problem.objective.entrance
-        found = grey_picture(structure, vector, self.slope, entrance=entrance, blades=self.blades, gain=self.gain)
+        aim, gain = self.problem.objective, self.gain
         if self.lens is None:
-            # wanted ghosts have no light of their own: that of the lens which is to make them
-            wanted = wanted_picture(self.problem.objective, float(vector[0]), ghosts=len(structure.pairs))
-            return wanted, found
-        return grey_picture(*self.lens, self.slope, entrance=entrance, blades=self.blades, gain=self.gain), found
+            # wanted ghosts have no light of their own; a lens gets as much as makes a ghost of one size as bright
+            target = wanted_picture(aim, SCRATCH_STOP, ghosts=aim.wanted, gain=gain)
+            gain *= SCRATCH_STOP / float(vector[0]) * len(structure.pairs) / aim.wanted
+        else:
+            target = grey_picture(*self.lens, self.slope, entrance=aim.entrance, blades=self.blades, gain=gain)
+        found = grey_picture(structure, vector, self.slope, entrance=aim.entrance, blades=self.blades, gain=gain)
+        return target, found
 
 
 def task_of(trial: Trial, seed: int = 0) -> Task:

@@ -15,6 +15,7 @@ from ..model import Iris, Lens, Medium, Stop, Surface
 from ..optics.paraxial import first_order
 from ..render.prepare import complete_lens
 from .constraints import kept, stiff
+from .finish import finish, weighted_fitness
 from .objective import fitness, fitness_thesis, misfits
 from .prescription import Structure
 from .rims import clear_radii
@@ -54,6 +55,9 @@ class Outcome:
         Catalogue name of the glass behind each row, where the problem asks for glasses.
     fitness_any_index : float or None
         Fitness before the indices became those of glasses.
+    fitness_traced : (float, float) or None
+        Mean squared misfit of traced ghosts by the weights of the search (parts of radii where these are relative),
+        before and after they were finished; `residuals` are traced then.
     """
 
     lens: Lens
@@ -66,6 +70,7 @@ class Outcome:
     ghosts: tuple[tuple[int, int], ...]
     glasses: dict[int, str] = field(default_factory=dict)
     fitness_any_index: float | None = None
+    fitness_traced: tuple[float, float] | None = None
 
 
 def lens_of(
@@ -194,6 +199,11 @@ def _outcome(one: Candidate, problem: Problem, name: str, iris: Iris | None) -> 
     residuals, _, ghosts = misfits(aim, one.structure, vector)
     if residuals is None:
         return None
+    traced = None
+    if problem.traced:
+        done = finish(problem, one.structure, known, inside.x, ghosts)
+        vector, residuals = known.prescription(done.x), done.after
+        traced = weighted_fitness(problem, done.before), weighted_fitness(problem, done.after)
     try:
         radii = clear_radii(one.structure, vector, aim.slopes, aim.entrance, edge=problem.bounds.edge)
         lens = lens_of(one.structure, vector, radii, name=name, iris=iris, media=media)
@@ -202,4 +212,5 @@ def _outcome(one: Candidate, problem: Problem, name: str, iris: Iris | None) -> 
     return Outcome(
         lens, one.structure, vector, inside.cost, fitness(aim, one.structure, vector),
         fitness_thesis(aim, one.structure, vector), residuals, ghosts, names, any_index,
+        traced,
     )  # fmt: skip

@@ -76,6 +76,7 @@ def summary(
                 "fitness_algorithm1": one.fitness_algorithm1,
                 "f_number": one.lens.f_number,
                 "stop_row": one.structure.stop,
+                **_traced_data(one),
                 **(
                     {}
                     if one.fitness_any_index is None
@@ -99,6 +100,13 @@ def summary(
             for number, one in enumerate(found, 1)
         ],
     }
+
+
+def _traced_data(one: Outcome) -> dict[str, float]:
+    """Return what tracing told; nothing where nothing was traced."""
+    if one.fitness_traced is None:
+        return {}
+    return {"fitness_traced_before": one.fitness_traced[0], "fitness_traced": one.fitness_traced[1]}
 
 
 def write_folder(
@@ -222,7 +230,7 @@ def _section(number: int, one: Outcome, problem: Problem, target: bytes, found: 
     return (
         f"<h2>Lens {number}</h2><p>fitness {one.fitness:.3g} mm² (best matching), {one.fitness_algorithm1:.3g} "
         f"(Algorithm 1), f/{one.lens.f_number:.3g}, stop at row {one.structure.stop}: "
-        f"<code>lens-{number}.toml</code>{html.escape(_glasses(one))}</p>"
+        f"<code>lens-{number}.toml</code>{html.escape(_glasses(one) + _traced(one))}</p>"
         f'<figure><img src="{_inline(target)}"><figcaption>wanted</figcaption></figure>'
         f'<figure><img src="{_inline(found)}"><figcaption>found</figcaption></figure>{rendered}'
         "<details><summary>every ghost</summary><table><tr><th>wanted</th><th>ghost</th><th>place off, mm</th>"
@@ -236,6 +244,14 @@ def _glasses(one: Outcome) -> str:
         return ""
     listed = ", ".join(f"{row}: {glass}" for row, glass in one.glasses.items())
     return f"; with any index {one.fitness_any_index:.3g} mm²; glass behind row {listed}"
+
+
+def _traced(one: Outcome) -> str:
+    """Tell how far traced ghosts are off, before and after they were finished; nothing where none was traced."""
+    if one.fitness_traced is None:
+        return ""
+    before, after = one.fitness_traced
+    return f"; finished with traced rays: weighted misfit {before:.3g} before, {after:.3g} now; errors below are traced"
 
 
 def _page(data: dict[str, Any], sections: str, target: bytes) -> str:

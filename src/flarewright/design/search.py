@@ -69,6 +69,8 @@ class Problem:
         Every lens is made of these; the bounds of n_d are theirs.
     fixed_media : tuple of Medium or None
         Behind each row of the prescription whose `fixed_rows` are kept.
+    traced : bool
+        Lenses that were found are finished with traced rays.
     """
 
     objective: Objective
@@ -80,6 +82,7 @@ class Problem:
     begin_with: tuple[tuple[Structure, Floats], ...] = ()
     glasses: GlassList | None = None
     fixed_media: tuple[Medium | None, ...] = ()
+    traced: bool = False
 
     def check(self) -> None:
         """Refuse what no solver can begin with.

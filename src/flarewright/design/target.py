@@ -67,6 +67,7 @@ def problem_of(project: Project) -> tuple[Problem, Settled]:
         fixed=vector if design.fixed_rows else None, fixed_rows=_checked(design.fixed_rows, structure),
         begin_with=((structure, vector),) if changed and structure in found else (), glasses=glasses,
         fixed_media=tuple(None if isinstance(row, Stop) else row.medium for row in settled.lens.rows),
+        traced=design.quality == "final",
     ), settled  # fmt: skip
 
 

@@ -4,13 +4,19 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, WithJsonSchema, field_validator, model_validator
 
 from .base import Frozen
 
 Length = Annotated[float, Field(gt=0.0, le=1000.0)]
 Place = Annotated[float, Field(ge=-10000.0, le=10000.0)]
 Index = Annotated[float, Field(gt=1.0, lt=4.0)]
+
+# a single name may stand without a list
+Names = Annotated[
+    tuple[str, ...],
+    WithJsonSchema({"anyOf": [{"type": "string"}, {"items": {"type": "string"}, "type": "array"}]}),
+]
 
 
 class Bounds(Frozen):
@@ -154,6 +160,8 @@ class Design(Frozen):
     glasses : tuple of str
         Makers ("SCHOTT"), glasses ("N-BK7", "OHARA S-BSL7") or "all": every glass of a designed lens is one of these.
         Empty: any index within the bounds. A single name may stand without a list.
+    quality : {"draft", "final"}
+        draft: ghosts to first order; final: lenses that were found are finished with traced rays.
     bounds : Bounds
     """
 
@@ -167,7 +175,8 @@ class Design(Frozen):
     brightness: Literal["none", "stop", "fresnel"] = "none"
     extra: float = Field(500.0, ge=0.0, le=1e9)
     entrance: float = Field(100.0, gt=0.0, le=10000.0)
-    glasses: tuple[str, ...] = ()
+    glasses: Names = ()
+    quality: Literal["draft", "final"] = "draft"
     bounds: Bounds = Bounds()
 
     @field_validator("glasses", mode="before")

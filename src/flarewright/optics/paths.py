@@ -67,12 +67,13 @@ class LightPath:
 
 def _path(lens: Lens, mirrors: tuple[int, ...]) -> LightPath:
     """Go to and fro between mirrors; row len(lens.rows) is the sensor."""
-    return _steps(len(lens.rows), lens.stop_row, mirrors)
+    return steps_between(len(lens.rows), lens.stop_row, mirrors)
 
 
 # pictures of a moving hand ask for the same hundreds of paths each time
 @lru_cache(maxsize=8192)
-def _steps(count: int, stop: int, mirrors: tuple[int, ...]) -> LightPath:
+def steps_between(count: int, stop: int, mirrors: tuple[int, ...]) -> LightPath:
+    """Return the path along some mirrors, of so many rows with the stop among them."""
     rows: list[int] = []
     actions: list[int] = []
     start, heading = 0, 1
