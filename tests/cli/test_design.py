@@ -110,6 +110,21 @@ def test_scratch_and_colors_write_lenses(folder, capsys):
     assert "Algorithm 2" in capsys.readouterr().out
 
 
+def test_a_limit_no_lens_keeps_is_told_and_the_nearest_are_written(folder, capsys):
+    head = 'lens = "triplet-pestrecov"\nf_number = 8\n[[lights]]\nfield_deg = [7, 3]\n'
+    (folder / "short.toml").write_text(head + '[design.bounds]\nlength = 3.0\nhard = ["length", "edges"]\n')
+    assert run(["design", "solve", "short.toml", "-o", "short", "--searches", "100", "--lenses", "1", "--json"]) == 0
+    out, err = capsys.readouterr()
+    told = json.loads(out)
+    assert told["verdict"] == "impossible"
+    assert "hard limit length" in err
+    assert told["lenses"][0]["breaks"]["length"] > 0.01
+    assert told["lenses"][0]["ghosts"]
+    page = (folder / "short" / "report.html").read_text()
+    assert "it breaks length" in page
+    assert read_lens(folder / "short" / "lens-1.toml")[0].rows
+
+
 @pytest.mark.parametrize(
     ("words", "told"),
     [

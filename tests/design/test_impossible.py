@@ -4,15 +4,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from planted import planted
 
-from flarewright.design.candidate import outcomes
+from flarewright.design.candidate import nearest_outcomes, outcomes
+from flarewright.design.constraints import breaches, without_ghosts
 from flarewright.design.ghosts import evaluate
 from flarewright.design.impossible import obstacles
 from flarewright.design.objective import own_objective
-from flarewright.design.reach import least_distances
+from flarewright.design.reach import broken_limits, least_distances
 from flarewright.design.report import summary, verdict
 from flarewright.design.search import solve
 from flarewright.design.target import problem_of
@@ -115,3 +116,85 @@ def test_wishes_at_two_lights_that_no_ghost_can_serve():
     # both lights alike: one ghost serves both
     both, _ = problem_of(project(GhostWish(ghost="4-1", height=2.0), lights=lights, structure="lens"))
     assert obstacles(both) == ()
+
+
+def limits_of(structure, vector):
+    """Return focal length, f-number and length from the matrices written out."""
+    rows = structure.rows
+    height, slope, index, length, at_stop = 1.0, 0.0, 1.0, 0.0, 1.0
+    for k in range(rows):
+        d, c, n = vector[1 + k], vector[1 + rows + k], vector[1 + 2 * rows + k]
+        if k == structure.stop:
+            at_stop = height
+        slope = (index * slope - (n - index) * c * height) / n
+        height, index = height + d * slope, n
+        length += d if k < rows - 1 else 0.0
+    focal = -1.0 / slope
+    return focal, focal * abs(at_stop) / vector[0], length
+
+
+@given(st.integers(0, 2**32 - 1))
+@settings(max_examples=25, deadline=None)
+def test_limits_that_a_lens_keeps_are_never_called_broken(seed):
+    problem, _, _ = planted()
+    random = np.random.default_rng(seed)
+    structure = problem.structures[int(random.integers(len(problem.structures)))]
+    vector = problem.variables(structure).prescription(problem.variables(structure).random_points(random, 1)[0])
+    focal, speed, length = limits_of(structure, vector)
+    assume(5.0 < focal < 2000.0)
+    assume(0.4 < speed < 200.0)
+    bounds = Bounds(
+        hard=("focal_length", "f_number", "length"), focal_length=(focal, focal), f_number=(speed, speed),
+        length=length, stop_diameter=(6.0, 6.0),
+    )  # fmt: skip
+    aim = own_objective(structure, vector, np.array([0.1]), bounds=bounds)
+    assert broken_limits(replace(problem, objective=aim, bounds=bounds)) == ()
+    assert breaches(replace(problem, objective=aim, bounds=bounds), structure, vector) == ()
+
+
+def test_a_lens_too_short_for_its_glasses_is_proven_impossible():
+    problem, _ = problem_of(project(bounds=Bounds(hard=("length",), length=3.0)))
+    (one,) = broken_limits(problem)
+    thinnest = min(sum(1.0 if g else 0.1 for g in each.glass[:-1]) for each in problem.structures)
+    assert one.names == ("length",)
+    assert one.nearest == pytest.approx(thinnest)
+    (told, *_) = obstacles(problem)
+    assert "hard limit length" in told.reason
+    assert f"{thinnest:.4g} mm" in told.reason
+    # and with enough room nothing is said
+    enough = problem_of(project(bounds=Bounds(hard=("length",), length=thinnest + 0.1)))[0]
+    assert broken_limits(enough) == ()
+
+
+def test_a_focal_length_that_one_free_row_cannot_reach_is_proven_impossible():
+    rows = tuple(k for k in range(9) if k != 7)
+    bounds = Bounds(hard=("focal_length",), focal_length=(20.0, 25.0), least_radius=40.0, glass=(1.0, 9.0))
+    problem, _ = problem_of(project(structure="lens", fixed_rows=rows, bounds=bounds))
+    (one,) = broken_limits(problem)
+    assert one.names == ("focal_length",)
+    (structure,) = problem.structures
+    known = problem.variables(structure)
+    many = known.prescription(known.random_points(np.random.default_rng(0), 4000))
+    focal = [limits_of(structure, vector)[0] for vector in many]
+    shortest = min(value for value in focal if value > 0.0)
+    # what is told is a bound, and not far from what lenses do
+    assert 25.0 < one.nearest <= shortest
+    assert one.nearest > 0.9 * shortest
+
+
+def test_limits_that_contradict_each_other_are_told_apart_from_ghosts_not_found():
+    bounds = Bounds(hard=("edges", "focal_length", "f_number"), focal_length=(2000.0, 2000.0), f_number=(0.5, 0.5))
+    problem, _ = problem_of(project(bounds=bounds))
+    conflict = without_ghosts(problem, searches=24)
+    assert {one.name for one in conflict} & {"edges", "focal_length", "f_number"}
+    state = solve(problem, seed=0, time_limit=None, most_searches=100)
+    assert outcomes(state, problem, count=1) == ()
+    nearest = nearest_outcomes(state, problem, count=1)
+    assert nearest[0].breaks
+    data = summary(state, nearest, problem, (), conflict)
+    assert data["verdict"] == "contradictory"
+    assert data["lenses"][0]["breaks"]
+    assert len(data["lenses"][0]["ghosts"]) == 13
+    # limits that go together are no conflict
+    kind = Bounds(hard=("edges", "focal_length", "f_number"), focal_length=(90.0, 110.0), f_number=(4.0, 8.0))
+    assert without_ghosts(problem_of(project(bounds=kind))[0], searches=24) == ()

@@ -6,7 +6,7 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -15,6 +15,8 @@ from .common import interruptible, print_json, tell
 from .design_checks import check_fitness, check_time
 
 if TYPE_CHECKING:
+    from ..design.candidate import Outcome
+    from ..design.constraints import Breach
     from ..design.genes import Measure
     from ..design.search import Problem, State
     from ..design.solvers import Choice
@@ -113,7 +115,8 @@ def search(
     measure : {"ours", "algorithm1"}
         The fitness that a solver sees that evolves.
     """
-    from ..design.candidate import outcomes
+    from ..design.candidate import nearest_outcomes, outcomes
+    from ..design.constraints import without_ghosts
     from ..design.impossible import obstacles
     from ..design.report import summary, write_folder
     from ..design.solvers import Limits, chosen, make_ready, solve_with
@@ -134,22 +137,38 @@ def search(
             solver, problem, limits=Limits(time_s, searches, progress, asked), seed=state.seed, measure=measure,
             threads=threads, state=state,
         ).state  # fmt: skip
-    found = outcomes(state, problem, count=lenses, name=name or f"After {settled.lens.name}", iris=settled.iris)
-    remarks = write_folder(folder, project, problem, state, found, proven)
-    data = summary(state, found, problem, proven)
+    naming: Any = {"count": lenses, "name": name or f"After {settled.lens.name}", "iris": settled.iris}
+    found = outcomes(state, problem, **naming)
+    conflict: tuple[Breach, ...] = ()
+    if not found and problem.bounds.hard:
+        conflict = without_ghosts(problem, seed=state.seed)
+        found = nearest_outcomes(state, problem, **naming)
+    remarks = write_folder(folder, project, problem, state, found, proven, conflict)
+    data = summary(state, found, problem, proven, conflict)
     tell([*(settled.remarks if name is None else ()), *remarks])
     if as_json:
         print_json({"folder": str(folder), **data})
         return
+    _print(folder, problem, found, str(data["verdict"]), conflict)
+
+
+def _print(
+    folder: Path, problem: Problem, found: tuple[Outcome, ...], verdict: str, conflict: tuple[Breach, ...]
+) -> None:
     words = {"met": "the wanted ghosts are met", "nearly": "the wanted ghosts are nearly met",
-             "impossible": "no lens can meet all wanted ghosts, as told above; the nearest are written",
+             "impossible": "no lens can do that, as told above; the nearest are written",
+             "contradictory": "the hard limits contradict each other: the nearest lens of any ghosts breaks "
+                              + " and ".join(f"{one.name} by {one.amount:.2g}" for one in conflict),
              "unsolved": "the wanted ghosts are not met; the report tells how far each is off"}  # fmt: skip
-    if not found and problem.bounds.hard:
-        print(f"no lens was found that keeps {', '.join(problem.bounds.hard)}; search longer, or widen the bounds")
-        return
-    print(f"{words[data['verdict']]}: {len(found)} lenses in {folder}, report in "
-          f"{folder / 'report.html'}")  # fmt: skip
+    if found and found[0].breaks and verdict == "unsolved":
+        words["unsolved"] = (
+            f"no lens was found that keeps {', '.join(problem.bounds.hard)}, though there are some with other ghosts; "
+            "search longer, or widen the bounds; the nearest are written"
+        )
+    print(f"{words[verdict]}: {len(found)} lenses in {folder}, report in {folder / 'report.html'}")
     for number, one in enumerate(found, 1):
+        if one.breaks:
+            print(f"lens-{number} breaks {', '.join(f'{each.name} by {each.amount:.2g}' for each in one.breaks)}")
         if one.fitness_traced is not None:
             print(f"lens-{number}: weighted misfit of traced ghosts {one.fitness_traced[1]:.3g} "
                   f"({one.fitness_traced[0]:.3g} before they were finished)")  # fmt: skip

@@ -14,7 +14,7 @@ from ..io.media import complete as complete_media
 from ..model import Iris, Lens, Medium, Stop, Surface
 from ..optics.paraxial import first_order
 from ..render.prepare import complete_lens
-from .constraints import kept, stiff
+from .constraints import Breach, breaches, kept, stiff
 from .finish import finish, weighted_fitness
 from .objective import fitness, fitness_thesis, misfits
 from .prescription import Structure
@@ -58,6 +58,8 @@ class Outcome:
     fitness_traced : (float, float) or None
         Mean squared misfit of traced ghosts by the weights of the search (parts of radii where these are relative),
         before and after they were finished; `residuals` are traced then.
+    breaks : tuple of Breach
+        Hard constraints that it does not keep; only of `nearest_outcomes`.
     """
 
     lens: Lens
@@ -71,6 +73,7 @@ class Outcome:
     glasses: dict[int, str] = field(default_factory=dict)
     fitness_any_index: float | None = None
     fitness_traced: tuple[float, float] | None = None
+    breaks: tuple[Breach, ...] = ()
 
 
 def lens_of(
@@ -171,6 +174,29 @@ def outcomes(state: State, problem: Problem, *, count: int = 5, name: str = "Des
     return tuple(
         replace(one, lens=one.lens.replace(name=f"{name} {number}")) for number, one in enumerate(found[:count], 1)
     )
+
+
+def nearest_outcomes(
+    state: State, problem: Problem, *, count: int = 5, name: str = "Designed lens", iris: Iris | None = None
+) -> tuple[Outcome, ...]:
+    """Return the best lenses of a search none of which keeps its hard constraints.
+
+    Parameters
+    ----------
+    state, problem, count, name, iris
+        As in `outcomes`.
+
+    Returns
+    -------
+    tuple of Outcome
+        With what each `breaks`; that surfaces do not cross is kept where that is possible at all.
+    """
+    for hard in (tuple(one for one in problem.bounds.hard if one == "edges"), ()):
+        loose = replace(problem, bounds=problem.bounds.replace(hard=hard))
+        found = outcomes(state, loose, count=count, name=name, iris=iris)
+        if found:
+            break
+    return tuple(replace(one, breaks=breaches(problem, one.structure, one.vector)) for one in found)
 
 
 def _same(one: Candidate, other: Candidate) -> bool:

@@ -104,6 +104,38 @@ def kept(problem: Problem, one: Candidate, known: Variables | None = None) -> Ca
     return None
 
 
+def without_ghosts(problem: Problem, *, searches: int = 96, seed: int = 0) -> tuple[Breach, ...]:
+    """Look for any lens that keeps the hard constraints, whatever its ghosts are.
+
+    Parameters
+    ----------
+    problem : Problem
+    searches : int
+        Local searches, over structures evenly spread.
+    seed : int
+
+    Returns
+    -------
+    tuple of Breach
+        By how much the nearest lens breaks them; empty when one keeps them. That there is none is not proven.
+    """
+    aim = problem.objective
+    free = stiff(replace(problem, objective=replace(aim, weights=np.zeros_like(aim.weights), extra=0.0)))
+    random, found = np.random.default_rng(seed), []
+    chosen = problem.structures[:: max(1, len(problem.structures) // 12)][:12]
+    for structure in chosen:
+        known = problem.variables(structure)
+        points = known.random_points(random, max(1, searches // len(chosen)))
+        ends, costs = polish_within(known, points, free.objective, STEPS)
+        found += [Candidate(float(cost), structure, x) for x, cost in zip(ends, costs, strict=True)]
+    found.sort(key=lambda one: one.cost)
+    for one in found[:8]:
+        if kept(free, one) is not None:
+            return ()
+    best = found[0]
+    return breaches(problem, best.structure, problem.variables(best.structure).prescription(best.x))
+
+
 def stiff(problem: Problem) -> Problem:
     """Return the problem with stiffer springs at its hard constraints, for what is searched near them."""
     wishes = problem.objective.wishes.copy()

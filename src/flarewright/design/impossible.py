@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ..errors import ProjectError
 from ..model import Project
 from ..model.design import GhostWish
-from .reach import least_distances
+from .reach import broken_limits, least_distances
 from .search import Problem
 
 Floats = NDArray[np.float64]
@@ -27,11 +27,11 @@ class Obstacle:
     Attributes
     ----------
     target : str
-        Its name; several where they contradict each other.
+        Its name, or that of a hard limit; several where they contradict each other.
     reason : str
         A sentence.
     least_error_mm : float
-        Place or radius of the target, or of one of several, is off by as much in every lens.
+        Place or radius of the target, or of one of several, is off by as much in every lens; 0 of a hard limit.
     """
 
     target: str
@@ -54,7 +54,28 @@ def obstacles(problem: Problem, project: Project | None = None) -> tuple[Obstacl
         Empty does not mean possible.
     """
     off = () if project is None else _off_the_line(project)
-    return (*off, *_out_of_reach(problem), *_contradictions(problem))
+    return (*off, *_unkept(problem), *_out_of_reach(problem), *_contradictions(problem))
+
+
+def _unkept(problem: Problem) -> tuple[Obstacle, ...]:
+    """Tell which hard limits no lens within the bounds keeps."""
+    found = []
+    for one in broken_limits(problem):
+        if one.nearest is None:
+            reason = (
+                f"the hard limits {', '.join(one.names)} contradict each other: no lens within the bounds keeps all"
+            )
+        else:
+            (name,) = one.names
+            unit = "f/" if name == "f_number" else ""
+            reason = (
+                f"no lens within the bounds keeps the hard limit {name}; the nearest has at best "
+                f"{unit}{one.nearest:.4g}{'' if unit else ' mm'}"
+            )
+        found.append(
+            Obstacle(", ".join(one.names), f"{reason}; widen it or the bounds of gaps, radii and indices", 0.0)
+        )
+    return tuple(found)
 
 
 def on_the_line(wish: GhostWish, number: int, project: Project) -> GhostWish:

@@ -85,6 +85,85 @@ def least_distances(problem: Problem) -> Floats:
     return np.where(least > 1e-6, least, 0.0)
 
 
+@dataclass(frozen=True)
+class BrokenLimit:
+    """A hard limit that every lens within the bounds breaks.
+
+    Attributes
+    ----------
+    names : tuple of str
+        "focal_length", "f_number", "length"; several where each alone can be kept, but not all by one lens.
+    nearest : float or None
+        Of a single one, what comes nearest to the limit: mm, or the f-number.
+    """
+
+    names: tuple[str, ...]
+    nearest: float | None
+
+
+def broken_limits(problem: Problem) -> tuple[BrokenLimit, ...]:
+    """Return the hard limits that no lens within the bounds can keep.
+
+    Parameters
+    ----------
+    problem : Problem
+
+    Returns
+    -------
+    tuple of BrokenLimit
+        Empty where nothing is proven.
+
+    Notes
+    -----
+    As `least_distances`: 1/efl, 1/f-number and length by interval arithmetic over every structure, or over the boxes of
+    a single one of few free variables. A box that breaks some limit everywhere holds no lens; if each box breaks one,
+    there is none.
+    """
+    named = [(m, name) for m, name in enumerate(("focal_length", "f_number", "length")) if name in problem.bounds.hard]
+    if not named or len(problem.structures) > MOST_STRUCTURES:
+        return ()
+    low, high = (problem.objective.wishes[:3, side] for side in (0, 1))
+    enclosed: list[list[_Interval]] = [[], [], []]
+    for stop in sorted({structure.stop for structure in problem.structures}):
+        for m, one in enumerate(_limited(problem, stop)):
+            enclosed[m].append(one)
+    whole = [_Interval(*(np.concatenate([getattr(one, side) for one in each]) for side in ("low", "high")))
+             for each in enclosed]  # fmt: skip
+    # a hair's breadth for roundings
+    off = {m: np.maximum(whole[m].low - high[m], low[m] - whole[m].high) > 1e-9 * (low[m] + high[m]) for m, _ in named}
+    single = [
+        BrokenLimit((name,), _nearest(m, whole[m], float(high[m])))
+        for m, name in named if off[m].all()
+    ]  # fmt: skip
+    if single:
+        return tuple(single)
+    together = len(named) > 1 and bool(np.any([off[m] for m, _ in named], axis=0).all())
+    return (BrokenLimit(tuple(name for _, name in named), None),) if together else ()
+
+
+def _limited(problem: Problem, stop: int) -> tuple[_Interval, _Interval, _Interval]:
+    """Enclose 1/efl, 1/f-number and length of the lenses in every box of a stop."""
+    low, high = _boxes(problem, stop)
+    rows = _rows(low, high)
+    last = len(rows.power)
+    _, slope = _ray(rows, 0, last, 1.0, 0.0, None)
+    a, _ = _ray(rows, 0, stop, 1.0, 0.0, None)
+    power = slope.times(-1.0)
+    size = _Interval(np.where((a.low <= 0.0) & (a.high >= 0.0), 0.0, np.minimum(np.abs(a.low), np.abs(a.high))),
+                     np.maximum(np.abs(a.low), np.abs(a.high)))  # fmt: skip
+    with np.errstate(divide="ignore"):
+        opened = _Interval(low[:, 0], high[:, 0]) * _Interval(1.0 / size.high, np.minimum(1.0 / size.low, 1e12))
+    length = _Interval(low[:, 1:last].sum(axis=1), high[:, 1:last].sum(axis=1))
+    return power, power * opened, length
+
+
+def _nearest(m: int, whole: _Interval, high: float) -> float:
+    """Return what comes nearest to a limit; of inverses the number itself."""
+    least, most = float(whole.low.min()), float(whole.high.max())
+    value = least if least > high else most
+    return value if m == 2 else (1.0 / value if value != 0.0 else np.inf)
+
+
 def _boxes(problem: Problem, stop: int) -> tuple[Floats, Floats]:
     """Return bounds of prescriptions, shape (B, 1 + 3 K): a box a structure, or many of a single one."""
     known = [problem.variables(structure) for structure in problem.structures if structure.stop == stop]

@@ -19,6 +19,7 @@ from ..io.project_file import project_text
 from ..model import AsLens, Output, Project, Quality
 from ..model.design import Design, GhostWish
 from .candidate import Outcome
+from .constraints import Breach
 from .ghosts import evaluate
 from .impossible import Obstacle
 from .objective import seen
@@ -32,19 +33,29 @@ Floats = NDArray[np.float64]
 MET, NEARLY = 0.005, 0.3
 
 
-def verdict(outcome: Outcome | None, proven: tuple[Obstacle, ...] = ()) -> str:
-    """Say in a word how well the ghosts are met: "met", "nearly", "unsolved", or "impossible" where that is proven."""
+def verdict(outcome: Outcome | None, proven: tuple[Obstacle, ...] = (), conflict: tuple[Breach, ...] = ()) -> str:
+    """Say in a word how well the ghosts are met.
+
+    Returns
+    -------
+    str
+        "met", "nearly" or "unsolved"; "impossible" where that is proven; "contradictory" where the hard limits cannot
+        be kept together even by a lens of any ghosts, as far as a search tells.
+    """
     if proven:
         return "impossible"
-    if outcome is None:
+    if conflict:
+        return "contradictory"
+    if outcome is None or outcome.breaks:
         return "unsolved"
     worst = float(np.abs(outcome.residuals).max())
     return "met" if worst < MET else ("nearly" if worst < NEARLY else "unsolved")
 
 
 def summary(
-    state: State, found: tuple[Outcome, ...], problem: Problem, proven: tuple[Obstacle, ...] = ()
-) -> dict[str, Any]:
+    state: State, found: tuple[Outcome, ...], problem: Problem, proven: tuple[Obstacle, ...] = (),
+    conflict: tuple[Breach, ...] = (),
+) -> dict[str, Any]:  # fmt: skip
     """Return the facts of a search, ready for JSON.
 
     Parameters
@@ -54,13 +65,16 @@ def summary(
     problem : Problem
     proven : tuple of Obstacle
         What is known to be impossible.
+    conflict : tuple of Breach
+        By how much the nearest lens of any ghosts breaks the hard limits, if none was found that keeps them.
 
     Returns
     -------
     dict
     """
     return {
-        "verdict": verdict(found[0] if found else None, proven),
+        "verdict": verdict(found[0] if found else None, proven, conflict),
+        **({"contradictory": {one.name: one.amount for one in conflict}} if conflict else {}),
         "impossible": [
             {"target": one.target, "reason": one.reason, "least_error_mm": one.least_error_mm} for one in proven
         ],
@@ -77,6 +91,7 @@ def summary(
                 "f_number": one.lens.f_number,
                 "stop_row": one.structure.stop,
                 **_traced_data(one),
+                **({"breaks": {each.name: each.amount for each in one.breaks}} if one.breaks else {}),
                 **(
                     {}
                     if one.fitness_any_index is None
@@ -111,7 +126,7 @@ def _traced_data(one: Outcome) -> dict[str, float]:
 
 def write_folder(
     folder: Path, project: Project, problem: Problem, state: State, found: tuple[Outcome, ...],
-    proven: tuple[Obstacle, ...] = (),
+    proven: tuple[Obstacle, ...] = (), conflict: tuple[Breach, ...] = (),
 ) -> list[str]:  # fmt: skip
     """Write project, search, lenses, pictures and report.
 
@@ -125,6 +140,8 @@ def write_folder(
     found : tuple of Outcome
     proven : tuple of Obstacle
         What is known to be impossible.
+    conflict : tuple of Breach
+        As in `summary`.
 
     Returns
     -------
@@ -152,7 +169,7 @@ def write_folder(
         pictures = found_pictures(one, problem, project)
         draft = _draft(folder / f"lens-{number}.png", one, project, remarks)
         sections.append(_section(number, one, problem, wanted, png_bytes(pictures[0]), draft))
-    data = summary(state, found, problem, proven)
+    data = summary(state, found, problem, proven, conflict)
     _write_text(folder / "report.html", _page(data, "".join(sections), wanted))
     return remarks
 
@@ -230,7 +247,7 @@ def _section(number: int, one: Outcome, problem: Problem, target: bytes, found: 
     return (
         f"<h2>Lens {number}</h2><p>fitness {one.fitness:.3g} mm² (best matching), {one.fitness_algorithm1:.3g} "
         f"(Algorithm 1), f/{one.lens.f_number:.3g}, stop at row {one.structure.stop}: "
-        f"<code>lens-{number}.toml</code>{html.escape(_glasses(one) + _traced(one))}</p>"
+        f"<code>lens-{number}.toml</code>{html.escape(_glasses(one) + _traced(one) + _broken(one))}</p>"
         f'<figure><img src="{_inline(target)}"><figcaption>wanted</figcaption></figure>'
         f'<figure><img src="{_inline(found)}"><figcaption>found</figcaption></figure>{rendered}'
         "<details><summary>every ghost</summary><table><tr><th>wanted</th><th>ghost</th><th>place off, mm</th>"
@@ -246,6 +263,13 @@ def _glasses(one: Outcome) -> str:
     return f"; with any index {one.fitness_any_index:.3g} mm²; glass behind row {listed}"
 
 
+def _broken(one: Outcome) -> str:
+    """Tell which hard limits a lens does not keep."""
+    if not one.breaks:
+        return ""
+    return "; it breaks " + ", ".join(f"{each.name} by {each.amount:.2g}" for each in one.breaks)
+
+
 def _traced(one: Outcome) -> str:
     """Tell how far traced ghosts are off, before and after they were finished; nothing where none was traced."""
     if one.fitness_traced is None:
@@ -259,6 +283,8 @@ def _page(data: dict[str, Any], sections: str, target: bytes) -> str:
         "met": "The wanted ghosts are met.",
         "nearly": "The wanted ghosts are nearly met.",
         "impossible": "No lens can meet all wanted ghosts. The nearest are below; a table tells how far each is off.",
+        "contradictory": "No lens was found that keeps the hard limits together, not even one of any ghosts. The "
+        "nearest are below; each tells what it breaks.",
         "unsolved": "The wanted ghosts are not met: a longer search, more surfaces or wider bounds may help; the table "
         "of a lens tells which ghosts are far off.",
     }
