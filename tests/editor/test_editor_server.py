@@ -14,7 +14,7 @@ pytest.importorskip("uvicorn", reason="the extra ui is not installed")
 from flarewright.cli.app import run
 from flarewright.editor.desk import Desk
 from flarewright.editor.guard import Guard
-from flarewright.editor.server import _GET, _POST, make_app
+from flarewright.editor.server import _GET, _POST, SOCKETS, make_app
 from flarewright.editor.session import begin
 from flarewright.io.lens_file import read_lens
 
@@ -27,7 +27,7 @@ def desk():
 
     session, _ = begin(None)
     desk = Desk(session)
-    server = uvicorn.Server(uvicorn.Config(make_app(desk), port=0, log_level="warning", lifespan="off"))
+    server = uvicorn.Server(uvicorn.Config(make_app(desk), port=0, log_level="warning", lifespan="off", **SOCKETS))
     thread = threading.Thread(target=server.run, daemon=True)
     thread.start()
     while not server.started:
@@ -146,6 +146,31 @@ def test_a_background_that_is_gone_is_told(desk, tmp_path):
     assert (code, "is gone" in answer["error"]) == (400, True)
     told(desk, "/api/view", {"plate": None})
     assert ask(desk, "/api/picture")[0] == 200
+
+
+def test_a_hand_is_followed_through_a_socket(desk):
+    from websockets.sync.client import connect
+
+    def ask_for(socket, **values):
+        socket.send(json.dumps(values))
+        head, _, picture = socket.recv().partition(b"\n")
+        return json.loads(head), picture
+
+    revision = desk.session.revision
+    address = desk.address.replace("http", "ws") + "/ws/moving"
+    with connect(address) as socket:
+        head, picture = ask_for(socket, number=1, light=0, x="3", y="1", revision=revision)
+        assert (head["number"], head["lights"], picture[:2]) == (1, [[3.0, 1.0]], b"\xff\xd8")
+        # the light has no path: it stays
+        head, picture = ask_for(socket, number=2, at="2.5", revision=revision)
+        assert (head["lights"], picture[:2]) == ([[8.0, 4.4]], b"\xff\xd8")
+        head, picture = ask_for(socket, number=3, light=0, x="3", y="1", revision=revision - 1)
+        assert (head, picture) == ({"number": 3}, b"")
+        head, picture = ask_for(socket, number=4, light=7, x="3", y="1", revision=revision)
+        assert ("there is no light 7" in head["error"], picture) == (True, b"")
+        assert "did not understand" in ask_for(socket, number=5, light="first", x="3", y="1")[0]["error"]
+    with pytest.raises(Exception, match=r"403|1008|rejected"), connect(address, origin="http://evil.example"):
+        pass
 
 
 def test_strangers_are_kept_out(desk):

@@ -11,7 +11,7 @@ from flarewright.editor.deeds import DEEDS, done
 from flarewright.editor.edit_ghosts import Hand, hand, soloed
 from flarewright.editor.edit_lens import own_lens, prescription
 from flarewright.editor.edit_wishes import direction, new_discs, target_project
-from flarewright.editor.jobs import Lane
+from flarewright.editor.jobs import Gate, Lane
 from flarewright.editor.session import begin
 from flarewright.editor.view import View
 from flarewright.errors import FlarewrightError
@@ -340,3 +340,32 @@ def test_a_lane_outlives_a_job_that_fails(capsys):
 def test_a_lens_named_on_the_command_line_has_an_autosave_of_its_own():
     assert autosave_path(None) != autosave_path("tessar-brendel")
     assert Light(field_deg=(0, 0)) is not None
+
+
+def test_a_gate_lets_the_newest_through_first():
+    gate, order = Gate(), []
+    held, waiting = threading.Event(), threading.Semaphore(0)
+
+    def go(name):
+        waiting.release()
+        with gate:
+            order.append(name)
+
+    def hold():
+        with gate:
+            waiting.release()
+            held.wait(10.0)
+
+    threads = [threading.Thread(target=hold)]
+    threads[0].start()
+    waiting.acquire(timeout=10.0)
+    for name in "abc":
+        threads.append(threading.Thread(target=go, args=(name,)))
+        threads[-1].start()
+        waiting.acquire(timeout=10.0)
+        while len(gate._waiting) < len(threads) - 1:
+            pass
+    held.set()
+    for thread in threads:
+        thread.join(10.0)
+    assert order == ["c", "b", "a"]

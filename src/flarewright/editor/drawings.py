@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import threading
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -27,13 +26,14 @@ from ..render.figure import to_svg
 from ..render.prepare import as_lens, load_lens, settle
 from .autosave import state_folder
 from .files import project_for_lens
+from .jobs import Gate
 from .shown import jpeg, pixels_of, png
 from .studio import exposure_of, take
 from .view import View
 
 THUMB_SCALE = 0.25
 # thumbnails are drawn one at a time: they are many, and the picture in the viewport comes first
-_THUMBS = threading.Lock()
+_THUMBS = Gate()
 
 
 @dataclass(frozen=True)

@@ -83,3 +83,27 @@ class Lane:
                 with self._wake:
                     self._busy = False
                     self._wake.notify_all()
+
+
+class Gate:
+    """Lets one through at a time, whoever asked last first: what a person looks at now is what they asked for last."""
+
+    def __init__(self) -> None:
+        self._wake = threading.Condition()
+        self._waiting: list[object] = []
+        self._busy = False
+
+    def __enter__(self) -> None:
+        """Wait for one's turn."""
+        ticket = object()
+        with self._wake:
+            self._waiting.append(ticket)
+            self._wake.wait_for(lambda: not self._busy and self._waiting[-1] is ticket)
+            self._waiting.pop()
+            self._busy = True
+
+    def __exit__(self, *_: object) -> None:
+        """Let the next one through."""
+        with self._wake:
+            self._busy = False
+            self._wake.notify_all()

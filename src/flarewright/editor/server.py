@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import asyncio
 import errno
 import json
 import tempfile
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Mapping
+from contextlib import suppress
 from functools import partial, wraps
 from pathlib import Path
 from typing import Any
@@ -17,6 +19,7 @@ from starlette.requests import Request
 from starlette.responses import FileResponse, JSONResponse, Response
 from starlette.routing import Mount, Route, WebSocketRoute
 from starlette.staticfiles import StaticFiles
+from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from ..errors import FlarewrightError, ProjectError
 from ..model import Project
@@ -25,11 +28,14 @@ from .desk import Desk
 from .edit_path import go_to
 from .edit_shot import move_light
 from .guard import Application, Guard
+from .hand import Moved
 from .imports import take_in
 from .snapshot import ghosts_of
 
 STATIC = Path(__file__).parent / "static"
 MOST_SECONDS = 3600.0
+# pictures are packed already
+SOCKETS: dict[str, Any] = {"ws": "websockets-sansio", "ws_per_message_deflate": False}
 
 Answer = Callable[[Request], Awaitable[Response]]
 Work = Callable[[Desk, Request, Any], Any]
@@ -98,20 +104,53 @@ def _picture(desk: Desk, _request: Request, _body: Any) -> Any:
     return _jpeg(viewing.shown_jpeg(desk.screen))
 
 
-def _moving(desk: Desk, request: Request, _body: Any) -> Any:
+def _moved(desk: Desk, asked: Mapping[str, Any]) -> Moved | None:
     """Draw the project with a light elsewhere, or at a time of its path."""
-    asked = request.query_params
     revision = int(asked.get("revision", desk.session.revision))
     moved: Callable[[Project], Project]
     if "at" in asked:
         moved = partial(go_to, at_s=float(asked["at"]))
     else:
         moved = partial(move_light, light=int(asked["light"]), x=float(asked["x"]), y=float(asked["y"]))
-    found = desk.hand.picture(moved, revision)
-    if found is None:
-        return Response(status_code=204)
-    places = [light.field_deg for light in found.project.lights]
-    return _jpeg(found.jpeg, {"X-Seconds": f"{found.seconds:.4f}", "X-Lights": json.dumps(places)})
+    return desk.hand.picture(moved, revision)
+
+
+def _moving(desk: Desk, request: Request, _body: Any) -> Any:
+    found = _moved(desk, request.query_params)
+    return Response(status_code=204) if found is None else _jpeg(found.jpeg)
+
+
+async def _follow(desk: Desk, socket: WebSocket) -> None:
+    """Answer the questions of a hand as they come: a line of JSON, then the picture.
+
+    A socket costs browser and server less a picture than requests do.
+    """
+    await socket.accept()
+    tasks: set[asyncio.Task[None]] = set()
+
+    async def answer(asked: dict[str, Any]) -> None:
+        head: dict[str, Any] = {"number": asked.get("number")}
+        picture = b""
+        try:
+            found = await run_in_threadpool(_moved, desk, asked)
+            if found is not None:
+                picture = found.jpeg
+                head |= {"seconds": round(found.seconds, 4), "lights": [one.field_deg for one in found.project.lights]}
+        except FlarewrightError as error:
+            head["error"] = str(error)
+        except (ValueError, KeyError, TypeError) as error:
+            head["error"] = f"the editor did not understand the page: {error}"
+        # the tab may be gone by now
+        with suppress(RuntimeError, WebSocketDisconnect):
+            await socket.send_bytes(json.dumps(head).encode() + b"\n" + picture)
+
+    try:
+        while True:
+            task = asyncio.create_task(answer(dict(json.loads(await socket.receive_text()))))
+            tasks.add(task)
+            task.add_done_callback(tasks.discard)
+    except (WebSocketDisconnect, ValueError):
+        return
 
 
 def _target(desk: Desk, _request: Request, _body: Any) -> Any:
@@ -302,7 +341,8 @@ def make_app(desk: Desk, token: str | None = None) -> Application:
     routes: list[Any] = [Route("/", _index)]
     routes += [Route(path, told(work)(desk), methods=["GET"]) for path, work in _GET.items()]
     routes += [Route(path, told(work)(desk), methods=["POST"]) for path, work in _POST.items()]
-    routes += [WebSocketRoute("/ws", desk.socket), Mount("/static", StaticFiles(directory=STATIC))]
+    routes += [WebSocketRoute("/ws", desk.socket), WebSocketRoute("/ws/moving", partial(_follow, desk))]
+    routes += [Mount("/static", StaticFiles(directory=STATIC))]
     return Guard(Starlette(routes=routes), token)
 
 
@@ -341,7 +381,7 @@ def serve(desk: Desk, host: str, port: int, token: str | None, ready: Callable[[
         # whoever comes now waits until the server is up
         place.listen(128)
         desk.screen.start()
-        config = uvicorn.Config(make_app(desk, token), log_level="warning", lifespan="off", ws="websockets-sansio")
+        config = uvicorn.Config(make_app(desk, token), log_level="warning", lifespan="off", **SOCKETS)
         ready(place.getsockname()[1])
         uvicorn.Server(config).run([place])
     desk.session.keeper.close()

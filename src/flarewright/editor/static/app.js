@@ -163,7 +163,7 @@ function header() {
     h('span', { class: 'brand' }, 'Flarewright'),
     button('Open', openFile, { tip: 'Open a project, a lens file or a lens by its name (O).', id: 'open' }),
     button('Save', () => save(), { tip: 'Save the project file (Ctrl+S).', id: 'save' }),
-    button('Export ▾', (event) => menu(event.currentTarget, exports), { id: 'export' }),
+    button('Export ▾', (event) => menu(event.currentTarget, exports), { id: 'export', tip: 'Pictures, lens, project, table of ghosts, or the command that renders the saved project.' }),
     file, h('span', { class: 'split' }), undo, redo, h('span', { class: 'gap' }), exposed, auto, look,
     button('?', help, { kind: 'quiet', tip: 'All shortcuts (?).', 'aria-label': 'Help', id: 'help' }),
   );

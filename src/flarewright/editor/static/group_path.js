@@ -5,15 +5,15 @@ export function pathGroup(app) {
   const { player } = app;
   const span = () => Math.max(5, Math.ceil(app.state?.path_s ?? 0), Math.ceil(player.at));
   const keys = () => app.state.lights[app.light].keys;
-  const bar = h('input', { type: 'range', min: 0, step: 0.01, value: 0, name: 'path_at', 'aria-label': 'Time on the path, seconds' });
-  const box = h('input', { class: 'number', type: 'text', inputmode: 'decimal', name: 'path_time', 'aria-label': 'Time, seconds', style: 'width:56px' });
+  const bar = h('input', { type: 'range', min: 0, step: 0.01, value: 0, name: 'path_at', 'aria-label': 'Time on the path, seconds', tip: 'Along the path by hand: drafts while it moves, the final picture where it rests.' });
+  const box = h('input', { class: 'number', type: 'text', inputmode: 'decimal', name: 'path_time', 'aria-label': 'Time, seconds', tip: 'Go to a time, also behind the last key, to put the next one there.', style: 'width:56px' });
   const marks = h('div', { class: 'marks' });
   const body = h('tbody');
   const table = h('table', { class: 'keys' }, h('thead', {}, h('tr', {}, h('th', { scope: 'col' }, 'Seconds'), h('th', { scope: 'col' }, 'Right °'), h('th', { scope: 'col' }, 'Up °'), h('th'))), body);
   const play = button('▶ Play', () => player.toggle(), { id: 'path-play', tip: 'Plays the light along its path; where it stops the light stays, which undo takes back (T).' });
   const key = button('Key', () => player.key(), { id: 'path-key', tip: 'Where the light is now is where it shall be at this time (K).' });
   const loop = h('input', { type: 'checkbox', name: 'path_loop' });
-  const clear = button('Remove path', () => app.deed('clear_keys', { light: app.light }).catch(() => {}), { kind: 'quiet', id: 'path-clear' });
+  const clear = button('Remove path', () => app.deed('clear_keys', { light: app.light }).catch(() => {}), { kind: 'quiet', id: 'path-clear', tip: 'Take all keys of this light away; it stays where it is.' });
   const told = h('p', { class: 'quietly' });
   loop.addEventListener('change', () => player.setLoop(loop.checked));
   bar.addEventListener('input', () => player.scrub(Number(bar.value)));

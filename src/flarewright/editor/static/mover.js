@@ -11,7 +11,7 @@ export function mover(app, shown) {
   let usual = 30;
   let waiting = 0;
   const self = { live: false, lights: null, stats: { shown: [], latency: [], server: [] } };
-  self.want = (query, time) => { self.live = true; next = { query, time }; pump(); };
+  self.want = (values, time) => { self.live = true; next = { values, time }; pump(); };
   self.stop = () => { self.live = false; next = null; };
   self.busy = () => under > 0;
   // what is under way ends final pictures: whoever wants one waits for it
@@ -31,18 +31,49 @@ export function mover(app, shown) {
     asked = performance.now();
     ask(now, ++sent).finally(() => { under -= 1; pump(); });
   }
+  // one socket for all pictures: it costs less than a request each
+  let socket = null;
+  const waits = new Map();
+  function opened() {
+    socket ??= new Promise((done, failed) => {
+      const made = new WebSocket(`${location.protocol === 'https:' ? 'wss' : 'ws'}://${location.host}/ws/moving`);
+      made.binaryType = 'arraybuffer';
+      made.onopen = () => done(made);
+      made.onmessage = ({ data }) => {
+        const bytes = new Uint8Array(data);
+        const end = bytes.indexOf(10);
+        const head = JSON.parse(new TextDecoder().decode(bytes.subarray(0, end)));
+        waits.get(head.number)?.done([head, bytes.subarray(end + 1)]);
+        waits.delete(head.number);
+      };
+      made.onclose = () => {
+        socket = null;
+        const lost = new TypeError('fetch: the editor is gone');
+        failed(lost);
+        for (const each of waits.values()) each.failed(lost);
+        waits.clear();
+      };
+    });
+    return socket;
+  }
+  async function answered(values, number) {
+    const line = await opened();
+    return new Promise((done, failed) => {
+      waits.set(number, { done, failed });
+      line.send(JSON.stringify({ ...values, number, revision: app.state.revision }));
+    });
+  }
   async function ask(now, number) {
     try {
-      const answer = await fetch(`/api/moving?${now.query}&revision=${app.state.revision}`);
-      if (answer.status === 204) return;
-      if (!answer.ok) throw new Error((await answer.json()).error);
-      const lights = JSON.parse(answer.headers.get('X-Lights'));
-      const bitmap = await createImageBitmap(await answer.blob());
+      const [head, bytes] = await answered(now.values, number);
+      if (head.error) throw new Error(head.error);
+      if (!bytes.length) return;
+      const { lights, seconds } = head;
+      const bitmap = await createImageBitmap(new Blob([bytes], { type: 'image/jpeg' }));
       if (number < received || !self.live) return;
       received = number;
       self.lights = lights;
       shown(bitmap, lights);
-      const seconds = Number(answer.headers.get('X-Seconds'));
       usual += 0.2 * (1000 * seconds - usual);
       self.stats.server.push(seconds);
       requestAnimationFrame((time) => { self.stats.shown.push(time); self.stats.latency.push(performance.now() - now.time); });

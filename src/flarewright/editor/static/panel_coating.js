@@ -1,8 +1,10 @@
 // Coatings: of the whole lens, of one row, and the colours that a ghost can have.
 import { latest } from './api.js';
-import { button, choice, entry, group, h } from './ui.js';
+import { button, choice, entry, group, h, slider } from './ui.js';
 
 const KNOWN = [['lens', 'as the lens file says'], ['none', 'bare glass'], ['quarter-wave:550', 'quarter wave at 550 nm'], ['quarter-wave:450', 'quarter wave at 450 nm'], ['uncoated-1930s', 'uncoated, 1930s'], ['single-1950s', 'single film, 1950s'], ['early-multicoat', 'early multicoat'], ['modern-broadband', 'modern broadband']];
+const KINDS = [['none', 'bare glass'], ['quarter-wave', 'quarter wave'], ['film', 'free film'], ['uncoated-1930s', 'uncoated, 1930s'], ['single-1950s', 'single film, 1950s'], ['early-multicoat', 'early multicoat'], ['modern-broadband', 'modern broadband']];
+const FIRST = { 'quarter-wave': 'quarter-wave:550', film: 'film:1.38:100' };
 // ends of the map, as the server draws it
 const LOW = 380;
 const HIGH = 750;
@@ -14,7 +16,20 @@ export function coatingPanel(app) {
     entry({ label: 'Or as text', tip: 'quarter-wave:550, film:1.38:96, stack:1.38:96,2.1:120 and so on: films from the air to the glass.', words: true, name: 'coating_text', get: (s) => s.coating, set: coat }),
   ]);
   const rows = h('div', { class: 'buttons' });
-  const field = entry({ label: 'Its coating', tip: 'none, quarter-wave:NM, film:INDEX:NM, stack:…, or the name of a standard coating.', words: true, name: 'row_coating', get: (s) => line(s)?.coating ?? '', set: (text) => app.deed('set_cell', { row: row(), column: 'coating', text }).catch(() => {}) });
+  const field = entry({ label: 'As text', tip: 'none, quarter-wave:NM, film:INDEX:NM, stack:…, or the name of a standard coating.', words: true, name: 'row_coating', get: (s) => line(s)?.coating ?? '', set: (text) => app.deed('set_cell', { row: row(), column: 'coating', text }).catch(() => {}) });
+  // what a row wears, taken apart: quarter-wave:NM, film:INDEX:NM, or a text of its own
+  const worn = (state) => {
+    const text = line(state)?.coating || 'none';
+    const [kind, ...numbers] = text.split(':');
+    const plain = numbers.length === { 'quarter-wave': 1, film: 2 }[kind] && numbers.every((each) => Number.isFinite(Number(each)));
+    return plain ? { kind, numbers: numbers.map(Number) } : { kind: KINDS.some(([key]) => key === text) ? text : 'text', numbers: [] };
+  };
+  const wear = (text, held = '') => app.lively('set_cell', { row: row(), column: 'coating', text }, held, `coat${row()}`);
+  const film = () => { const { kind, numbers } = worn(app.state); return kind === 'film' ? numbers : [1.38, 100]; };
+  const kinds = choice({ label: 'Kind', name: 'row_kind', tip: 'One film of a quarter of a wavelength is what lenses of the 1950s wear; a free film takes colours that no such film gives (thesis section 5.4).', options: (s) => (worn(s).kind === 'text' ? [...KINDS, ['text', 'layers, as written below', true]] : KINDS), get: (s) => worn(s).kind, set: (kind) => wear(FIRST[kind] ?? kind) });
+  const quarter = slider({ label: 'Wavelength', name: 'row_nm', tip: 'Centre wavelength: it reflects this colour least, so what is left is the opposite one.', min: LOW, max: HIGH, step: 2, digits: 0, unit: 'nm', get: (s) => worn(s).numbers[0] ?? 550, set: (nm, held) => wear(`quarter-wave:${nm}`, held) });
+  const index = slider({ label: 'Film index', name: 'row_index', tip: 'Magnesium fluoride has 1.38; the nearer to the root of the glass’ index, the less is reflected.', min: 1.2, max: 2.6, step: 0.01, get: () => film()[0], set: (n, held) => wear(`film:${n}:${film()[1]}`, held) });
+  const thick = slider({ label: 'Thickness', name: 'row_thickness', tip: 'Of the film: a thicker one reflects more colours in turn.', min: 10, max: 750, step: 1, digits: 0, unit: 'nm', get: () => film()[1], set: (nm, held) => wear(`film:${film()[0]}:${nm}`, held) });
   const plot = h('div', { class: 'plot' });
   const pair = h('div', { class: 'group', hidden: true });
   const mapTold = h('span', { class: 'quietly' });
@@ -53,12 +68,15 @@ export function coatingPanel(app) {
     try { await app.deed('set_row_wavelengths', { values: { [j]: first, [i]: second } }); } catch (error) { void error; }
   });
   return {
-    element: h('div', {}, whole.element, h('div', { class: 'group' }, h('h3', {}, 'One row'), rows, field.element), plot, pair),
+    element: h('div', {}, whole.element, h('div', { class: 'group' }, h('h3', {}, 'One row'), rows, kinds.element, quarter.element, index.element, thick.element, field.element), plot, pair),
     update(state) {
       whole.update(state);
       const here = row();
       rows.replaceChildren(...surfaces(state).map((each) => button(String(each.row), () => { app.row = each.row; app.panels.coating.update(app.state); }, { kind: each.row === here ? 'on' : '', tip: each.coating || 'no coating' })));
-      field.update(state);
+      for (const part of [kinds, quarter, index, thick, field]) part.update(state);
+      const { kind } = worn(state);
+      quarter.element.hidden = kind !== 'quarter-wave';
+      index.element.hidden = thick.element.hidden = kind !== 'film';
       drawPlot(JSON.stringify([here, line(state)]));
       const two = app.ghost && /^\d+-\d+$/.test(app.ghost);
       pair.hidden = !two;

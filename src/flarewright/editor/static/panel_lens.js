@@ -90,8 +90,8 @@ export function lensPanel(app) {
   }
   const rowDeed = (name) => () => app.deed(name, { row: app.row }).catch(() => {});
   const add = button('Add row', rowDeed('add_row'), { tip: 'A plane surface behind the chosen row, in the middle of its gap.', id: 'add-row' });
-  const copy = button('Duplicate', rowDeed('duplicate_row'));
-  const remove = button('Remove', rowDeed('remove_row'), { id: 'remove-row' });
+  const copy = button('Duplicate', rowDeed('duplicate_row'), { tip: 'The same surface once more behind the chosen row.' });
+  const remove = button('Remove', rowDeed('remove_row'), { id: 'remove-row', tip: 'Take the chosen row out; the gap in front of it takes its room.' });
   const stop = button('Make it the stop', rowDeed('move_stop'), { tip: 'The iris moves there: which ghosts it bounds, and so their size, changes. The old stop is taken out.' });
   const own = group('Lens', [
     entry({ label: 'Name', tip: 'Of the lens.', words: true, name: 'lens_name', get: (s) => s.lens.name, set: (name) => name && app.deed('set_lens_facts', { values: { name } }).catch(() => {}) }),

@@ -4,7 +4,7 @@ import { h } from './ui.js';
 
 export function libraryPanel(app) {
   let lenses = null;
-  const box = h('input', { type: 'text', placeholder: 'Search by name, maker or patent', name: 'search', style: 'width:100%', 'aria-label': 'Search lenses' });
+  const box = h('input', { type: 'text', placeholder: 'Search by name, maker or patent', name: 'search', style: 'width:100%', tip: 'Every word must occur in name, maker, patent or f-number.', 'aria-label': 'Search lenses' });
   const shelf = h('div', { class: 'library' });
   const told = h('p', { class: 'quietly' });
   const watcher = new IntersectionObserver((entries) => { for (const each of entries) if (each.isIntersecting) { each.target.src = each.target.dataset.src; watcher.unobserve(each.target); } });

@@ -53,9 +53,9 @@ export function lightPanel(app) {
   return {
     element: h('div', {}, lights.element, path.element, shot.element, seeing.element, hiding.element, work.element),
     update(state) {
-      choose.replaceChildren(...state.lights.map((light, k) => button(light.name === 'light' ? `Light ${k + 1}` : light.name, () => { app.chooseLight(k); app.panels.light.update(app.state); app.view.redraw(); }, { kind: k === app.light ? 'on' : '' })),
+      choose.replaceChildren(...state.lights.map((light, k) => button(light.name === 'light' ? `Light ${k + 1}` : light.name, () => { app.chooseLight(k); app.panels.light.update(app.state); app.view.redraw(); }, { kind: k === app.light ? 'on' : '', tip: 'The light that the controls below, the arrow keys and a drag of the picture move.' })),
         button('+', () => app.deed('add_light', {}).catch(() => {}), { kind: 'quiet', tip: 'Add a light.' }),
-        button('Remove', () => app.deed('remove_light', { light: app.light }).catch(() => {}), { kind: 'quiet', disabled: state.lights.length < 2 }));
+        button('Remove', () => app.deed('remove_light', { light: app.light }).catch(() => {}), { kind: 'quiet', disabled: state.lights.length < 2, tip: 'Take the chosen light away; one always stays.' }));
       for (const part of [lights, path, shot, seeing, hiding, work]) part.update(state);
     },
     moved(angles) {

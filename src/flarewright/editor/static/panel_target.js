@@ -1,7 +1,10 @@
 // Annotate and solve: what the ghosts shall be, and the lenses that make them so.
 import { button, choice, entry, group, h, row, slider, tick } from './ui.js';
 
-const COMPARE = [['physical', 'Physical'], ['target', 'Target'], ['wipe', 'Wipe'], ['side', 'Side by side']];
+const COMPARE = [
+  ['physical', 'Physical', 'What the lens does (W walks through these four).'], ['target', 'Target', 'The picture as it is wished for: no lens makes it yet.'],
+  ['wipe', 'Wipe', 'Target to the right of a line that can be dragged.'], ['side', 'Side by side', 'Both at once.'],
+];
 
 export function targetPanel(app) {
   const wishes = () => app.state.design?.wishes ?? [];
@@ -11,7 +14,7 @@ export function targetPanel(app) {
     ? app.lively('set_new_wish', { number: app.wish, values }, held, 'wish')
     : app.ghost && app.lively('set_wish', { ghost: app.ghost, values }, held, 'wish'));
   const compare = h('div', { class: 'buttons', role: 'group', 'aria-label': 'What is shown' });
-  const looks = COMPARE.map(([key, words]) => button(words, () => see(key), { 'data-compare': key }));
+  const looks = COMPARE.map(([key, words, tip]) => button(words, () => see(key), { 'data-compare': key, tip }));
   compare.append(...looks);
   const see = (key) => { app.view.compare = key; app.view.refreshTarget(); self.update(app.state); app.view.redraw(); };
   const list = h('div', { class: 'buttons' });
@@ -20,7 +23,7 @@ export function targetPanel(app) {
   colour.addEventListener('change', () => set({ color: [1, 3, 5].map((k) => Number(((parseInt(colour.value.slice(k, k + 2), 16) / 255) ** 2.2).toFixed(4))) }));
   const drop = button('Remove ghost', () => set({ action: mine()?.action === 'remove' ? 'want' : 'remove' }), { tip: 'It shall not be seen at all.', id: 'wish-remove' });
   const ignore = button('Any', () => set({ action: mine()?.action === 'ignore' ? 'want' : 'ignore' }), { tip: 'Whatever becomes of this ghost is fine; the solver is freer.' });
-  const back = button('Take back', () => (app.wish !== null ? app.deed('remove_wish', { number: app.wish }).then(() => { app.wish = null; }) : app.deed('remove_wish', { number: wishes().indexOf(mine()) })).catch(() => {}), { kind: 'quiet' });
+  const back = button('Take back', () => (app.wish !== null ? app.deed('remove_wish', { number: app.wish }).then(() => { app.wish = null; }) : app.deed('remove_wish', { number: wishes().indexOf(mine()) })).catch(() => {}), { kind: 'quiet', tip: 'Forget what was wished of this ghost.' });
   const fields = group('What it shall be', [
     slider({ label: 'Move', tip: 'Along the line from the middle of the picture to the light, mm: no ghost of a lens of revolution can leave it.', min: -20, max: 20, step: 0.05, unit: 'mm', name: 'wish_move', get: () => (app.wish !== null ? mine()?.place_mm : mine()?.move_mm) ?? 0, set: (value, held) => set(app.wish !== null ? { place_mm: value } : { move_mm: value }, held) }),
     slider({ label: 'Size ×', tip: 'Of its radius. Its light stays, so a smaller ghost is brighter.', min: 0.05, max: 5, step: 0.01, curve: 2, name: 'wish_size', get: () => mine()?.height ?? 1, set: (height, held) => set({ height }, held) }),
@@ -35,11 +38,11 @@ export function targetPanel(app) {
   ]);
   let seconds = 20;
   const time = entry({ label: 'Seconds', tip: 'Stop it any time; the best lenses so far are kept.', digits: 0, name: 'seconds', get: () => seconds, set: (value) => { if (value > 0) seconds = value; } });
-  const solve = button('Solve', () => app.ask('/api/solve', { seconds }), { kind: 'main', id: 'solve' });
+  const solve = button('Solve', () => app.ask('/api/solve', { seconds }), { kind: 'main', id: 'solve', tip: 'Search lenses whose ghosts are where they are wished to be; the best so far are shown below.' });
   const colors = button('Solve colours', () => app.ask('/api/colors', { kind: 'quarter-wave' }), { tip: 'Quarter-wave coatings for all rows, so that ghosts get the wished colours and the others keep theirs.', id: 'solve-colors' });
   const films = button('…with free films', () => app.ask('/api/colors', { kind: 'film' }), { tip: 'Films of any index and thickness: more colours, less like real lenses.' });
-  const stop = button('Stop', () => app.ask('/api/stop'), { id: 'stop' });
-  const clear = button('Take all back', () => app.deed('clear_wishes', {}).catch(() => {}), { kind: 'quiet' });
+  const stop = button('Stop', () => app.ask('/api/stop'), { id: 'stop', tip: 'End the search and keep the best.' });
+  const clear = button('Take all back', () => app.deed('clear_wishes', {}).catch(() => {}), { kind: 'quiet', tip: 'Forget all wishes; the lens stays.' });
   const add = button('Add a ghost', () => app.deed('add_ghost', { place_mm: 5, radius_mm: 1.5 }).then(() => app.chooseWish(wishes().length - 1)).catch(() => {}), { tip: 'One that the lens has not; drag it along the line.', id: 'wish-add' });
   const progress = h('p', { class: 'quietly', id: 'solve-words' });
   const found = h('div', { class: 'candidates' });

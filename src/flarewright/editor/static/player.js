@@ -21,7 +21,7 @@ export function player(app) {
     requestAnimationFrame(frame);
   }
   function show(time = performance.now()) {
-    app.view.mover.want(`at=${self.at.toFixed(3)}`, time);
+    app.view.mover.want({ at: self.at.toFixed(3) }, time);
     self.heard();
   }
   self.play = () => {

@@ -243,7 +243,7 @@ export function viewport(canvas, app) {
     const [mx, my] = toMm(px - drag.offX, py - drag.offY);
     drag.now = [angle(mx), angle(my)];
     // the handle moves with the picture: painting costs more than all else here
-    self.mover.want(`light=${drag.light}&x=${drag.now[0].toFixed(4)}&y=${drag.now[1].toFixed(4)}`, time);
+    self.mover.want({ light: drag.light, x: drag.now[0].toFixed(4), y: drag.now[1].toFixed(4) }, time);
     if (!self.mover.busy()) redraw();
   }
   // What moved is kept by a deed, and the final picture follows; also where nothing has changed after all.
