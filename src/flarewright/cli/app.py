@@ -29,6 +29,7 @@ from . import (
     lens_schema,
     lens_show,
     lenses,
+    measure_explain,
     measure_replay,
     measure_report,
     measure_run,
@@ -98,6 +99,7 @@ measure_app.command("find", epilog=measure_stages.FIND_EPILOG)(measure_stages.fi
 measure_app.command("fit", epilog=measure_stages.FIT_EPILOG)(measure_stages.fit)
 measure_app.command("track", epilog=measure_stages.TRACK_EPILOG)(measure_stages.track)
 measure_app.command("compress", epilog=measure_stages.COMPRESS_EPILOG)(measure_stages.compress)
+measure_app.command("explain", epilog=measure_explain.EPILOG)(measure_explain.explain)
 measure_app.command("report", epilog=measure_report.EPILOG)(measure_report.report)
 measure_app.command("replay", epilog=measure_replay.EPILOG)(measure_replay.replay)
 

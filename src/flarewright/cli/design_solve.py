@@ -93,8 +93,8 @@ def resume(
 def search(
     project: Project, folder: Path, time_s: float, state: State, lenses: int, searches: int | None,
     threads: int | None, as_json: bool, name: str | None = None,
-    choice: Choice | None = None, measure: Measure = "ours",
-) -> None:  # fmt: skip
+    choice: Choice | None = None, measure: Measure = "ours", talk: bool = True,
+) -> tuple[Problem, tuple[Outcome, ...], dict[str, Any]]:  # fmt: skip
     """Search, write the folder and tell what was found.
 
     Parameters
@@ -114,6 +114,15 @@ def search(
         None: pools of local minima.
     measure : {"ours", "algorithm1"}
         The fitness that a solver sees that evolves.
+    talk : bool
+        False: the caller tells what was found.
+
+    Returns
+    -------
+    problem : Problem
+    found : tuple of Outcome
+    data : dict
+        Facts for JSON.
     """
     from ..design.candidate import nearest_outcomes, outcomes
     from ..design.constraints import without_ghosts
@@ -146,10 +155,11 @@ def search(
     remarks = write_folder(folder, project, problem, state, found, proven, conflict)
     data = summary(state, found, problem, proven, conflict)
     tell([*(settled.remarks if name is None else ()), *remarks])
-    if as_json:
+    if talk and as_json:
         print_json({"folder": str(folder), **data})
-        return
-    _print(folder, problem, found, str(data["verdict"]), conflict)
+    elif talk:
+        _print(folder, problem, found, str(data["verdict"]), conflict)
+    return problem, found, data
 
 
 def _print(

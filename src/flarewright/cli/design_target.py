@@ -54,7 +54,7 @@ def target(
     if not all(hypot(*one) > 0.0 for one in angles):
         raise ProjectError("a light on the axis puts every ghost at its middle; give the angles it was seen at")
     model = source.suffix.lower() == ".json"
-    project = _of_model(source, angles, sensor_width, most) if model else _of_picture(
+    project = project_of_model(source, angles, sensor_width, most) if model else _of_picture(
         source, angles, sensor_width, focal, most
     )  # fmt: skip
     from ..io.project_file import project_text
@@ -72,7 +72,8 @@ def target(
     print(f"{len(wishes)} ghosts; take out of {output} what is none, and go on with flarewright design solve")
 
 
-def _of_model(source: Path, angles: list[tuple[float, float]], width: float, most: int) -> Project:
+def project_of_model(source: Path, angles: list[tuple[float, float]], width: float, most: int) -> Project:
+    """Make a project that wants a measured flare's ghosts, at lights and on a sensor so wide (mm)."""
     from ..design.seen import seen_project
     from ..io.ghost_model_file import read_ghost_model
     from ..measure.single import spots_of_model

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -52,6 +53,7 @@ def identify(
     entrance: float = 100.0,
     brightness: bool = False,
     stop_known: bool = False,
+    ghosts: Sequence[tuple[int, int]] | None = None,
 ) -> Identification:
     """Tell which variables of a lens its ghosts fix.
 
@@ -67,6 +69,8 @@ def identify(
         Whether the irradiance of every ghost is measured as well as place and size (bare surfaces).
     stop_known : bool
         Whether the stop's diameter is known.
+    ghosts : sequence of (int, int), optional
+        Mirrors of those that are measured; None: all.
 
     Returns
     -------
@@ -79,17 +83,20 @@ def identify(
     """
     names, columns, unit = _variables(structure, vector, stop_known)
     found = differentiate(structure, vector, entrance)
+    measured = np.array([ghosts is None or pair in ghosts for pair in structure.pairs])
     rows = []
     for slope in slopes:
         here = seen(found.values, float(slope))
-        for g in np.flatnonzero(here[:, 1] != HIDDEN):
+        for g in np.flatnonzero((here[:, 1] != HIDDEN) & measured):
             size = abs(here[g, 1]) + 0.3
             rows += [found.place[g] * slope / size, found.radius[g] / size]
             if brightness:
                 rows.append(found.log_irradiance_by[g])
     table = np.array(rows).reshape(-1, len(vector))[:, columns] * unit
+    if not rows:
+        table = np.zeros((1, len(names)))
     _, values, turned = np.linalg.svd(table, full_matrices=True)
-    rank = int((values > SMALLEST * values[0]).sum()) if values.size else 0
+    rank = int((values > SMALLEST * values[0]).sum()) if values.any() else 0
     free = turned[rank:].T
     moving = np.abs(free).max(axis=1, initial=0.0) > STILL
     remedies: list[str] = []

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from ..errors import FlarewrightError
 from ..kernels.measure_hough import search
 from ..model.ghost_model import AberrationGhost, GhostModel
+from .curves import pose_at
 from .find import LEVEL, Slopes, candidates, slopes_of
 from .numbers import Floats, bezier_numbers, field, frame, visible
 from .views import Pixels, View
@@ -200,11 +201,14 @@ def _disc(ghost: AberrationGhost, model: GhostModel, constellation_deg: float) -
     # green tells the shape, every colour its light
     f, g = (np.array(numbers) @ terms for numbers in (ghost.green.f, ghost.green.g))
     radius = float(((px * (s * f + px * g) + py * py * g).sum()) / u.sum())
+    pose = pose_at(ghost.curves, constellation_deg, ghost.visible_deg)
+    radius *= pose.size
     area = max(radius * radius, 1e-12)
-    light = [max(float((np.array(colour.intensity) @ terms).mean()), 0.0) / area
+    light = [pose.brightness * max(float((np.array(colour.intensity) @ terms).mean()), 0.0) / area
              for colour in (ghost.red, ghost.green, ghost.blue)]  # fmt: skip
     # which end of the pupil is up is not measured, so no ghost is upside down
-    return Spot(ghost.name, float((s * f + px * g).mean()), abs(radius), (light[0], light[1], light[2]), 1.0)
+    place = float((s * f + pose.size * px * g).mean()) + pose.along_px
+    return Spot(ghost.name, place, abs(radius), (light[0], light[1], light[2]), 1.0)
 
 
 def _bezier_disc(name: str, numbers: Floats) -> Spot:

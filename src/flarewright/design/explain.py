@@ -1,0 +1,120 @@
+"""What a search for a measured lens may claim: which ghosts it makes, and how much of the prescription they fix."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .candidate import Outcome
+from .identify import Identification, identify
+from .search import Problem
+
+Floats = NDArray[np.float64]
+
+# a ghost is explained when place and size are off by less than this part of its radius, or by this many mm
+PART, LEAST_MM = 0.1, 0.1
+# lenses explain alike when their misfits differ by less than this factor
+ALIKE = 2.0
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """What a search tells of a measured lens.
+
+    Attributes
+    ----------
+    explained : tuple of bool
+        By the best lens, target by target.
+    extra : int
+        Ghosts of that lens at that light which were not measured.
+    numbers : int
+        Places and sizes of the explained ghosts.
+    known : Identification
+        Which numbers of the prescription they fix near that lens.
+    alike : int
+        How many of the lenses found explain as many ghosts as well as the best does.
+    spread : float
+        Largest difference of an index of refraction between them; 0 when there is one.
+    """
+
+    explained: tuple[bool, ...]
+    extra: int
+    numbers: int
+    known: Identification
+    alike: int
+    spread: float
+
+
+def explain(problem: Problem, found: Sequence[Outcome]) -> Explanation:
+    """Judge what a search has found.
+
+    Parameters
+    ----------
+    problem : Problem
+    found : sequence of Outcome
+        Best first, at least one.
+
+    Returns
+    -------
+    Explanation
+    """
+    best = found[0]
+    explained = _explained(problem, best)
+    ghosts = sorted({pair for pair, yes in zip(best.ghosts, explained, strict=True) if yes})
+    aim = problem.objective
+    known = identify(best.structure, best.vector, aim.slopes, entrance=aim.entrance, ghosts=ghosts)
+    alike = [
+        one for one in found
+        if sum(_explained(problem, one)) == sum(explained) and one.fitness <= ALIKE * best.fitness + 1e-9
+    ]  # fmt: skip
+    indices = np.array([sorted(_indices(one)) for one in alike if one.structure.rows == best.structure.rows])
+    spread = float(np.ptp(indices, axis=0).max()) if len(indices) > 1 else 0.0
+    extra = len(set(best.structure.pairs) - set(best.ghosts))
+    return Explanation(explained, extra, 2 * len(ghosts), known, len(alike), spread)
+
+
+def _explained(problem: Problem, one: Outcome) -> tuple[bool, ...]:
+    limits = np.maximum(PART * np.abs(problem.objective.targets[:, 1]), LEAST_MM)
+    return tuple(bool(off) for off in (np.abs(one.residuals).max(axis=1) < limits))
+
+
+def _indices(one: Outcome) -> Floats:
+    """Return the index behind every row, air included."""
+    rows = one.structure.rows
+    return np.asarray(one.vector[1 + 2 * rows :], dtype=np.float64)
+
+
+def sentences(one: Explanation, names: Sequence[str]) -> list[str]:
+    """Say what was found and what nobody can know from these ghosts.
+
+    Parameters
+    ----------
+    one : Explanation
+    names : sequence of str
+        Of the targets.
+    """
+    missing = [name for name, yes in zip(names, one.explained, strict=True) if not yes]
+    said = [f"the best lens explains {sum(one.explained)} of {len(one.explained)} measured ghosts"
+            + (f" (not {', '.join(missing)})" if missing else "")
+            + (f", and has {one.extra} more that were not measured" if one.extra else "")]  # fmt: skip
+    known = one.known
+    loose = known.unknowns - known.rank
+    said.append(
+        f"their {one.numbers} places and sizes fix {known.rank} combinations of the {known.unknowns} numbers of its "
+        f"prescription" + (f"; {loose} stay free" if loose else "")
+    )
+    if loose:
+        said.append(
+            f"so this is one lens of a family of {loose} dimensions that make these ghosts, not the camera's own; "
+            f"what would fix it: {', '.join(known.remedies)}"
+        )
+    elif one.alike > 1:
+        said.append(f"near it no other lens makes them, but {one.alike} lenses far apart were found that do")
+    else:
+        said.append("near it no other lens makes them; lenses far from it may")
+    if one.alike > 1 and loose:
+        said.append(f"{one.alike} lenses were found that explain alike; their indices differ by up to {one.spread:.2f}")
+    return said
