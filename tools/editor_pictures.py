@@ -25,9 +25,32 @@ def shoot(tab: Tab, path: Path) -> None:
     print(f"{path} {path.stat().st_size // 1024} KB")
 
 
+def path(tab: Tab, folder: Path) -> None:
+    """Key a path and play it; afterwards all is as it was."""
+    for at, place in (("0", None), ("1.5", (0.35, 0.3)), ("3", (0.2, 0.8))):
+        tab.page.fill("input[name=path_time]", at)
+        tab.page.press("input[name=path_time]", "Enter")
+        tab.rest()
+        if place is not None:
+            tab.drag(tab.light(), tab.at(*place))
+            tab.rest()
+        tab.page.click("#path-key")
+        tab.rest()
+    tab.page.click("#path-play")
+    tab.until("flarewright.player.at > 0.8 && flarewright.view.shownGrade === 'moving'")
+    shoot(tab, folder / "editor-path.jpg")
+    tab.page.click("#path-play")
+    tab.rest()
+    while tab.state()["undo"]:
+        tab.page.click("#undo")
+        tab.page.wait_for_timeout(100)
+    tab.rest()
+
+
 def panels(tab: Tab, folder: Path) -> None:
     """Visit every panel once, as a person would who tries the program."""
     shoot(tab, folder / "editor-light.jpg")
+    path(tab, folder)
     tab.page.mouse.click(*tab.at(0.62, 0.6))
     tab.until("flarewright.ghost && flarewright.view.outline")
     tab.tab("ghosts")

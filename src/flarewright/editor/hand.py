@@ -5,11 +5,13 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import FlarewrightError
 from ..model import Project
 from ..render.display import view_sum
 from ..render.moving import Sheet, Still, moving_picture
@@ -91,8 +93,12 @@ class Hand:
 
     def prepare(self) -> None:
         """Draw once what all pictures of a hand share, before it moves."""
-        with self._one:
-            self._drawn(self.screen.session.project, self.screen.session.view)
+        project = self.screen.session.project
+        if project.iris is not None and project.iris.mask is not None:
+            # that takes seconds, which nobody may have to wait for in vain
+            return
+        with self._one, suppress(FlarewrightError):
+            self._drawn(project, self.screen.session.view)
 
     def _drawn(self, project: Project, view: View) -> Picture | Still:
         scale, levels = SCALES[self._scale], self.screen.match.levels

@@ -124,6 +124,7 @@ class Screen:
         self.session.tell({"type": "ghosts"})
         if not working:
             self._match_ghosts(project, view, self.seen, check)
+        check()
         if self.idle is not None:
             self.idle()
 
