@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -14,15 +13,12 @@ from ..errors import FlarewrightError
 from ..model import Project
 from . import studio
 from .jobs import Check, Lane, Overtaken
-from .seen import Seen, see
+from .seen import Seen
 from .session import Session
+from .sharpening import sharpen
 from .shown import pixels_of, plate_for
 from .studio import Match, Picture
 from .view import View
-
-# a lens whose final picture takes less needs no draft in front of it
-SOON_S = 0.35
-TELL_S = 0.12
 
 
 class Screen:
@@ -42,7 +38,7 @@ class Screen:
         self.number = 0
         # called when all is drawn and measured
         self.idle: Callable[[], None] | None = None
-        self._final_s = 10.0
+        self.final_s = 10.0
         self._lane = Lane("pictures")
         self._busy: tuple[Project, View] | None = None
         session.listeners.append(self._heard)
@@ -72,7 +68,7 @@ class Screen:
 
     def _work(self, project: Project, view: View, check: Check) -> None:
         try:
-            self._draw(project, view, check)
+            sharpen(self, project, view, check)
         except FlarewrightError as error:
             check()
             self.problem = str(error)
@@ -88,70 +84,8 @@ class Screen:
             self._publish()
             raise
 
-    def _draw(self, project: Project, view: View, check: Check) -> None:
-        shown = self.picture
-        # another lens has an exposure of its own; while one is worked on it is held, so that brightness can be compared
-        if shown is None and view.found_stops is not None:
-            self.match = Match(exposure_stops=view.found_stops)
-        fresh = (
-            view.found_stops is None if shown is None else studio.lens_name(shown.project) != studio.lens_name(project)
-        )
-        changed = shown is None or not studio.same_scene(shown.project, project)
-        working = view.grey or view.unclipped
-        draft: Picture | None = None
-        if changed or working or self._final_s > SOON_S:
-            draft = studio.take(project, "draft", view, levels=() if changed else self.match.levels)
-            check()
-            if fresh:
-                self.match = Match(exposure_stops=studio.exposure_of(draft))
-            elif changed:
-                self.match = replace(self.match, levels=())
-            self._show(draft)
-        if not working:
-            final = studio.take(project, "final", view, progress=self._progress("final picture", check))
-            check()
-            self._final_s = final.seconds
-            if draft is None:
-                draft = studio.take(project, "draft", view, levels=self.match.levels)
-            self.match = studio.matched(draft, final, self.match)
-            if fresh:
-                self.match = replace(self.match, exposure_stops=studio.exposure_of(final))
-                self.session.remember(self.match.exposure_stops)
-            self._show(final)
-        grade: studio.Grade = "draft" if working else "final"
-        self.seen = see(project, grade, self._progress("ghosts", check))
-        check()
-        self.session.tell({"type": "ghosts"})
-        if not working:
-            self._match_ghosts(project, view, self.seen, check)
-        check()
-        if self.idle is not None:
-            self.idle()
-
-    def _match_ghosts(self, project: Project, view: View, seen: Seen, check: Check) -> None:
-        """Learn from the final picture how bright each ghost of the next drafts shall be."""
-        drafted = see(project, "draft", lambda *_: check())
-        levels = studio.levels_of(*({ghost.name: ghost.flux for ghost in each.ghosts} for each in (drafted, seen)))
-        draft = studio.take(project, "draft", view, levels=levels)
-        check()
-        final = self.picture
-        if final is not None:
-            self.match = replace(studio.matched(draft, final, self.match), levels=levels)
-
-    def _progress(self, what: str, check: Check) -> Any:
-        told = 0.0
-
-        def step(part: float, _: str) -> None:
-            nonlocal told
-            check()
-            now = time.perf_counter()
-            if now - told > TELL_S:
-                told = now
-                self.session.tell({"type": "progress", "part": part, "what": what})
-
-        return step
-
-    def _show(self, picture: Picture) -> None:
+    def show(self, picture: Picture) -> None:
+        """Show another picture."""
         self.picture, self.problem = picture, ""
         self._publish()
 

@@ -131,7 +131,8 @@ def moving_picture(project: Project, kept: Sheet | None) -> Still | None:
     paths = ghost_paths(settled.lens, project.quality.paths, sensor=settled.sensor is not None)
     seen = shot if mask is None else replace(shot, opening=make_opening(settled, _coarse(mask)))
     layer = render_ghosts((seen,), paths, project.quality, art=art.paths).total
-    ghosts = layer.pixels * np.float32(art.gain.get("ghosts", 1.0))
+    by_hand = art.gain.get("ghosts", 1.0)
+    ghosts = layer.pixels if by_hand == 1.0 else layer.pixels * np.float32(by_hand)
     if ghosts.shape[:2] != (height, width):
         x, y, w, h = layer.window
         whole = np.zeros((height, width, 3), dtype=np.float32)

@@ -1,0 +1,97 @@
+"""How a picture comes about that waits: a draft first, the final one after it, and what is seen where."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from ..model import Project
+from . import studio
+from .jobs import Check
+from .seen import Seen, see
+from .studio import Match, Picture
+from .view import View
+
+if TYPE_CHECKING:
+    from .screen import Screen
+
+# a lens whose final picture takes less needs no draft in front of it
+SOON_S = 0.35
+TELL_S = 0.12
+
+
+def sharpen(screen: Screen, project: Project, view: View, check: Check) -> None:
+    """Draw a project for the screen: a draft, the final picture, then what lies where in it.
+
+    Parameters
+    ----------
+    screen : Screen
+    project : Project
+    view : View
+    check : callable
+        Raises when something newer waits.
+    """
+    shown = screen.picture
+    # another lens has an exposure of its own; while one is worked on it is held, so that brightness can be compared
+    if shown is None and view.found_stops is not None:
+        screen.match = Match(exposure_stops=view.found_stops)
+    fresh = view.found_stops is None if shown is None else studio.lens_name(shown.project) != studio.lens_name(project)
+    changed = shown is None or not studio.same_scene(shown.project, project)
+    working = view.grey or view.unclipped
+    draft: Picture | None = None
+    if changed or working or screen.final_s > SOON_S:
+        draft = studio.take(project, "draft", view, levels=() if changed else screen.match.levels)
+        check()
+        if fresh:
+            screen.match = Match(exposure_stops=studio.exposure_of(draft))
+        elif changed:
+            screen.match = replace(screen.match, levels=())
+        screen.show(draft)
+    if not working:
+        final = studio.take(project, "final", view, progress=_progress(screen, "final picture", check))
+        check()
+        screen.final_s = final.seconds
+        if fresh:
+            screen.match = replace(screen.match, exposure_stops=studio.exposure_of(final))
+            screen.session.remember(screen.match.exposure_stops)
+        screen.show(final)
+        if draft is None:
+            # for the next hand; the picture does not wait for it
+            draft = studio.take(project, "draft", view, levels=screen.match.levels)
+            check()
+        screen.match = studio.matched(draft, final, screen.match)
+    grade: studio.Grade = "draft" if working else "final"
+    screen.seen = see(project, grade, _progress(screen, "ghosts", check))
+    check()
+    screen.session.tell({"type": "ghosts"})
+    if not working:
+        _match_ghosts(screen, project, view, screen.seen, check)
+    check()
+    if screen.idle is not None:
+        screen.idle()
+
+
+def _match_ghosts(screen: Screen, project: Project, view: View, seen: Seen, check: Check) -> None:
+    """Learn from the final picture how bright each ghost of the next drafts shall be."""
+    drafted = see(project, "draft", lambda *_: check())
+    levels = studio.levels_of(*({ghost.name: ghost.flux for ghost in each.ghosts} for each in (drafted, seen)))
+    draft = studio.take(project, "draft", view, levels=levels)
+    check()
+    final = screen.picture
+    if final is not None:
+        screen.match = replace(studio.matched(draft, final, screen.match), levels=levels)
+
+
+def _progress(screen: Screen, what: str, check: Check) -> Any:
+    told = 0.0
+
+    def step(part: float, _: str) -> None:
+        nonlocal told
+        check()
+        now = time.perf_counter()
+        if now - told > TELL_S:
+            told = now
+            screen.session.tell({"type": "progress", "part": part, "what": what})
+
+    return step
