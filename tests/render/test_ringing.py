@@ -11,6 +11,7 @@ from scipy.special import fresnel
 from flarewright.model import Art, Camera, Dirt, Iris, Light, Lines, Output, Project, Quality, Rule
 from flarewright.optics.paraxial import flare_matrices
 from flarewright.optics.paths import ghost_paths
+from flarewright.render.edge_rings import edge_crossing
 from flarewright.render.prepare import settle
 from flarewright.render.render import render
 from flarewright.render.ringing import Ringing
@@ -169,3 +170,24 @@ def test_dirt_in_ghosts_diffracts_too():
 def test_draft_says_that_it_has_no_rings():
     quality = Quality(mode="draft", ringing="collins")
     assert any("quality.ringing" in told for told in render(project(quality=quality)).remarks)
+
+
+@pytest.mark.parametrize("iris", [Iris(blades=8, rotation_deg=10.0), Iris(blades=5, rounding=0.6), Iris()])
+def test_rings_of_shared_tables_are_those_of_the_ghosts_own_pattern(iris, monkeypatch):
+    """White light along long blades is drawn from tables; without them the ghost's opening is transformed."""
+    wanted = project(
+        "2-1", iris=iris, lights=(Light(field_deg=(3.0, 2.0)),),
+        quality=Quality(ringing="collins", wavelengths=3),
+    )  # fmt: skip
+    sharp, shared = picture(wanted.replace(quality=Quality(wavelengths=3))), picture(wanted)
+    served = []
+
+    def none_served(*known):
+        served.append(edge_crossing(*known) is not None)
+
+    monkeypatch.setattr("flarewright.render.ringing.edge_crossing", none_served)
+    own = picture(wanted)
+    assert served == [True]
+    assert shared.sum() == pytest.approx(own.sum(), rel=3e-4)
+    assert np.abs(shared - own).sum() < 4e-3 * own.sum()
+    assert np.abs(shared - own).sum() < 0.08 * np.abs(shared - sharp).sum()

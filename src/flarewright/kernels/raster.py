@@ -11,6 +11,7 @@ import numpy as np
 
 from ._jit import compiled, inlined, inner
 from .clip import PX, PY
+from .pattern import weave
 
 # a row of the picture is kept in blocks of this many pixels, each channel by itself: one vector to the compiler
 BLOCK = 8
@@ -106,42 +107,29 @@ def _fill_strip(flat, blocks, row, depth, xl0, xl1, xr0, xr1, start, gx, density
 
 
 @inlined
-def pattern_value(texture, k, column, row):
-    """Interpolate a texture's k-th pattern; beyond its border, which is 0, it is 0."""
-    patterns, table = texture[0], texture[1]
-    columns = np.int64(table[k, 2])
-    column = min(max(column, 0.0), table[k, 2] - 1.001)
-    row = min(max(row, 0.0), table[k, 1] - 1.001)
-    c, r = np.int64(column), np.int64(row)
-    fx, fy = column - c, row - r
-    at = np.int64(table[k, 0]) + r * columns + c
-    upper = patterns[at] * (1.0 - fx) + patterns[at + 1] * fx
-    lower = patterns[at + columns] * (1.0 - fx) + patterns[at + columns + 1] * fx
-    return upper * (1.0 - fy) + lower * fy
-
-
-@inner
-def _weave_strip(flat, blocks, row, depth, xl0, xl1, xr0, xr1, start, gx, density_low, density_high, rgb, texture):
-    """Add a strip of a polygon, its light multiplied at each pixel's centre by the patterns of a texture."""
+def _weave_strip(
+    flat, width, row, depth, xl0, xl1, xr0, xr1, start, gx, density_low, density_high, patterns, table, corners, places,
+    light,
+):  # fmt: skip
+    """Add a strip of a polygon to a picture without colours, its light multiplied at pixels' centres by patterns."""
     la, lb = min(xl0, xl1), max(xl0, xl1)
     ra, rb = min(xr0, xr1), max(xr0, xr1)
-    l_inverse, r_inverse = 0.5 / max(lb - la, 1e-9), 0.5 / max(rb - ra, 1e-9)
-    places = texture[2]
-    y = row + 0.5
-    for c in range(int(la), min(int(rb), blocks * BLOCK - 1) + 1):
-        x = c + 0.5
-        value = min(max(start + gx * x, density_low), density_high) * depth
-        value *= _share(float(c), la, lb, l_inverse, ra, rb, r_inverse)
-        for k in range(places.shape[0]):
-            column = places[k, 0] + places[k, 1] * x + places[k, 2] * y
-            line = places[k, 3] + places[k, 4] * x + places[k, 5] * y
-            # a pixel's centre may lie beside the polygon
-            column = min(max(column, places[k, 6]), places[k, 7])
-            value *= pattern_value(texture, k, column, min(max(line, places[k, 8]), places[k, 9]))
-        at = (row * blocks + c // BLOCK) * _FLOATS + c % BLOCK
-        flat[at] += rgb[0] * value
-        flat[at + BLOCK] += rgb[1] * value
-        flat[at + 2 * BLOCK] += rgb[2] * value
+    first, last = int(la), min(int(rb), width - 1)
+    l_inverse, r_inverse = np.float32(1.0 / max(lb - la, 1e-6)), np.float32(1.0 / max(rb - ra, 1e-6))
+    slope, low, high = np.float32(gx), np.float32(density_low), np.float32(density_high)
+    base = np.float32(start + gx * (first + 0.5))
+    l0, l1, r0, r1 = np.float32(la - first), np.float32(lb - first), np.float32(ra - first), np.float32(rb - first)
+    for m in range(last - first + 1):
+        c = np.float32(m)
+        light[np.uint64(first + m)] = (
+            min(max(base + slope * c, low), high)
+            * np.float32(depth)
+            * (_covered(c, l0, l1, l_inverse) - _covered(c, r0, r1, r_inverse))
+        )
+    for k in range(places.shape[0]):
+        weave(patterns, table, corners, k, places, row, first, last, light)
+    for column in range(first, last + 1):
+        flat[np.uint64(row * width + column)] += light[np.uint64(column)]
 
 
 @inner
@@ -207,17 +195,19 @@ def fill_polygon(polygon, count, density, gx, gy, density_low, density_high, rgb
     density_low, density_high : float
         Bounds kept at pixels whose centre lies outside the polygon.
     rgb : ndarray, shape (3,)
-    plane : ndarray, shape (H, B, 3, BLOCK), float32, or (H, W, 3), float64
+    plane : ndarray, shape (H, B, 3, BLOCK), float32, or (H, W, 3), float64, or (H, W), float32
         Added to. In the second form the density is even, and only the differences along the rows are marked, which
-        costs no more for large polygons than for small ones; `sum_rows` turns them into the picture.
+        costs no more for large polygons than for small ones; `sum_rows` turns them into the picture. The third has no
+        colours, and its light is multiplied by patterns.
     texture : tuple of ndarray, or None
-        Patterns that multiply the light (`kernels.ringing`), for a picture in blocks; what draws without does not
-        compile it.
+        Those patterns (`kernels.pattern.weave`), and a row to work in.
 
     Notes
     -----
     A pixel receives exact coverage times the density at its centre; the sum over pixels is the polygon's flux.
     """
+    if plane.ndim == 2:
+        patterns, table, corners, places, light = texture
     top = bottom = count - count  # zeros of the type of `count`, not literals
     twice_area = 0.0
     for k in range(count):
@@ -260,10 +250,10 @@ def fill_polygon(polygon, count, density, gx, gy, density_low, density_high, rgb
             xr0, xr1 = xr + (y - yr) * right_slope, xr + (y_next - yr) * right_slope
             if plane.ndim == 3:
                 _mark_strip(flat, plane.shape[1], row, y_next - y, xl0, xl1, xr0, xr1, density, rgb)
-            elif texture is not None:
+            elif plane.ndim == 2:
                 _weave_strip(
                     flat, plane.shape[1], row, y_next - y, xl0, xl1, xr0, xr1, density + gy * (row + 0.5), gx,
-                    density_low, density_high, rgb, texture,
+                    density_low, density_high, patterns, table, corners, places, light,
                 )  # fmt: skip
             else:
                 base = density + gy * (row + 0.5)

@@ -34,7 +34,7 @@ def compile_for_render(project: Project, threads: int | None = None) -> None:
     if project.quality.mode == "final":
         names += ["draw" if iris.mask is None else "draw masked", "densities", "pixels", "double"]
         if project.quality.ringing != "off":
-            names += ["draw ringing"]
+            names += ["draw ringing", "open cells"]
     elif project.quality.mode == "draft" and iris.mask is None:
         # a draft through a mask is rare: its kernel is compiled when it is called
         names += ["matrices"]

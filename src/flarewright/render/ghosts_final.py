@@ -243,7 +243,7 @@ def draw_final(
     pieces = _bridges(traced, item.view_radius, scale, visibility) if quality.bridge else [1] * (count - 1)
     steps = [(w, k / n) for w, n in enumerate(pieces) for k in range(n)] + [(count - 1, 0.0)]
     fine_nm = np.interp([w + part for w, part in steps], np.arange(count), shot.packed.wavelengths_nm)
-    patterns = None if rings is None else rings.textures(fine_nm)
+    patterns = None if rings is None else rings.textures(fine_nm, canvas.plane(detail))
     for k, ((w, part), rgb) in enumerate(zip(steps, shot.weights(fine_nm) * item.art.rgb, strict=True)):
         if stop is not None and stop.is_set():
             return
@@ -254,10 +254,7 @@ def draw_final(
         plane = canvas.plane(detail)
         for place, share in _places(item, to_pixels, w, part):
             if patterns is not None:
-                patterns.draw(
-                    k, data, bundle.pupil, bundle.triangles, densities, shot.incidence.axes, place, shot.gain,
-                    rgb * share, plane, bundle.halves,
-                )  # fmt: skip
+                patterns.draw(k, bundle, data, densities, shot.incidence.axes, place, shot.gain, rgb * share, plane)
             else:
                 draw_bundle(
                     data, bundle.pupil, bundle.triangles, densities, path.stop_crossings, opening.blades, opening.mask,

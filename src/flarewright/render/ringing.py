@@ -12,15 +12,19 @@ import threading
 from collections import OrderedDict
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..kernels.bundle import draw_bundle
+from ..kernels.pattern import find_open
 from ..kernels.ringing import draw_ringing
 from ..kernels.trace import ALIVE, REL, STOP_X
 from ..model import Light
 from ..model.light import Lines
+from ..optics.blade_form import BladeForm, blade_form
 from ..optics.iris import coverage, resampled, softened
 from ..optics.pack import PackedLens
 from ..optics.paths import LightPath
@@ -36,8 +40,11 @@ from ..optics.ringing import (
     stop_to_sensor,
 )
 from ..optics.spectrum import band_contents
+from .edge_rings import EdgeCrossing, Piece, edge_crossing, joined, picture_piece, sharp_piece
 
 if TYPE_CHECKING:
+    from ..optics.bundle import Bundle
+    from .canvas import Plane
     from .shot import Opening
 
 Floats = NDArray[np.float64]
@@ -186,15 +193,22 @@ class Ringing:
         kept: Pattern = found
         return kept
 
-    def sharp(self, step: float) -> Pattern:
-        """Return the opening itself as a pattern."""
+    @cached_property
+    def form(self) -> BladeForm | None:
+        """The blades by one of their corners; None for an image."""
+        return None if self.opening.mask is not None else blade_form(self.opening.blades)
+
+    def sharp(self, step: float) -> Piece:
+        """Return the opening itself as a pattern, its border a few steps wide."""
+        if self.form is not None:
+            return sharp_piece(self.form, step)
         reach = self.opening.radius + 2.0 * step
         count = min(2 * math.ceil(reach / step), 2048)
         step = 2.0 * reach / count
         at = np.asarray((np.arange(count) - 0.5 * (count - 1)) * step, dtype=np.float64)
         _, light = self.sample(at, at[:, None])
         light[0], light[-1], light[:, 0], light[:, -1] = 0.0, 0.0, 0.0, 0.0
-        return np.ascontiguousarray(light, dtype=np.float32), (reach, reach)
+        return picture_piece(np.ascontiguousarray(light, dtype=np.float32), (reach, reach))
 
 
 @dataclass(frozen=True)
@@ -232,30 +246,35 @@ class Rings:
     light : Light
     wavelengths_nm : ndarray, shape (W,)
         As traced.
-    crossings : tuple of _Crossing or Pattern
-        One a crossing of the stop; a pattern where the edge is sharp.
+    crossings : tuple of EdgeCrossing, _Crossing or Piece
+        One a crossing of the stop; a piece where the edge is sharp.
     """
 
     ringing: Ringing
     light: Light
     wavelengths_nm: Floats
-    crossings: tuple[_Crossing | Pattern, ...]
+    crossings: tuple[EdgeCrossing | _Crossing | Piece, ...]
 
     @property
     def reach(self) -> float:
         """How far out in the stop light is looked for, mm."""
-        return max(item.reach for item in self.crossings if isinstance(item, _Crossing))
+        return max(item.reach for item in self.crossings if not isinstance(item, Piece))
 
-    def textures(self, drawn_nm: Floats) -> Textures:
-        """Prepare for drawing at some wavelengths."""
-        return Textures(self, band_contents(self.light.spectrum, drawn_nm))
+    def textures(self, drawn_nm: Floats, plane: Plane) -> Textures:
+        """Prepare for drawing on a plane at some wavelengths."""
+        gray = np.zeros((plane.shape[0], plane.shape[1] * plane.shape[3]), dtype=np.float32)
+        return Textures(self, band_contents(self.light.spectrum, drawn_nm), gray)
 
-    def texture(self, waves: Floats, shares: Floats) -> tuple[Singles, Floats]:
-        """Return the patterns for some light and their table, as `kernels.ringing` takes them."""
-        found = [self._average(item, waves, shares) if isinstance(item, _Crossing) else item for item in self.crossings]
-        first = np.cumsum([0, *(values.size for values, _ in found)])
-        table = np.array([[at, *values.shape, *half] for at, (values, half) in zip(first[:-1], found, strict=True)])
-        return np.concatenate([values.ravel() for values, _ in found]), table.astype(np.float64)
+    def texture(self, waves: Floats, shares: Floats) -> tuple[Singles, Floats, float]:
+        """Return the patterns for some light and their table, as `kernels.ringing` takes them, and a gain."""
+        return joined([self._piece(item, waves, shares) for item in self.crossings])
+
+    def _piece(self, item: EdgeCrossing | _Crossing | Piece, waves: Floats, shares: Floats) -> Piece:
+        if isinstance(item, EdgeCrossing):
+            return item.piece(waves, shares)
+        if isinstance(item, _Crossing):
+            return picture_piece(*self._average(item, waves, shares))
+        return item
 
     def _average(self, item: _Crossing, waves: Floats, shares: Floats) -> Pattern:
         """Average a crossing's pattern over the light of a band."""
@@ -291,16 +310,37 @@ class Textures:
     rings : Rings
     bands : tuple of (ndarray, ndarray)
         What light each drawn wavelength stands for.
+    gray : ndarray, shape (H, W), float32
+        To draw on.
     """
 
     rings: Rings
     bands: tuple[tuple[Floats, Floats], ...]
+    gray: Singles
 
-    def draw(self, k: int, data: Floats, pupil: Floats, triangles: NDArray[np.int64], *rest: Any) -> None:
-        """Draw a bundle at the k-th wavelength; `rest` is what `draw_ringing` takes besides the patterns."""
-        densities, *place = rest
-        crossings = len(self.rings.crossings)
-        draw_ringing(data, pupil, triangles, densities, crossings, *self.rings.texture(*self.bands[k]), *place)
+    def draw(
+        self, k: int, bundle: Bundle, data: Floats, densities: Floats, axes: Floats, to_pixels: Floats, gain: float,
+        rgb: Floats, plane: Plane,
+    ) -> None:  # fmt: skip
+        """Draw a bundle at the k-th wavelength; the rest is as `kernels.bundle.draw_bundle` takes it."""
+        opening, crossings = self.rings.ringing.opening, len(self.rings.crossings)
+        patterns, table, brighter = self.rings.texture(*self.bands[k])
+        gain = gain * brighter
+        form = self.rings.ringing.form
+        corners = np.empty((0, 2)) if form is None else form.corners
+        rest = bundle.triangles
+        # what is far from the border has no pattern: it is drawn as ever
+        inside = find_open(data, rest, bundle.halves, crossings, axes, table, corners)
+        if inside.any():
+            draw_bundle(
+                data, bundle.pupil, rest[inside], densities, crossings, opening.blades, None, opening.half, axes,
+                to_pixels, gain, rgb, plane, bundle.halves,
+            )  # fmt: skip
+            rest = rest[~inside]
+        draw_ringing(
+            data, bundle.pupil, rest, densities, crossings, patterns, table, corners, axes, to_pixels, gain, rgb, plane,
+            self.gray, bundle.halves,
+        )  # fmt: skip
 
 
 def _cubic(t: float) -> tuple[float, float, float, float]:
@@ -320,7 +360,7 @@ def _rings(
 ) -> Rings | None:
     ways = stop_to_sensor(packed, path, nearness)
     lit = _lit(traced, path.stop_crossings, ringing.opening)
-    found: list[_Crossing | None] = [
+    found: list[EdgeCrossing | _Crossing | None] = [
         _crossing(ringing, packed.wavelengths_nm, way, light, pixels_per_mm) if shines else None
         for way, shines in zip(ways, lit, strict=True)
     ]
@@ -347,7 +387,7 @@ def _lit(traced: Sequence[Floats], crossings: int, opening: Opening) -> list[boo
 
 def _crossing(
     ringing: Ringing, wavelengths_nm: Floats, way: StopToSensor, light: Light, pixels_per_mm: tuple[float, float]
-) -> _Crossing | None:
+) -> EdgeCrossing | _Crossing | None:
     """Describe a crossing's pattern; None when there is nothing to see of it."""
     middle = len(wavelengths_nm) // 2
     if ringing.mode == "frft":
@@ -362,6 +402,14 @@ def _crossing(
     crosses = bool((np.sign(area) != np.sign(area[0])).any())
     if crosses or not (fringe.min(axis=0) * magnified).max() >= LEAST_FRINGE_PX:
         return None
+    if (
+        ringing.form is not None
+        and not isinstance(light.spectrum, Lines)
+        and np.allclose(area[:, 0], area[:, 1], rtol=1e-6)
+    ):
+        at_edges = edge_crossing(ringing.form, wavelengths_nm, area[:, 0], 1.0 / float(magnified.max()))
+        if at_edges is not None:
+            return at_edges
     # the rings of a line are not averaged, so finer ones are seen: twice the samples
     finer = 2.0 if isinstance(light.spectrum, Lines) else 0.0
     # half octaves, so that ghosts alike share their patterns; light beyond the traced wavelengths belongs to the ends
