@@ -5,8 +5,8 @@ import pytest
 from planted_run import GHOSTS, LARGEST, NOISE, shape, views
 
 from flarewright.measure.fit import Shape, render
-from flarewright.measure.fragments import joined
 from flarewright.measure.found import Found
+from flarewright.measure.fragments import joined
 from flarewright.measure.joint import lit
 
 FEW = np.linspace(2.0, LARGEST, 9)

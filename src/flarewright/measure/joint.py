@@ -77,7 +77,8 @@ def lit(
         if m == 1:
             kept = _needed(matrix, side, pictures, needed)
         at = _columns(kept)
-        values[m] = np.linalg.solve(matrix[np.ix_(at, at)], side[at]).reshape(-1, _TERMS.size)
+        solved = np.linalg.solve(matrix[np.ix_(at, at)], side[at])
+        values[m] = np.asarray(solved, dtype=np.float64).reshape(-1, _TERMS.size)
     return [_with_light(ghosts[int(k)], [values[m][n] for m in range(CHANNELS)]) for n, k in enumerate(kept)]
 
 
