@@ -4,6 +4,7 @@ from dataclasses import replace as changed
 
 import numpy as np
 import pytest
+from camera_raw import camera_to_rec709
 from measured_run import SETUP, Measured
 from star_run import ANGLES, CAMERA, light_px, shoot, shoot_raw, star
 
@@ -128,10 +129,8 @@ def test_raw_files_with_dark_frames_and_flats_merge_to_the_scene(tmp_path):
     truth = scene[3.0]
     assert frame.light_px == pytest.approx(light_px(3.0), abs=0.3)
     # four flats and dark frames have noise of their own, which all frames share: a few per cent of the variance
-    print(
-        [((frame.radiance - truth) ** 2 / frame.variance)[..., c][frame.valid[..., c]].mean() for c in range(3)],
-        run.camera,
-    )
+    # what the file's matrix says of the camera's colours goes on
+    np.testing.assert_allclose(run.to_rec709, camera_to_rec709(), rtol=2e-3, atol=2e-3)
     chi2 = ((frame.radiance - truth) ** 2 / frame.variance)[frame.valid].mean()
     assert 0.95 < chi2 < 1.6
     green, red = (frame.variance[..., c][frame.valid[..., c]].mean() / truth[..., c][frame.valid[..., c]].mean()
@@ -192,3 +191,32 @@ def test_an_unclipped_light_is_found_too_and_a_hot_pixel_is_none():
     found = find_light((scene + noise).astype(np.float32), np.full(scene.shape, 1e-4, np.float32))
     assert found.position_px == pytest.approx((50.37, 30.81), abs=0.05)
     assert found.rival_px is None
+
+
+def test_upright_frames_are_turned_about_the_axis(tmp_path):
+    def leaning(angle):
+        x = light_px(angle)[0]
+        return x, 31.6 - 0.2 * (x - 40.3)  # as a camera that leans by 11 degrees sees it
+
+    captures = read_captures(shoot(tmp_path, {angle: star(leaning(angle)) for angle in ANGLES}))
+    plain = merge_captures(captures, tmp_path, tmp_path / "run")
+    run = merge_captures(captures, tmp_path, tmp_path / "run", settings=MergeSettings(upright=True))
+    assert any("turned upright" in remark for remark in run.remarks)
+    assert plain.frames[3].horizon_deg > 5.0
+    for before, info in zip(plain.frames[2:], run.frames[2:], strict=True):
+        assert info.horizon_deg == 0.0
+        assert info.light_px[1] == pytest.approx(info.axis_px[1], abs=0.05)
+        # the light's image lies where it is said to lie, and nothing of it is lost
+        frame, old = read_frame(tmp_path / "run", info), read_frame(tmp_path / "run", before)
+        ring = [np.hypot(np.arange(96) + 0.5 - i.light_px[0], np.arange(64)[:, None] + 0.5 - i.light_px[1]) for i in
+                (info, before)]  # fmt: skip
+        core = np.where(ring[0] < 6.0, frame.radiance[..., 1], 0.0)
+        middle = [(core * (at + 0.5)).sum() / core.sum() for at in (np.arange(96), np.arange(64)[:, None])]
+        assert middle == pytest.approx(info.light_px, abs=0.3)
+        sums = [one.radiance[(r > 9.0) & (r < 20.0)].mean() for one, r in zip((frame, old), ring, strict=True)]
+        assert sums[0] == pytest.approx(sums[1], rel=0.02)
+    corner = read_frame(tmp_path / "run", run.frames[0]).variance[0, -1]
+    assert np.isinf(corner).all()
+    # the frames as photographed are still there, and are taken up again
+    again = merge_captures(captures, tmp_path, tmp_path / "run")
+    assert again == plain

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import tifffile
-from camera_raw import BLACK, WHITE, write_dng
+from camera_raw import BLACK, WHITE, camera_to_rec709, write_dng
 
 from flarewright.errors import FlarewrightError
 from flarewright.io.exr import write_exr
@@ -101,3 +101,20 @@ def test_what_is_no_linear_photograph_is_refused(tmp_path, name, content, word):
         open_photo(path)
     with pytest.raises(FlarewrightError, match="does not exist"):
         open_photo(tmp_path / "other.npy")
+
+
+def test_an_x_trans_mosaic_is_refused_in_a_sentence(tmp_path, mosaic):
+    # Fujifilm's pattern of six by six; 0 red, 1 green, 2 blue
+    rows = ("110112", "112110", "201021", "112110", "110112", "021201")
+    write_dng(tmp_path / "x.dng", mosaic, pattern=tuple(tuple(map(int, row)) for row in rows))
+    with pytest.raises(FlarewrightError, match=r"x\.dng has an X-Trans mosaic.* linear 16-bit TIFF") as told:
+        open_photo(tmp_path / "x.dng")
+    assert "\n" not in str(told.value)
+
+
+def test_the_cameras_colour_matrix_comes_through_the_decoder(tmp_path, mosaic):
+    write_dng(tmp_path / "a.dng", mosaic)
+    found = open_photo(tmp_path / "a.dng").to_rec709
+    np.testing.assert_allclose(found, camera_to_rec709(), rtol=1e-3, atol=1e-3)
+    np.save(tmp_path / "a.npy", mosaic)
+    assert open_photo(tmp_path / "a.npy").to_rec709 is None

@@ -112,6 +112,19 @@ def test_layers_add_up_and_single_ghosts_too():
     assert "ghost.2" not in {layer.name for layer in replay(model, 22.0, single=True)}
 
 
+def test_the_cameras_colours_become_rec709_by_its_matrix():
+    model = planted()
+    with pytest.raises(FlarewrightError, match="does not know its camera's colour matrix"):
+        replay(model, 12.0, colors="rec709")
+    matrix = ((1.5, -0.4, -0.1), (-0.2, 1.4, -0.2), (0.0, -0.5, 1.5))
+    known = model.replace(to_rec709=matrix)
+    for own, seen in zip(
+        replay(known, 12.0, single=True), replay(known, 12.0, single=True, colors="rec709"), strict=True
+    ):
+        assert (own.name, own.window) == (seen.name, seen.window)
+        np.testing.assert_allclose(seen.pixels, own.pixels @ np.array(matrix).T, rtol=1e-4, atol=1e-6)
+
+
 def test_file_and_command(tmp_path, capsys):
     model = planted()
     path, out, camera = tmp_path / "model.json", tmp_path / "o.exr", tmp_path / "camera.json"

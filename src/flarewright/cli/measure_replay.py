@@ -30,6 +30,10 @@ def replay(
         None
     ),
     single: Annotated[bool, typer.Option("--ghosts", help="Also a layer for each ghost.")] = False,
+    rec709: Annotated[
+        bool,
+        typer.Option("--rec709", help="In linear Rec.709 by the camera's matrix, not its own colours."),
+    ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
     """Draw a measured flare as layers of an EXR file."""
@@ -50,7 +54,8 @@ def replay(
         raise FlarewrightError("say where the light is: --constellation DEG, or a --camera file with a light")
     pixels = picture_size(size) if size is not None else shot.size_px or known.size_px
     gain = brightness(known.reference, shot)
-    layers = draw(known, constellation, roll_deg=roll or 0.0, size_px=pixels, gain=gain, single=single)
+    layers = draw(known, constellation, roll_deg=roll or 0.0, size_px=pixels, gain=gain, single=single,
+                  colors="rec709" if rec709 else "camera")  # fmt: skip
     metadata = {"model": model.name, "constellation_deg": f"{constellation:.9g}", "roll_deg": f"{roll or 0.0:.9g}"}
     write_exr(output, layers, pixels, pixel_type="float", metadata=metadata)
     facts = {

@@ -40,6 +40,9 @@ Block = Annotated[int, typer.Option(min=1, max=64, help="Average so many by so m
 WhiteBalance = Annotated[
     str, typer.Option(metavar="none|camera|R,G,B", help="What red, green and blue are multiplied by.")
 ]
+Upright = Annotated[
+    bool, typer.Option("--upright", help="Turn frames so that the horizon's tilt is out of their pixels.")
+]
 Threads = Annotated[int | None, typer.Option(min=1, help="All cores when left out; the pixels do not depend on it.")]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
 
@@ -51,6 +54,7 @@ def merge(
     angles: Angles = None,
     block: Block = 1,
     white_balance: WhiteBalance = "none",
+    upright: Upright = False,
     threads: Threads = None,
     as_json: Json = False,
 ) -> None:
@@ -58,7 +62,7 @@ def merge(
 
     Goes on where an earlier run into the same folder was stopped.
     """
-    run = _merge(captures, output, camera, angles, _settings(block, white_balance), threads)
+    run = _merge(captures, output, camera, angles, _settings(block, white_balance, upright), threads)
     tell(run.remarks)
     if as_json:
         print_json({"folder": str(output), "stages": ["merge"], "merge": summary(run)})
@@ -74,12 +78,13 @@ def run(
     angles: Angles = None,
     block: Block = 1,
     white_balance: WhiteBalance = "none",
+    upright: Upright = False,
     threads: Threads = None,
     as_json: Json = False,
 ) -> None:
     """Run the stages of a measurement one after the other; what is finished already is kept."""
     chosen = chosen_stages(stages)
-    settings = _settings(block, white_balance)
+    settings = _settings(block, white_balance, upright)
     facts: dict[str, Any] = {"folder": str(output), "stages": chosen}
     if "merge" in chosen:
         merged = _merge(captures, output, camera, angles, settings, threads)
@@ -112,11 +117,11 @@ def chosen_stages(text: str) -> list[str]:
     return [stage for stage in STAGES if stage in wanted]
 
 
-def _settings(block: int, white_balance: str) -> MergeSettings:
+def _settings(block: int, white_balance: str, upright: bool) -> MergeSettings:
     from ..measure.merge_run import MergeSettings
 
     if white_balance in ("none", "camera"):
-        return MergeSettings(block, "camera" if white_balance == "camera" else "none")
+        return MergeSettings(block, "camera" if white_balance == "camera" else "none", upright)
     try:
         red, green, blue = (float(part) for part in white_balance.split(","))
     except ValueError:
@@ -125,7 +130,7 @@ def _settings(block: int, white_balance: str) -> MergeSettings:
         raise FlarewrightError(
             f"--white-balance {white_balance!r} is neither none nor camera nor three numbers above 0"
         )
-    return MergeSettings(block, (red, green, blue))
+    return MergeSettings(block, (red, green, blue), upright)
 
 
 def _merge(

@@ -111,7 +111,8 @@ def model_flare(
     size = (width_px, max(1, round(width_px * height / width)))
 
     def draw(constellation_deg: float, roll_deg: float) -> Sequence[Layer]:
-        layers = replay(model, constellation_deg, roll_deg=roll_deg, size_px=size, gain=1.0 / light_lx)
+        layers = replay(model, constellation_deg, roll_deg=roll_deg, size_px=size, gain=1.0 / light_lx,
+                        colors="camera" if model.to_rec709 is None else "rec709")  # fmt: skip
         return [layer for layer in layers if layer.name == "ghosts"]
 
     low, high = model.constellation_deg

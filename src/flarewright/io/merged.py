@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import numpy as np
 from pydantic import ValidationError
 
 from ..errors import FlarewrightError, OutputError
@@ -23,7 +24,7 @@ _RADIANCE, _VARIANCE = "radiance", "radiance.variance"
 
 
 def write_frame(folder: Path, frame: MergedFrame) -> None:
-    """Write the pixels of a frame into the file that its `info` names.
+    """Write the pixels of a frame into the file that its `info` names, as photographed: with the drift of the light.
 
     Parameters
     ----------
@@ -39,12 +40,16 @@ def write_frame(folder: Path, frame: MergedFrame) -> None:
     height, width = frame.radiance.shape[:2]
     window = (0, 0, width, height)
     about: dict[str, str | float] = {"constellation_deg": frame.info.constellation_deg}
-    layers = [Layer(_RADIANCE, frame.radiance, window, about), Layer(_VARIANCE, frame.variance, window)]
+    gain = np.float32(frame.info.gain)
+    layers = [
+        Layer(_RADIANCE, frame.radiance * gain, window, about),
+        Layer(_VARIANCE, frame.variance * gain**2, window),
+    ]
     write_exr(folder / frame.info.file, layers, (width, height), pixel_type="float", metadata={})
 
 
 def read_frame(folder: Path, info: FrameInfo) -> MergedFrame:
-    """Read one frame.
+    """Read one frame, the drift of the light taken out (`FrameInfo.gain`).
 
     Parameters
     ----------
@@ -72,7 +77,8 @@ def read_frame(folder: Path, info: FrameInfo) -> MergedFrame:
         raise FlarewrightError(f"{path} cannot be read as a merged frame: {again}") from None
     if not {_RADIANCE, _VARIANCE} <= layers.keys() or layers[_RADIANCE].shape != layers[_VARIANCE].shape:
         raise FlarewrightError(f"{path} has no radiance with a variance, so it is no merged frame: {again}")
-    return MergedFrame(info, layers[_RADIANCE], layers[_VARIANCE])
+    gain = np.float32(info.gain)
+    return MergedFrame(info, layers[_RADIANCE] / gain, layers[_VARIANCE] / gain**2)
 
 
 def write_run(folder: Path, run: MergedRun) -> None:

@@ -13,12 +13,13 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from math import inf
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import FlarewrightError, OutputError, optional
+from ..model.capture import Matrix3
 
 _RAW = (".dng", ".cr2", ".cr3", ".nef", ".arw", ".raf", ".rw2", ".orf", ".pef", ".srw", ".raw", ".crw", ".nrw", ".3fr")
 _TIFF = (".tif", ".tiff")
@@ -53,6 +54,8 @@ class Photo:
         By how much two numbers of the file differ at least; 0 for floating point.
     white_balance : tuple of float
         The camera's own multipliers, green 1.
+    to_rec709 : tuple of 3 tuples of 3 float, or None
+        From its numbers above black, before any white balance, to linear Rec.709; None: the file does not tell.
     """
 
     path: Path
@@ -63,6 +66,7 @@ class Photo:
     samples: tuple[int, int, int] = (1, 1, 1)
     step: float = 1.0
     white_balance: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    to_rec709: Matrix3 | None = None
 
 
 def open_photo(path: Path, white_level: float | None = None, block: int = 1) -> Photo:
@@ -253,7 +257,8 @@ def _open_raw(path: Path, white_level: float | None) -> Photo:
         pattern = raw.raw_pattern
         if pattern is None or pattern.shape != (2, 2):
             raise FlarewrightError(
-                f"{path} has no mosaic of two by two colours: develop it as linear 16-bit TIFF and give that"
+                f"{path} has {_pattern_words(pattern)}, not one of two by two colours: develop it as linear "
+                "16-bit TIFF and give that"
             )
         sizes = raw.sizes
         # the pattern is that of the whole sensor; the visible part may begin at an odd row or column
@@ -262,6 +267,7 @@ def _open_raw(path: Path, white_level: float | None) -> Photo:
         black = [float(raw.black_level_per_channel[k]) for k in order]
         white = float(raw.white_level) if white_level is None else white_level
         camera = [float(value) for value in raw.camera_whitebalance[:3]]
+        to_rec709 = _to_rec709(raw)
         size = sizes.width // 2, sizes.height // 2
     if sorted(colors) != ["B", "G", "G", "R"]:
         raise FlarewrightError(f"{path} has photosites {''.join(colors)}, not red, green and blue: develop it as TIFF")
@@ -270,7 +276,24 @@ def _open_raw(path: Path, white_level: float | None) -> Photo:
     return Photo(
         path, size, _mosaic_rows(lru_cache(maxsize=1)(load), colors, size[0], white), (levels[0], levels[1], levels[2]),
         white, (1, 2, 1), white_balance=(balance[0], balance[1], balance[2]),
+        to_rec709=to_rec709,
     )  # fmt: skip
+
+
+def _pattern_words(pattern: NDArray[Any] | None) -> str:
+    if pattern is None:
+        return "no mosaic"
+    return "an X-Trans mosaic" if pattern.shape == (6, 6) else f"a mosaic of {pattern.shape[0]} by {pattern.shape[1]}"
+
+
+def _to_rec709(raw: Any) -> Matrix3 | None:
+    """Return the decoder's matrix, which takes numbers balanced for daylight, for numbers that are not balanced."""
+    matrix = np.array(raw.color_matrix, dtype=np.float64)[:, :3]
+    daylight = np.array(raw.daylight_whitebalance[:3], dtype=np.float64)
+    if matrix.shape != (3, 3) or not (matrix.any() and np.isfinite(matrix).all() and (daylight > 0.0).all()):
+        return None
+    red, green, blue = (tuple(map(float, row)) for row in matrix * (daylight / daylight[1]))
+    return cast(Matrix3, (red, green, blue))
 
 
 @contextmanager

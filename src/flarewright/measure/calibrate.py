@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ..errors import FlarewrightError
 from ..io.photo import Photo, open_photo
-from ..model.capture import CameraNoise, Capture
+from ..model.capture import CameraNoise, Capture, Matrix3
 from .merge import Exposure
 from .noise import LEVEL_SIDE, Band, Noise, Transfer, common_black, fit_transfer, noise_of, smooth, transfers
 
@@ -48,6 +48,8 @@ class Calibration:
     step : float
     white_balance : tuple of float
         The camera's own.
+    to_rec709 : tuple of 3 tuples of 3 float, or None
+        As of `Photo`.
     block : int
         Pixels averaged a side.
     remarks : tuple of str
@@ -62,6 +64,7 @@ class Calibration:
     samples: tuple[int, int, int]
     step: float
     white_balance: tuple[float, float, float]
+    to_rec709: Matrix3 | None
     block: int
     remarks: tuple[str, ...]
 
@@ -123,7 +126,7 @@ def calibrate(captures: Sequence[Capture], folder: Path, camera: CameraNoise, bl
     response = _response([photos[one.file] for one in captures if one.kind == "flat"], black)
     return Calibration(
         known, black, black_noise, white, response, first.size_px, first.samples, first.step, first.white_balance,
-        block, tuple(remarks),
+        first.to_rec709, block, tuple(remarks),
     )  # fmt: skip
 
 

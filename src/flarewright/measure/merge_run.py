@@ -23,12 +23,14 @@ from ..errors import FlarewrightError, OutputError
 from ..io.atomic import write_atomically
 from ..io.merged import read_frame, write_frame, write_run
 from ..io.photo import open_photo
-from ..model.capture import CameraNoise, Capture, FrameInfo, MergedFrame, MergedRun
+from ..model.capture import CameraNoise, Capture, FrameInfo, Matrix3, MergedFrame, MergedRun
 from .calibrate import Calibration, calibrate
+from .drift import without_drift
 from .geometry import Geometry, Seen, believable, solve_geometry
 from .light import Sighting, find_light
 from .merge import exposure_ratios, merge, without_idle_digits
 from .symmetry import axis_beside_path, reduced
+from .upright import make_upright
 
 FRAMES = "frames"
 # raise when the same photographs give other pixels
@@ -54,10 +56,13 @@ class MergeSettings:
         Average so many by so many pixels into one.
     white_balance : {"none", "camera"} or tuple of float
         What red, green and blue are multiplied by: nothing, what the camera says, or these.
+    upright : bool
+        Whether frames are turned so that the horizon's tilt is out of their pixels.
     """
 
     block: int = 1
     white_balance: Literal["none", "camera"] | tuple[float, float, float] = "none"
+    upright: bool = False
 
 
 @dataclass(frozen=True)
@@ -120,7 +125,9 @@ def merge_captures(
     found = believable([one.sighting for one in merged])
     tell(0.95, "axis")
     geometry = _geometry(merged, found, output, known)
-    run = _run(merged, geometry, known, balance)
+    run = without_drift(output, _run(merged, geometry, known, balance))
+    if chosen.upright:
+        run = make_upright(output, run, lambda part, words: tell(0.96 + 0.04 * part, words))
     write_run(output, run)
     tell(1.0, "merged")
     return run
@@ -296,8 +303,16 @@ def _run(
         size_px=known.size_px, frames=tuple(frames), axis_px=geometry.axis_px, axis_error_px=geometry.axis_error_px,
         px_per_rad=geometry.px_per_rad, camera=known.camera, reference_iso=known.camera.iso,
         reference_f_number=merged[0].group[0].f_number, white_balance=balance,
-        remarks=(*known.remarks, *geometry.remarks),
+        to_rec709=_to_rec709(known, balance), remarks=(*known.remarks, *geometry.remarks),
     )  # fmt: skip
+
+
+def _to_rec709(known: Calibration, balance: tuple[float, float, float]) -> Matrix3 | None:
+    """Return the photographs' matrix for numbers that were multiplied by a white balance."""
+    if known.to_rec709 is None:
+        return None
+    red, green, blue = ((row[0] / balance[0], row[1] / balance[1], row[2] / balance[2]) for row in known.to_rec709)
+    return red, green, blue
 
 
 def check_same_run(output: Path) -> None:

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import cast
+from dataclasses import replace
+from typing import Literal, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import FlarewrightError
 from ..kernels.measure_bezier import bezier_window, draw_bezier
-from ..kernels.measure_edges import sum_into
+from ..kernels.measure_edges import sum_along_rows
 from ..kernels.measure_mesh import draw_ghosts
 from ..model.ghost_model import AberrationGhost, BezierGhost, Curves, GhostModel
 from ..model.layer import Layer
@@ -44,6 +45,7 @@ def replay(
     size_px: tuple[int, int] | None = None,
     gain: float = 1.0,
     single: bool = False,
+    colors: Literal["camera", "rec709"] = "camera",
 ) -> tuple[Layer, ...]:
     """Draw a measured flare.
 
@@ -60,6 +62,8 @@ def replay(
         Multiplies everything (`measure.placing.brightness`).
     single : bool
         Also a layer for each ghost, "ghost.NAME".
+    colors : {"camera", "rec709"}
+        The captures' red, green and blue, or linear Rec.709 by the camera's matrix.
 
     Returns
     -------
@@ -70,7 +74,7 @@ def replay(
     Raises
     ------
     FlarewrightError
-        When the constellation lies outside what was measured.
+        When the constellation lies outside what was measured, or the model knows no matrix.
 
     Notes
     -----
@@ -95,7 +99,17 @@ def replay(
         layers.append(Layer("halo", (gain * halo_radiance(model.halo, x, y)).astype(np.float32), (0, 0, *size)))
     whole = beauty(layers, size)
     singles = _single(model, constellation_deg, roll_deg, size, gain) if single else []
-    return (whole, *layers, *singles)
+    drawn = (whole, *layers, *singles)
+    return drawn if colors == "camera" else tuple(_in_rec709(layer, model) for layer in drawn)
+
+
+def _in_rec709(layer: Layer, model: GhostModel) -> Layer:
+    if model.to_rec709 is None:
+        raise FlarewrightError(
+            "the model does not know its camera's colour matrix (to_rec709): replay it in the camera's own colours"
+        )
+    pixels = layer.pixels @ np.array(model.to_rec709, dtype=np.float32).T
+    return replace(layer, pixels=np.asarray(pixels, dtype=np.float32))
 
 
 def _fit(model: GhostModel, size: tuple[int, int]) -> tuple[float, float]:
@@ -155,17 +169,18 @@ def draw_packed(
     if meshes:
         there = visible(meshes, constellation_deg)
         numbers = _posed(meshes, numbers, constellation_deg, sigma)
-        planes = np.zeros((3, height, width + 1))
         for m in range(3):
-            draw_ghosts(numbers[m], counts[m], there, sigma, placed, planes[m])
-        sum_into(planes, pixels)
+            plane = np.zeros((height, width + 1))
+            draw_ghosts(numbers[m], counts[m], there, sigma, placed, plane)
+            sum_along_rows(plane)
+            pixels[:, :, m] = plane[:, :width]
     for ghost, there_is in zip(curves, visible(curves, constellation_deg), strict=True):
         if there_is:
             left, top, w, h = bezier_window(bezier_numbers(ghost, constellation_deg), placed, width, height)
             if w:
                 window = pixels[top : top + h, left : left + w]
                 draw_bezier(bezier_numbers(ghost, constellation_deg), placed, left, top, window, _NOTHING)
-    return pixels
+    return np.maximum(pixels, 0.0)
 
 
 def _posed(meshes: Sequence[AberrationGhost], numbers: Floats, constellation_deg: float, sigma: float) -> Floats:

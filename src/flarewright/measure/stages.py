@@ -20,10 +20,8 @@ from ..model.ghost_model import AberrationGhost, GhostModel, Halo, Reference, St
 from .find import Candidate
 from .fit import Shape, render
 from .found import Found
-from .fragments import joined
 from .glow import halo_radiance, offsets, star_radiance
 from .glow_fit import fit_halo, fit_star, glow, register
-from .joint import lit
 from .journal import Journal
 from .numbers import channel_numbers
 from .pursuit import pursue
@@ -164,7 +162,6 @@ def find_ghosts(
         found = pursue(
             small, measured, most=most, first=pointed, pool=pool, tell=tell, progress=progress, journal=journal
         )
-        found = lit(joined(lit(found, small, pool=pool), small, pool=pool, tell=tell), small, pool=pool)
     ghosts = to_model([_sized(ghost, 2.0**times) for ghost in found], views)
     if corrections:
         ghosts = tuple(ghost for ghost in ghosts if ghost.name not in corrections.remove)
@@ -321,4 +318,5 @@ def _model(run: MergedRun, ghosts: tuple[AberrationGhost, ...], dim: Dimmed, vie
         largest_deg=max(abs(angle) for angle in angles), constellation_deg=(min(used), max(used)), ghosts=ghosts,
         halo=dim.halo, star=dim.star,
         reference=Reference(iso=run.reference_iso, f_number=run.reference_f_number, exposure_s=1.0),
+        to_rec709=run.to_rec709,
     )  # fmt: skip

@@ -18,6 +18,7 @@ from .base import Frozen
 Kind = Literal["light", "dark", "flat"]
 Positive = Annotated[float, Field(gt=0.0)]
 Degrees = Annotated[float, Field(ge=-360.0, le=360.0)]
+Matrix3 = tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]]
 
 
 class Capture(Frozen):
@@ -121,6 +122,9 @@ class FrameInfo(Frozen):
     iso, f_number, focal_mm : float or None
     clipped_share : float
         Part of the pixels that were clipped in every exposure.
+    gain, gain_error : float
+        The light in this frame over what its neighbours foretell, and its standard error; the file holds what was
+        photographed, `io.merged.read_frame` divides by it.
     """
 
     file: str
@@ -137,6 +141,8 @@ class FrameInfo(Frozen):
     f_number: Positive | None = None
     focal_mm: Positive | None = None
     clipped_share: float = Field(0.0, ge=0.0, le=1.0)
+    gain: Positive = 1.0
+    gain_error: float = Field(0.0, ge=0.0)
 
     @property
     def horizon_deg(self) -> float:
@@ -169,6 +175,8 @@ class MergedRun(Frozen):
         Radiance 1 is what fills the sensor (white level) in one second at these.
     white_balance : tuple of float
         What red, green and blue were multiplied by.
+    to_rec709 : tuple of 3 tuples of 3 float, or None
+        From the frames' red, green and blue to linear Rec.709, one row each; None: the files do not tell.
     remarks : tuple of str
         What a person should know.
     """
@@ -183,6 +191,7 @@ class MergedRun(Frozen):
     reference_iso: Positive = 100.0
     reference_f_number: Positive | None = None
     white_balance: tuple[Positive, Positive, Positive] = (1.0, 1.0, 1.0)
+    to_rec709: Matrix3 | None = None
     remarks: tuple[str, ...] = ()
 
 

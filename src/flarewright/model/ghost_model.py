@@ -239,6 +239,8 @@ class GhostModel(Frozen):
     reference : Reference
     background : Rgb
         Radiance everywhere, part of no layer.
+    to_rec709 : tuple of 3 tuples of 3 float, or None
+        From the captures' red, green and blue to linear Rec.709, one row each; None: unknown.
     remarks : tuple of str
     """
 
@@ -253,6 +255,7 @@ class GhostModel(Frozen):
     star: Star | None = None
     reference: Reference = Reference()
     background: Rgb3 = (0.0, 0.0, 0.0)
+    to_rec709: tuple[Rgb3, Rgb3, Rgb3] | None = None
     remarks: tuple[str, ...] = ()
 
     @model_validator(mode="after")
