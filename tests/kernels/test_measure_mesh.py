@@ -65,9 +65,35 @@ def test_a_shut_pupil_is_dark():
     assert window_of(numbers, 1, 0.5, FRAME, *SIZE)[2] == 0
 
 
-@pytest.mark.parametrize("discs", [0, 1, 2])
-def test_derivatives_are_those_of_the_picture(discs):
+def even(discs: int = 1) -> np.ndarray:
+    """Return a ghost whose map is nearly straight, so that cells are joined."""
     numbers = ghost(discs)
+    numbers[FIRST_G + 1 : FIRST_G + 10] *= 0.1
+    return numbers
+
+
+def test_joined_cells_are_as_bright_as_the_pupil_is():
+    numbers = np.zeros(42)
+    numbers[0], numbers[FIRST_G] = 80.0, 30.0
+    numbers[FIRST_I : FIRST_I + 3] = 900.0, 200.0, 240.0
+    picture = draw(numbers, 0)
+    y, x = np.mgrid[: SIZE[1], : SIZE[0]] + 0.5
+    right, up = x - FRAME[0], FRAME[1] - y
+    xi = (FRAME[2] * right + FRAME[3] * up - 40.0) / 30.0
+    eta = (FRAME[2] * up - FRAME[3] * right) / 30.0
+    u = xi**2 + eta**2
+    inside = u < 0.9
+    expected = (900.0 + 200.0 * u + 240.0 * 0.5 * xi) / 900.0
+    off = (picture / expected - 1.0)[inside]
+    assert np.abs(off).max() < 0.06
+    assert np.sqrt(np.mean(off**2)) < 0.02
+    assert picture.sum() == pytest.approx((900.0 + 100.0) * np.pi, rel=2e-3)
+
+
+@pytest.mark.parametrize("kind", [ghost, even])
+@pytest.mark.parametrize("discs", [0, 1, 2])
+def test_derivatives_are_those_of_the_picture(discs, kind):
+    numbers = kind(discs)
     free = np.arange(FIRST_DISC + 3 * discs)
     left, top, width, height = window_of(numbers, discs, 0.5, FRAME, *SIZE)
     plane, changes = np.zeros((height, width + 1)), np.zeros((height, width + 1, free.size))

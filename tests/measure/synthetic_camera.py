@@ -18,6 +18,7 @@ import json
 import os
 import shutil
 import tempfile
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass, replace
 from math import cos, degrees, hypot, radians, sin
 from pathlib import Path
@@ -158,21 +159,25 @@ def _walk(rng: np.random.Generator, count: int) -> Floats:
     return np.asarray(np.tanh(steps - steps.mean()))
 
 
-def render_pose(setup: Setup, pose: Pose, *, layers: str = "passes") -> fw.Rendering:
-    """Render the light where it truly stands, with room for the axis' offset around the picture."""
+def project_of(setup: Setup, pose: Pose, layers: str) -> fw.Project:
+    """Return the light where it truly stands, with room for the axis' offset around the picture."""
     (width, height), (right, down) = setup.size_px, setup.axis_offset_px
     big = (width + 2 * abs(right), height + 2 * abs(down))
     pixel = setup.sensor_width_mm / width
     iris = {} if setup.blades is None else {"iris": fw.Iris(blades=setup.blades)}
     coating = {} if setup.coating is None else {"coating": _coating(setup.coating)}
-    project = fw.Project(
+    return fw.Project(
         lens=setup.lens, f_number=setup.f_number, zoom=setup.zoom,
         lights=(fw.Light(field_deg=pose.field_deg, diameter_deg=setup.light_diameter_deg),),
         camera=fw.Camera(size_px=big, sensor_mm=(big[0] * pixel, big[1] * pixel)),
         quality=fw.Quality(mode=setup.quality, wavelengths=setup.wavelengths),
-        output=fw.Output(layers=layers), **iris, **coating,
+        output=fw.Output(layers=layers, starburst=layers != "ghosts"), **iris, **coating,
     )  # fmt: skip
-    return fw.render(project)
+
+
+def render_pose(setup: Setup, pose: Pose, *, layers: str = "passes") -> fw.Rendering:
+    """Render one step of the turntable."""
+    return fw.render(project_of(setup, pose, layers))
 
 
 def _coating(text: str) -> Any:
@@ -203,9 +208,9 @@ def _seen(setup: Setup, layer: fw.Layer) -> Floats:
     (width, height), (right, down) = setup.size_px, setup.axis_offset_px
     big = np.zeros((height + 2 * abs(down), width + 2 * abs(right), 3))
     x, y, w, h = layer.window
-    big[y : y + h, x : x + w] = layer.pixels
+    big[y : y + h, x : x + w] = np.maximum(layer.pixels @ _FROM_REC709.T, 0.0)
     top, left = abs(down) - down, abs(right) - right
-    return np.maximum(big[top : top + height, left : left + width] @ _FROM_REC709.T, 0.0)
+    return big[top : top + height, left : left + width]
 
 
 def _blurred(image: Floats) -> Floats:
@@ -279,14 +284,15 @@ def ideal_frame(setup: Setup, truth: Truth, pose: Pose, *, seed: int = 0, noise:
 
 def ghosts_of(setup: Setup, pose: Pose, scale: float) -> list[GhostTruth]:
     """Return the truth of every ghost in the picture, brightest first."""
-    rendering = render_pose(setup, pose, layers="ghosts")
-    found = []
-    for layer in rendering.layers:
+    seen = (_ghost(name, image) for name, image in ghost_layers(setup, pose, scale))
+    return sorted((one for one in seen if one is not None), key=lambda ghost: -ghost.flux[1])
+
+
+def ghost_layers(setup: Setup, pose: Pose, scale: float) -> Iterator[tuple[str, Floats]]:
+    """Yield the name and the picture of every path, noise-free, shape (H, W, 3)."""
+    for layer in render_pose(setup, pose, layers="ghosts").layers:
         if layer.name.startswith("ghost."):
-            one = _ghost(layer.name.removeprefix("ghost."), _seen(setup, layer) * scale)
-            if one is not None:
-                found.append(one)
-    return sorted(found, key=lambda ghost: -ghost.flux[1])
+            yield layer.name.removeprefix("ghost."), _seen(setup, layer) * scale
 
 
 def _ghost(name: str, image: Floats) -> GhostTruth | None:
@@ -296,7 +302,10 @@ def _ghost(name: str, image: Floats) -> GhostTruth | None:
         return None
     # half of what the even inside has: noise-free edges are sharp, so the level hardly matters
     inside = green > 0.5 * float(np.median(lit))
-    rows, columns = np.nonzero(inside)
+    # what is farthest in any direction lies on the border
+    padded = np.pad(inside, 1)
+    surrounded = padded[:-2, 1:-1] & padded[2:, 1:-1] & padded[1:-1, :-2] & padded[1:-1, 2:]
+    rows, columns = np.nonzero(inside & ~surrounded)
     x, y = columns + 0.5, rows + 0.5
     middle = 0.5 * (x.min() + x.max()), 0.5 * (y.min() + y.max())
     angle = np.radians(np.arange(64) * (360.0 / 64))

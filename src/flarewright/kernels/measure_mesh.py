@@ -1,7 +1,8 @@
 """Draw a measured ghost from its pupil's mesh: flux-conserving, with exact coverage and exact derivatives.
 
 The mesh is a fan of spokes and rings over the open pupil (`kernels.measure_pupil`). A triangle carries the flux of its
-part of the pupil wherever it lands, so folds and caustics need no special care.
+part of the pupil wherever it lands, so folds and caustics need no special care. Far from folds, triangles are joined to
+cells as large as the brightness over the pupil allows: only borders between cells are drawn.
 """
 
 from math import ceil, floor, pi, sin, sqrt
@@ -10,12 +11,30 @@ import numpy as np
 
 from ._jit import compiled, inner
 from .measure_edges import add_edge, add_edge_changes
-from .measure_pupil import DISC_NUMBERS, FIRST_DISC, FIRST_G, FIRST_I, TERMS, border, monomials, place, rims, slopes
+from .measure_pupil import (
+    DISC_NUMBERS,
+    FIRST_DISC,
+    FIRST_G,
+    FIRST_I,
+    TERMS,
+    at_field,
+    border,
+    level,
+    monomials,
+    place,
+    rims,
+    slopes,
+)
 
 # pixels by which a chord may leave its arc, up to so many spokes
 _CHORD = 0.05
 _LEAST_SPOKES, _MOST_SPOKES = 16, 208
 _LEAST_RINGS, _MOST_RINGS = 3, 16
+# without folds: areas on the sensor that differ by no more than this factor, the part of the brightness that may change
+# from one ring of cells to the next, how many rings there may be, and cells around for each ring
+_EVEN, _STEP = 4.0, 0.05
+_RINGS = (2, 3, 4, 6, 8, 12, 16)
+_AROUND = 3
 
 
 @inner
@@ -25,7 +44,7 @@ def _mesh(parameters, disc_count, sigma, spokes, rings, with_changes, pupil, pup
     rims(parameters, disc_count, sigma, discs)
     edge = np.empty((spokes + 1, 2))
     by = np.empty((spokes + 1, 2, 2 * disc_count + 2))
-    if not border(discs, disc_count + 1, spokes, edge, by):
+    if not border(discs, disc_count + 1, spokes, with_changes, edge, by):
         return False
     # a polygon as large as the disc it stands for
     swell = sqrt((2.0 * pi / spokes) / sin(2.0 * pi / spokes))
@@ -55,11 +74,11 @@ def _steadied(area):
 
 
 @inner
-def _flux(parameters, sigma, pupil, ia, ja, ib, jb, ic, jc):
+def _flux(light, sigma, pupil, ia, ja, ib, jb, ic, jc):
     """Return a triangle's flux: intensity at its middle, never below 0, times its part of the pupil."""
     xi = (pupil[ia, ja, 0] + pupil[ib, jb, 0] + pupil[ic, jc, 0]) / 3.0
     eta = (pupil[ia, ja, 1] + pupil[ib, jb, 1] + pupil[ic, jc, 1]) / 3.0
-    intensity, _, _ = slopes(parameters, FIRST_I, xi * xi + eta * eta, xi * sigma, sigma * sigma)
+    intensity = level(light, xi * xi + eta * eta, xi * sigma)
     part = _area(
         pupil[ia, ja, 0], pupil[ia, ja, 1], pupil[ib, jb, 0], pupil[ib, jb, 1], pupil[ic, jc, 0], pupil[ic, jc, 1]
     )
@@ -69,9 +88,15 @@ def _flux(parameters, sigma, pupil, ia, ja, ib, jb, ic, jc):
 @inner
 def _land(parameters, pupil, sigma, frame, spots):
     """Fill where the mesh lands in pixels; frame: axis x, axis y, cos roll, sin roll, scale."""
+    f, g = np.empty(6), np.empty(6)
+    at_field(parameters, 0, sigma * sigma, f)
+    at_field(parameters, FIRST_G, sigma * sigma, g)
     for i in range(pupil.shape[0]):
         for j in range(pupil.shape[1]):
-            along, across, _, _, _, _ = place(parameters, pupil[i, j, 0], pupil[i, j, 1], sigma)
+            xi, eta = pupil[i, j, 0], pupil[i, j, 1]
+            u, v = xi * xi + eta * eta, xi * sigma
+            spread = level(g, u, v)
+            along, across = sigma * level(f, u, v) + xi * spread, eta * spread
             # rows count downwards
             spots[i, j, 0] = frame[0] + frame[4] * (frame[2] * along - frame[3] * across)
             spots[i, j, 1] = frame[1] - frame[4] * (frame[3] * along + frame[2] * across)
@@ -81,6 +106,8 @@ def _land(parameters, pupil, sigma, frame, spots):
 def _densities(parameters, sigma, pupil, spots, densities):
     """Fill the signed density of each triangle, shape (rings, spokes, 2)."""
     rings, spokes = densities.shape[0], densities.shape[1]
+    light = np.empty(6)
+    at_field(parameters, FIRST_I, sigma * sigma, light)
     for i in range(rings):
         for j in range(spokes):
             k = j + 1 if j + 1 < spokes else 0
@@ -88,14 +115,46 @@ def _densities(parameters, sigma, pupil, spots, densities):
                 spots[i, j, 0], spots[i, j, 1], spots[i + 1, j, 0], spots[i + 1, j, 1], spots[i + 1, k, 0],
                 spots[i + 1, k, 1],
             )  # fmt: skip
-            densities[i, j, 0] = -_flux(parameters, sigma, pupil, i, j, i + 1, j, i + 1, k) / _steadied(area)
+            densities[i, j, 0] = -_flux(light, sigma, pupil, i, j, i + 1, j, i + 1, k) / _steadied(area)
             if i == 0:
                 densities[i, j, 1] = 0.0
                 continue
             area = _area(
                 spots[i, j, 0], spots[i, j, 1], spots[i + 1, k, 0], spots[i + 1, k, 1], spots[i, k, 0], spots[i, k, 1]
             )
-            densities[i, j, 1] = -_flux(parameters, sigma, pupil, i, j, i + 1, k, i, k) / _steadied(area)
+            densities[i, j, 1] = -_flux(light, sigma, pupil, i, j, i + 1, k, i, k) / _steadied(area)
+
+
+@inner
+def _join(spots, span, densities):
+    """Give all triangles of each cell one density, so that the edges between them need not be drawn."""
+    rings, spokes = densities.shape[0], densities.shape[1]
+    for i in range(rings):
+        for first in range(0, spokes, span):
+            light, area = 0.0, 0.0
+            for j in range(first, first + span):
+                one, other = _cell_areas(spots, i, j, spokes)
+                light += densities[i, j, 0] * one
+                area += one
+                if i > 0:
+                    light += densities[i, j, 1] * other
+                    area += other
+            densities[i, first : first + span, 0] = light / area
+            if i > 0:
+                densities[i, first : first + span, 1] = light / area
+
+
+@inner
+def _cell_areas(spots, i, j, spokes):
+    """Return the signed areas of the two triangles between two spokes and two rings, as they are divided by."""
+    k = j + 1 if j + 1 < spokes else 0
+    one = _area(
+        spots[i, j, 0], spots[i, j, 1], spots[i + 1, j, 0], spots[i + 1, j, 1], spots[i + 1, k, 0], spots[i + 1, k, 1]
+    )
+    other = _area(
+        spots[i, j, 0], spots[i, j, 1], spots[i + 1, k, 0], spots[i + 1, k, 1], spots[i, k, 0], spots[i, k, 1]
+    )
+    return _steadied(one), _steadied(other)
 
 
 @inner
@@ -120,20 +179,42 @@ def _draw_mesh(spots, densities, left, top, width, height, plane):
 
 @inner
 def _grain(parameters, disc_count, sigma, scale):
-    """Return spokes and rings fine enough for a ghost, or 0 spokes when nothing is open; and its longest half width."""
-    pupil, none = np.empty((2, 8, 2)), np.empty((0, 0, 0, 0))
-    if not _mesh(parameters, disc_count, sigma, 8, 1, False, pupil, none):
-        return 0, 0
-    reach = 0.0
+    """Return spokes and rings fine enough for a ghost, and how many spokes a cell spans.
+
+    0 spokes: nothing is open; a span of 0: there are folds, and every triangle stays alone.
+    """
+    pupil, none = np.empty((3, 8, 2)), np.empty((0, 0, 0, 0))
+    if not _mesh(parameters, disc_count, sigma, 8, 2, False, pupil, none):
+        return 0, 0, 0
+    reach, least, most = 0.0, 1e300, -1e300
+    dark, bright = 1e300, 0.0
     x0, y0, _, _, _, _ = place(parameters, pupil[0, 0, 0], pupil[0, 0, 1], sigma)
-    for j in range(8):
-        x, y, _, _, _, _ = place(parameters, pupil[1, j, 0], pupil[1, j, 1], sigma)
-        reach = max(reach, sqrt((x - x0) ** 2 + (y - y0) ** 2))
-    reach *= scale
-    spokes = min(max(pi * sqrt(reach / (2.0 * _CHORD)), _LEAST_SPOKES), _MOST_SPOKES)
+    for i in range(3):
+        for j in range(8 if i > 0 else 1):
+            xi, eta = pupil[i, j, 0], pupil[i, j, 1]
+            x, y, a, b, c, d = place(parameters, xi, eta, sigma)
+            reach = max(reach, sqrt((x - x0) ** 2 + (y - y0) ** 2))
+            area = a * d - b * c
+            least, most = min(least, area), max(most, area)
+            intensity, _, _ = slopes(parameters, FIRST_I, xi * xi + eta * eta, xi * sigma, sigma * sigma)
+            density = max(intensity, 0.0) / max(abs(area), 1e-9)
+            dark, bright = min(dark, density), max(bright, density)
+    spokes = min(max(pi * sqrt(reach * scale / (2.0 * _CHORD)), _LEAST_SPOKES), _MOST_SPOKES)
     # coarse steps: while a ghost is fitted its mesh had better stay the same
     spokes = 16 * int(ceil(spokes / 16.0))
-    return spokes, int(min(max(spokes // 6, _LEAST_RINGS), _MOST_RINGS))
+    rings = int(min(max(spokes // 6, _LEAST_RINGS), _MOST_RINGS))
+    if not (least * most > 0.0 and max(abs(least), abs(most)) < _EVEN * min(abs(least), abs(most))):
+        return spokes, rings, 0
+    wanted = (bright - dark) / (_STEP * max(0.5 * (bright + dark), 1e-300))
+    few = rings
+    for trial in _RINGS:
+        if trial >= wanted:
+            few = min(trial, rings)
+            break
+    span = max(spokes // max(_AROUND * few, 16), 1)
+    while spokes % span:
+        span -= 1
+    return spokes, few, span
 
 
 @compiled
@@ -159,7 +240,7 @@ def draw_ghosts(parameters, disc_counts, visible, sigma, frame, plane):
     for g in range(parameters.shape[0]):
         if visible[g] == 0.0:
             continue
-        spokes, rings = _grain(parameters[g], disc_counts[g], sigma, frame[4])
+        spokes, rings, span = _grain(parameters[g], disc_counts[g], sigma, frame[4])
         if spokes == 0:
             continue
         pupil, spots = np.empty((rings + 1, spokes, 2)), np.empty((rings + 1, spokes, 2))
@@ -168,6 +249,8 @@ def draw_ghosts(parameters, disc_counts, visible, sigma, frame, plane):
         _land(parameters[g], pupil, sigma, frame, spots)
         densities = np.empty((rings, spokes, 2))
         _densities(parameters[g], sigma, pupil, spots, densities)
+        if span > 0:
+            _join(spots, span, densities)
         # the model's irradiance is per pixel of the model: a finer picture keeps it
         densities *= visible[g] * frame[4] * frame[4]
         _draw_mesh(spots, densities, 0, 0, width, height, plane)
@@ -191,7 +274,7 @@ def window_of(parameters, disc_count, sigma, frame, width, height):
     left, top, width, height : int
         Of the window; width 0 when it touches none.
     """
-    spokes, rings = _grain(parameters, disc_count, sigma, frame[4])
+    spokes, rings, _ = _grain(parameters, disc_count, sigma, frame[4])
     if spokes == 0:
         return 0, 0, 0, 0
     pupil, spots = np.empty((rings + 1, spokes, 2)), np.empty((rings + 1, spokes, 2))
@@ -284,17 +367,55 @@ def _triangle_changes(parameters, sigma, free, pupil, pupil_by, spots, spots_by,
             )  # fmt: skip
             brighter = (i_xi * (dax + dbx + dcx) + i_eta * (day + dby + dcy)) / 3.0
             flux_change = brighter * part + intensity * grown
-        ux, uy = spots_by[ia, ja, q, 0], spots_by[ia, ja, q, 1]
-        vx, vy = spots_by[ib, jb, q, 0], spots_by[ib, jb, q, 1]
-        tx, ty = spots_by[ic, jc, q, 0], spots_by[ic, jc, q, 1]
-        wider = 0.5 * ((vx - ux) * (cy - ay) + (bx - ax) * (ty - uy) - (tx - ux) * (by - ay) - (cx - ax) * (vy - uy))
-        if raw != area:
-            wider = 0.0
+        wider = _wider(spots, spots_by, ia, ja, ib, jb, ic, jc, q) if raw == area else 0.0
         out[q] = -flux_change / area - density * wider / area
 
 
 @inner
-def _draw_changes(spots, spots_by, densities, changes, left, top, width, height, out):
+def _wider(spots, spots_by, ia, ja, ib, jb, ic, jc, q):
+    """Return the derivative of a triangle's signed area by free parameter q."""
+    ax, ay = spots[ia, ja, 0], spots[ia, ja, 1]
+    bx, by = spots[ib, jb, 0], spots[ib, jb, 1]
+    cx, cy = spots[ic, jc, 0], spots[ic, jc, 1]
+    ux, uy = spots_by[ia, ja, q, 0], spots_by[ia, ja, q, 1]
+    vx, vy = spots_by[ib, jb, q, 0], spots_by[ib, jb, q, 1]
+    tx, ty = spots_by[ic, jc, q, 0], spots_by[ic, jc, q, 1]
+    return 0.5 * ((vx - ux) * (cy - ay) + (bx - ax) * (ty - uy) - (tx - ux) * (by - ay) - (cx - ax) * (vy - uy))
+
+
+@inner
+def _join_changes(spots, spots_by, span, densities, changes):
+    """Give all triangles of each cell the derivatives of their common density; `densities` are still their own."""
+    rings, spokes = densities.shape[0], densities.shape[1]
+    for i in range(rings):
+        for first in range(0, spokes, span):
+            light, area = 0.0, 0.0
+            for j in range(first, first + span):
+                one, other = _cell_areas(spots, i, j, spokes)
+                light += densities[i, j, 0] * one
+                area += one
+                if i > 0:
+                    light += densities[i, j, 1] * other
+                    area += other
+            common = light / area
+            for q in range(changes.shape[3]):
+                change = 0.0
+                for j in range(first, first + span):
+                    k = j + 1 if j + 1 < spokes else 0
+                    one, other = _cell_areas(spots, i, j, spokes)
+                    change += changes[i, j, 0, q] * one
+                    change += (densities[i, j, 0] - common) * _wider(spots, spots_by, i, j, i + 1, j, i + 1, k, q)
+                    if i > 0:
+                        change += changes[i, j, 1, q] * other
+                        change += (densities[i, j, 1] - common) * _wider(spots, spots_by, i, j, i + 1, k, i, k, q)
+                for j in range(first, first + span):
+                    changes[i, j, 0, q] = change / area
+                    if i > 0:
+                        changes[i, j, 1, q] = change / area
+
+
+@inner
+def _draw_changes(spots, spots_by, densities, changes, span, left, top, width, height, out):
     """Draw every edge's derivatives once."""
     rings, spokes = densities.shape[0], densities.shape[1]
     step = np.empty(changes.shape[3])
@@ -307,18 +428,20 @@ def _draw_changes(spots, spots_by, densities, changes, left, top, width, height,
             bx, by = spots[i + 1, j, 0], spots[i + 1, j, 1]
             cx, cy = spots[i + 1, k, 0], spots[i + 1, k, 1]
             half = 1 if i > 0 else 0
-            step[:] = changes[i, j, 0] - changes[i, before, half]
-            add_edge_changes(
-                ax, ay, bx, by, densities[i, j, 0] - densities[i, before, half], step, spots_by[i, j],
-                spots_by[i + 1, j], left, top, width, height, out,
-            )  # fmt: skip
+            # nothing changes inside a cell
+            if span == 0 or j % span == 0:
+                step[:] = changes[i, j, 0] - changes[i, before, half]
+                add_edge_changes(
+                    ax, ay, bx, by, densities[i, j, 0] - densities[i, before, half], step, spots_by[i, j],
+                    spots_by[i + 1, j], left, top, width, height, out,
+                )  # fmt: skip
             outer = densities[i + 1, j, 1] if i + 1 < rings else 0.0
             step[:] = changes[i, j, 0] - (changes[i + 1, j, 1] if i + 1 < rings else zero)
             add_edge_changes(
                 bx, by, cx, cy, densities[i, j, 0] - outer, step, spots_by[i + 1, j], spots_by[i + 1, k], left, top,
                 width, height, out,
             )  # fmt: skip
-            if i > 0:
+            if i > 0 and span == 0:
                 step[:] = changes[i, j, 1] - changes[i, j, 0]
                 add_edge_changes(
                     ax, ay, cx, cy, densities[i, j, 1] - densities[i, j, 0], step, spots_by[i, j], spots_by[i + 1, k],
@@ -351,7 +474,7 @@ def draw_with_changes(parameters, disc_count, sigma, free, frame, left, top, pla
     differences.
     """
     height, width = plane.shape[0], plane.shape[1] - 1
-    spokes, rings = _grain(parameters, disc_count, sigma, frame[4])
+    spokes, rings, span = _grain(parameters, disc_count, sigma, frame[4])
     if spokes == 0:
         return
     pupil, spots = np.empty((rings + 1, spokes, 2)), np.empty((rings + 1, spokes, 2))
@@ -373,8 +496,11 @@ def draw_with_changes(parameters, disc_count, sigma, free, frame, left, top, pla
                 _triangle_changes(
                     parameters, sigma, free, pupil, pupil_by, spots, spots_by, i, j, i + 1, k, i, k, changes[i, j, 1]
                 )
+    if span > 0:
+        _join_changes(spots, spots_by, span, densities, changes)
+        _join(spots, span, densities)
     # the model's irradiance is per pixel of the model, whatever the picture's scale
     densities *= frame[4] * frame[4]
     changes *= frame[4] * frame[4]
     _draw_mesh(spots, densities, left, top, width, height, plane)
-    _draw_changes(spots, spots_by, densities, changes, left, top, width, height, out)
+    _draw_changes(spots, spots_by, densities, changes, span, left, top, width, height, out)

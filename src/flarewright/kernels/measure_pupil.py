@@ -38,6 +38,20 @@ def slopes(c, at, u, v, w):
 
 
 @inner
+def at_field(c, at, w, out):
+    """Fill the six numbers 1, u, v, uu, uv, vv of a polynomial's ten at a field of w = s.s."""
+    out[0] = c[at] + c[at + 3] * w + c[at + 9] * w * w
+    out[1], out[2] = c[at + 1] + c[at + 7] * w, c[at + 2] + c[at + 8] * w
+    out[3], out[4], out[5] = c[at + 4], c[at + 5], c[at + 6]
+
+
+@inner
+def level(six, u, v):
+    """Return the value of a polynomial of `at_field`."""
+    return six[0] + u * (six[1] + six[3] * u + six[4] * v) + v * (six[2] + six[5] * v)
+
+
+@inner
 def _reach(middle, cosine, sine, centre, radius):
     """Return the distance from `middle` to a disc's rim, and its derivatives by middle - centre and by radius."""
     a = middle - centre
@@ -96,7 +110,7 @@ def rims(parameters, disc_count, sigma, discs):
 
 
 @inner
-def border(discs, count, spokes, points, by):
+def border(discs, count, spokes, with_changes, points, by):
     """Fill the border of the open pupil, spoke by spoke, from the middle of its axis.
 
     Parameters
@@ -104,6 +118,8 @@ def border(discs, count, spokes, points, by):
     discs : ndarray, shape (D, 2)
         Centre along s and radius.
     count, spokes : int
+    with_changes : bool
+        Whether to fill `by`.
     points : ndarray, shape (spokes + 1, 2)
         Filled: along s and across; the last one is the middle.
     by : ndarray, shape (spokes + 1, 2, 2 * D)
@@ -132,20 +148,20 @@ def border(discs, count, spokes, points, by):
     by[spokes, 0, 2 * at_high] += 0.5
     by[spokes, 0, 2 * at_high + 1] += 0.5
     active = np.empty(spokes, np.int64)
+    turn_c, turn_s = cos(2.0 * pi / spokes), sin(2.0 * pi / spokes)
+    cosine, sine = 1.0, 0.0
     for j in range(spokes):
-        angle = 2.0 * pi * j / spokes
-        active[j] = _nearest_rim(middle, cos(angle), sin(angle), discs, count)
-    for j in range(spokes):
-        angle = 2.0 * pi * j / spokes
-        cosine, sine = cos(angle), sin(angle)
-        k = active[j]
+        k = _nearest_rim(middle, cosine, sine, discs, count) if count > 1 else 0
+        active[j] = k
         reach, by_a, by_r = _reach(middle, cosine, sine, discs[k, 0], discs[k, 1])
         points[j, 0], points[j, 1] = middle + reach * cosine, reach * sine
-        for q in range(2 * count):
+        for q in range(2 * count if with_changes else 0):
             dm = by[spokes, 0, q]
             dreach = by_a * (dm - (1.0 if q == 2 * k else 0.0)) + (by_r if q == 2 * k + 1 else 0.0)
             by[j, 0, q], by[j, 1, q] = dm + dreach * cosine, dreach * sine
-    _snap(discs, spokes, active, middle, points, by)
+        cosine, sine = cosine * turn_c - sine * turn_s, sine * turn_c + cosine * turn_s
+    if count > 1:
+        _snap(discs, spokes, active, middle, points, by)
     return True
 
 

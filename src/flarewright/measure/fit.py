@@ -164,7 +164,7 @@ def patches_of(
 
 
 def evaluate(
-    shape: Shape, free: Indices, patch: Patch, offset: bool, error: float
+    shape: Shape, free: Indices, patch: Patch, offset: bool, error: float, tails: bool = True
 ) -> tuple[float, int, Floats, Floats]:
     """Return cost, pixels, normal matrix and right side of one patch."""
     height, width = patch.pixels.shape
@@ -178,7 +178,7 @@ def evaluate(
     if offset and total > 0.0:
         residual = residual - (weight * residual).sum() / total
     # heavy tails: other ghosts that are not known yet
-    if error > 0.0:
+    if error > 0.0 and tails:
         weight = weight / (1.0 + weight * residual**2 / OUTLIER**2)
         total = weight.sum()
     cost = float((weight * residual**2).sum())
@@ -223,6 +223,7 @@ def refine(
     steps: int = 12,
     offset: bool = True,
     error: float = MODEL_ERROR,
+    tails: bool = True,
     pool: ThreadPoolExecutor | None = None,
 ) -> Fit:
     """Fit one ghost's numbers to patches by Levenberg-Marquardt.
@@ -242,6 +243,8 @@ def refine(
         Every patch has an unknown even background.
     error : float
         Part of the light that the model may miss; above 0 outliers count less, too.
+    tails : bool
+        False: they count as all do.
     pool : executor, optional
         Runs the patches; sums are taken in their order.
 
@@ -257,7 +260,7 @@ def refine(
 
     def look(trial: Shape) -> tuple[float, int, Floats, Floats]:
         parts: list[tuple[float, int, Floats, Floats]] = list(
-            run(lambda patch: evaluate(trial, free, patch, offset, error), patches)  # type: ignore[call-overload]
+            run(lambda patch: evaluate(trial, free, patch, offset, error, tails), patches)  # type: ignore[call-overload]
         )
         prior = priors(shape, free, width)
         at = trial.numbers[free]
@@ -299,10 +302,12 @@ def stepped(shape: Shape, free: Indices, step: Floats) -> Shape:
     return replace(shape, numbers=numbers)
 
 
-def cost_of(shape: Shape, patches: Sequence[Patch], *, offset: bool = True, error: float = MODEL_ERROR) -> float:
+def cost_of(
+    shape: Shape, patches: Sequence[Patch], *, offset: bool = True, error: float = MODEL_ERROR, tails: bool = True
+) -> float:
     """Return the cost of a shape on patches, without the priors."""
     none = np.zeros(0, np.int64)
-    return sum(evaluate(shape, none, patch, offset, error)[0] for patch in patches)
+    return sum(evaluate(shape, none, patch, offset, error, tails)[0] for patch in patches)
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..kernels.measure_pupil import FIRST_DISC, FIRST_I
-from .fit import MODEL_ERROR, Fit, Patch, Shape, cost_of, render
+from .fit import Fit, Shape, render
 from .views import Pixels, View
 
 CHANNELS = 3
@@ -83,9 +83,3 @@ def darkened(shape: Shape) -> Shape:
     numbers = shape.numbers.copy()
     numbers[FIRST_I:FIRST_DISC] = 0.0
     return Shape(numbers, shape.discs)
-
-
-def gain(shape: Shape, patches: Sequence[Patch], error: float = MODEL_ERROR) -> float:
-    """Return the part of the squares inside its windows that a ghost explains."""
-    before = cost_of(darkened(shape), patches, error=error)
-    return 1.0 - cost_of(shape, patches, error=error) / max(before, 1e-300)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..errors import FlarewrightError
 from ..kernels.measure_bezier import bezier_window, draw_bezier
-from ..kernels.measure_edges import sum_along_rows
+from ..kernels.measure_edges import sum_into
 from ..kernels.measure_mesh import draw_ghosts
 from ..model.ghost_model import AberrationGhost, BezierGhost, Curves, GhostModel
 from ..model.layer import Layer
@@ -169,18 +169,17 @@ def draw_packed(
     if meshes:
         there = visible(meshes, constellation_deg)
         numbers = _posed(meshes, numbers, constellation_deg, sigma)
+        planes = np.zeros((3, height, width + 1))
         for m in range(3):
-            plane = np.zeros((height, width + 1))
-            draw_ghosts(numbers[m], counts[m], there, sigma, placed, plane)
-            sum_along_rows(plane)
-            pixels[:, :, m] = plane[:, :width]
+            draw_ghosts(numbers[m], counts[m], there, sigma, placed, planes[m])
+        sum_into(planes, pixels)
     for ghost, there_is in zip(curves, visible(curves, constellation_deg), strict=True):
         if there_is:
             left, top, w, h = bezier_window(bezier_numbers(ghost, constellation_deg), placed, width, height)
             if w:
                 window = pixels[top : top + h, left : left + w]
                 draw_bezier(bezier_numbers(ghost, constellation_deg), placed, left, top, window, _NOTHING)
-    return np.maximum(pixels, 0.0)
+    return pixels
 
 
 def _posed(meshes: Sequence[AberrationGhost], numbers: Floats, constellation_deg: float, sigma: float) -> Floats:

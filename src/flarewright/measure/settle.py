@@ -11,15 +11,13 @@ import numpy as np
 
 from ..kernels.measure_pupil import FIRST_DISC, FIRST_I
 from ..model.ghost_model import AberrationGhost
-from .fit import Fit, Shape, free_numbers, patches_of, presence, refine, render
-from .found import CHANNELS, Found, alone, by_light, exchange, gain, rest_of
+from .fit import Fit, Shape, free_numbers, patches_of, presence, refine
+from .found import CHANNELS, Found, alone, by_light, exchange, rest_of
 from .grow import Growth, grow
+from .joint import lit
 from .journal import Journal
 from .numbers import channel_of
 from .views import Pixels, View
-
-# part of the squares inside its windows by which the picture must get worse without a ghost
-NEEDED = 0.03
 
 
 @dataclass(frozen=True)
@@ -74,8 +72,9 @@ def settle(
     """
     ghosts = list(found)
     steps = journal or Journal()
-    rest = [rest_of(ghosts, views, m) for m in range(CHANNELS)]
     for turn in range(how.rounds):
+        ghosts = lit(ghosts, views, pool=pool)
+        rest = [rest_of(ghosts, views, m) for m in range(CHANNELS)]
         for done, k in enumerate(by_light(ghosts)):
             old = ghosts[k]
             ghosts[k] = steps.step(partial(_again, old, views, rest, how, pool))
@@ -83,7 +82,7 @@ def settle(
                 exchange(old.shapes[m], ghosts[k].shapes[m], old, views, rest[m])
             progress((turn + (done + 1) / len(ghosts)) / how.rounds, f"ghost {done + 1} of {len(ghosts)}")
         before = len(ghosts)
-        ghosts = needed(ghosts, views, rest)
+        ghosts = lit(ghosts, views, pool=pool)
         tell(f"round {turn + 1}: {len(ghosts)} of {before} ghosts are needed")
     return [ghosts[k] for k in by_light(ghosts)]
 
@@ -179,22 +178,6 @@ def _refined(
         return None
     free = like.free if like is not None and like.shape.discs == start.discs else free_numbers(1, start.discs, 1)
     return refine(start, patches, free, width=alone[0].size_px[0], steps=8, pool=pool)
-
-
-def needed(ghosts: Sequence[Found], views: Sequence[View], rest: list[list[Pixels]]) -> list[Found]:
-    """Leave out ghosts without which the views are explained as well, faintest first; the rest gets their light."""
-    kept = list(ghosts)
-    for k in reversed(by_light(ghosts)):
-        ghost = ghosts[k]
-        patches = patches_of(ghost.shapes[1], alone(ghost, 1, views, rest[1], 12), 1)
-        bright = ghost.shapes[1].numbers[FIRST_I] > 0.0
-        if bright and patches and gain(ghost.shapes[1], patches) > NEEDED:
-            continue
-        kept = [other for other in kept if other is not ghost]
-        for m in range(len(rest)):
-            for v in range(ghost.first, ghost.last + 1):
-                rest[m][v] = (rest[m][v] + render(ghost.shapes[m], views[v])).astype(np.float32)
-    return kept
 
 
 def to_model(ghosts: Sequence[Found], views: Sequence[View]) -> tuple[AberrationGhost, ...]:

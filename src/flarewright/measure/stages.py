@@ -20,8 +20,10 @@ from ..model.ghost_model import AberrationGhost, GhostModel, Halo, Reference, St
 from .find import Candidate
 from .fit import Shape, render
 from .found import Found
+from .fragments import joined
 from .glow import halo_radiance, offsets, star_radiance
 from .glow_fit import fit_halo, fit_star, glow, register
+from .joint import lit
 from .journal import Journal
 from .numbers import channel_numbers
 from .pursuit import pursue
@@ -162,6 +164,7 @@ def find_ghosts(
         found = pursue(
             small, measured, most=most, first=pointed, pool=pool, tell=tell, progress=progress, journal=journal
         )
+        found = lit(joined(lit(found, small, pool=pool), small, pool=pool, tell=tell), small, pool=pool)
     ghosts = to_model([_sized(ghost, 2.0**times) for ghost in found], views)
     if corrections:
         ghosts = tuple(ghost for ghost in ghosts if ghost.name not in corrections.remove)

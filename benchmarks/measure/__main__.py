@@ -1,0 +1,76 @@
+"""The proof of the measurement, as a table.
+
+    python -m benchmarks.measure LENS ... [--width 720] [--merge real|ideal] [--keep FOLDER] [--json FILE]
+
+A synthetic camera (`tests/measure/synthetic_camera.py`) photographs each lens at the even ones of 100 constellations;
+the model is found and fitted from those alone, and judged at the odd ones against the noise-free truth, outside 40 (of
+720) pixels around the light.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+from benchmarks.measure.judge import judge
+from benchmarks.measure.shoot import setup_of, shoot
+
+from flarewright.io.captures import read_camera, read_captures
+from flarewright.io.ghost_model_file import write_ghost_model
+from flarewright.io.merged import read_run
+from flarewright.measure.merge_run import merge_captures
+from flarewright.measure.stages import find_ghosts, fit_ghosts
+
+
+def prove(lens: str, folder: Path, given: argparse.Namespace) -> dict[str, Any]:
+    """Photograph, merge, find, fit and judge one lens."""
+    shoot(setup_of(lens, given.width, given.count, given.f_number), folder)
+    run_folder = folder / given.merge
+    start, cpu = time.perf_counter(), time.process_time()
+
+    def tell(text: str) -> None:
+        print(f"{lens} {time.process_time() - cpu:7.1f} CPU s: {text}", flush=True)
+
+    if given.merge == "real":
+        captures = read_captures(folder / "captures.csv")
+        merge_captures(captures, folder, run_folder, camera=read_camera(folder / "camera.json"))
+        tell("merged")
+    run = read_run(run_folder)
+    merged = time.process_time()
+    rough = find_ghosts(run_folder, run, tell=tell)
+    found = time.process_time()
+    model = fit_ghosts(run_folder, run, rough, tell=tell)
+    fitted = time.process_time()
+    write_ghost_model(folder / f"model-{given.merge}.json", model)
+    scores = judge(model, folder, run_folder, run)
+    times = {"merge": merged - cpu, "find": found - merged, "fit": fitted - found, "wall": time.perf_counter() - start}
+    return {"lens": lens, "merge": given.merge, "ghosts": len(model.ghosts), "CPU s": times, **scores}
+
+
+def main() -> None:
+    """Judge lenses and print their scores."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.measure", description=__doc__)
+    parser.add_argument("lens", nargs="+")
+    parser.add_argument("--width", type=int, default=720)
+    parser.add_argument("--count", type=int, default=100, help="constellations, both kinds")
+    parser.add_argument("--f-number", type=float, default=5.6)
+    parser.add_argument("--merge", choices=("real", "ideal"), default="real")
+    parser.add_argument("--keep", type=Path, help="a folder for photographs and models, taken up again")
+    parser.add_argument("--json", type=Path, help="also write the scores here")
+    given = parser.parse_args()
+    rows = []
+    with tempfile.TemporaryDirectory() as made:
+        for lens in given.lens:
+            folder = (given.keep or Path(made)) / f"{lens}-{given.width}-{given.f_number:g}"
+            rows.append(prove(lens, folder, given))
+            print(json.dumps(rows[-1], indent=1), flush=True)
+    if given.json is not None:
+        given.json.write_text(json.dumps(rows, indent=1) + "\n", "utf-8")
+
+
+if __name__ == "__main__":
+    main()

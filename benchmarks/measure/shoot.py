@@ -1,0 +1,105 @@
+"""Photograph a lens with the synthetic camera: captures at the even angles, truth at the odd ones."""
+
+from __future__ import annotations
+
+import json
+import pickle
+from dataclasses import asdict, replace
+from math import hypot
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+from benchmarks.measure.truth import TrueGhost, true_ghosts
+from numpy.typing import NDArray
+from synthetic_camera import Setup, expose, ideal_frame, poses, scale_of, truth_of
+
+from flarewright.io.merged import write_frame, write_run
+from flarewright.model.capture import CameraNoise, FrameInfo, MergedRun
+
+# every so many odd angles is judged ghost by ghost; the pictures are judged at all of them
+EVERY = 2
+
+
+def setup_of(lens: str, width: int = 720, count: int = 100, f_number: float | None = 5.6, seed: int = 5) -> Setup:
+    """Return the proof's setup of a lens: steps of 0.3 degrees when there are 100."""
+    angles = tuple(np.round(np.linspace(0.0, 29.7, count), 6).tolist())
+    return Setup(
+        lens=lens, quality="final", size_px=(width, width * 2 // 3), angles_deg=angles, f_number=f_number, seed=seed,
+        axis_offset_px=(round(3 * width / 720), -round(2 * width / 720)), haze_radius_px=60.0 * width / 720,
+    )  # fmt: skip
+
+
+def shoot(setup: Setup, folder: Path) -> None:
+    """Write `captures.csv` and photographs, `ideal/` (a run with a perfect merge), and the truth.
+
+    Constellations with even numbers alone are photographed. Of the odd ones `truth-KKK.npz` holds the noise-free
+    picture and its noise, and `ghosts-KKK.pickle` every second time the ghosts. What is there is kept.
+    """
+    if (folder / "truth.json").is_file():
+        return
+    (folder / "ideal" / "frames").mkdir(parents=True, exist_ok=True)
+    scale = scale_of(setup)
+    lines = ["file,constellation_deg,exposure_s,iso,f_number,roll_deg"]
+    frames = []
+    rows: list[dict[str, Any]] = []
+    for pose in poses(setup):
+        truth = truth_of(setup, pose, scale)
+        frame = ideal_frame(setup, truth, pose)
+        rows.append({**asdict(pose), "light_px": truth.light_px, "roll_deg": frame.info.roll_deg})
+        if pose.number % 2:
+            sigma = np.sqrt(frame.variance[..., 1]).astype(np.float32)
+            np.savez(folder / f"truth-{pose.number:03d}.npz", total=truth.total, sigma=sigma)
+            if pose.number % (2 * EVERY) == 1:
+                (folder / f"ghosts-{pose.number:03d}.pickle").write_bytes(
+                    pickle.dumps(true_ghosts(setup, pose, scale, sigma))
+                )
+            continue
+        info = cast(FrameInfo, frame.info.replace(file=f"frames/frame-{pose.number:03d}.exr"))
+        write_frame(folder / "ideal", replace(frame, info=info))
+        frames.append(info)
+        for j, exposure in enumerate(setup.exposures_s):
+            name = f"capture-{pose.number:03d}-{j}.npy"
+            np.save(folder / name, expose(setup, truth.total, exposure, pose.brightness[j], (pose.number, j)))
+            lines.append(f"{name},{pose.nominal_deg:.6g},{exposure!r},{setup.iso:g},,{setup.roll_deg:g}")
+    write_run(folder / "ideal", _run(setup, tuple(frames)))
+    (folder / "captures.csv").write_text("\n".join(lines) + "\n", "utf-8")
+    camera = {"black_level": setup.black, "white_level": setup.white, "iso": setup.iso}
+    (folder / "camera.json").write_text(json.dumps(camera) + "\n", "utf-8")
+    data = {"scale": scale, "axis_px": setup.axis_px, "setup": asdict(setup), "poses": rows}
+    (folder / "truth.json").write_text(json.dumps(data) + "\n", "utf-8")
+
+
+def _run(setup: Setup, frames: tuple[FrameInfo, ...]) -> MergedRun:
+    """Return the index of the perfect merge: axis and focal length are known."""
+    reach = []
+    for info in frames:
+        x, y = info.light_px[0] - info.axis_px[0], info.light_px[1] - info.axis_px[1]
+        if 2.0 < abs(info.constellation_deg) < 15.0:
+            reach.append(hypot(x, y) / np.tan(np.radians(abs(info.constellation_deg))))
+    return MergedRun(
+        size_px=setup.size_px, frames=frames, axis_px=setup.axis_px, px_per_rad=float(np.median(reach)),
+        camera=CameraNoise(
+            black_level=setup.black, white_level=setup.white, electrons_per_unit=setup.electrons_per_unit,
+            read_noise=setup.read_noise, iso=setup.iso,
+        ),
+        reference_iso=setup.iso,
+    )  # fmt: skip
+
+
+def read_poses(folder: Path) -> list[dict[str, Any]]:
+    """Return what is true of each constellation."""
+    return list(json.loads((folder / "truth.json").read_text("utf-8"))["poses"])
+
+
+def read_truth(folder: Path, number: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Return the noise-free picture of an odd constellation and green's noise."""
+    with np.load(folder / f"truth-{number:03d}.npz") as held:
+        return held["total"], held["sigma"]
+
+
+def read_ghosts(folder: Path, number: int) -> list[TrueGhost] | None:
+    """Return the true ghosts of an odd constellation; None where they are not judged."""
+    path = folder / f"ghosts-{number:03d}.pickle"
+    # written by this program into its own folder
+    return pickle.loads(path.read_bytes()) if path.is_file() else None

@@ -1,0 +1,139 @@
+"""What is true of each ghost of a synthetic capture: where it is, how bright, and what makes it hard."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass
+from math import pi
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flarewright.kernels.trace import ALIVE, REL, STOP_X, X, Y
+from flarewright.optics.bundle import find_region, trace_points
+from flarewright.optics.paths import LightPath, ghost_paths
+from flarewright.render.prepare import settle
+from flarewright.render.shot import Shot, make_opening, make_shots
+
+sys.path.append(str(Path(__file__).parents[2] / "tests" / "measure"))
+
+from synthetic_camera import Pose, Setup, ghost_layers, project_of
+
+Floats = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+# rays across half the accepted pupil and along it, which tell its shape and its folds
+_RAYS = (48, 96)
+# part of the pupil that must land turned over for a fold
+FOLD = 0.02
+# an accepted pupil that fills less than this of the ellipse with its moments is cut by more than one rim
+CUT = 0.985
+# another ghost's light over a ghost's own, and the part of the ghost where it is exceeded, that make a crossing
+CROSSING_LIGHT, CROSSING_PART = 1.0, 0.5
+# ghosts below this part of green's noise are not kept
+_FAINTEST = 1.0
+
+
+@dataclass(frozen=True)
+class TrueGhost:
+    """One path of one constellation.
+
+    Attributes
+    ----------
+    name : str
+    window : tuple of int
+        Left, top, width, height of `mask`, pixels.
+    mask : ndarray of bool, shape (height, width)
+        Its footprint: where green is more than half of the median of what is lit.
+    light : ndarray, shape (ceil(height / 2), ceil(width / 2)), float16
+        Green over `level`, at half the resolution.
+    level, snr : float
+        Median green radiance there, and over the median noise there.
+    fold, cut, at_edge, crossing : bool
+        Part of it lands turned over; more than one rim bounds it; the picture cuts it; others are as bright over much
+        of it.
+    """
+
+    name: str
+    window: tuple[int, int, int, int]
+    mask: Mask
+    light: NDArray[np.float16]
+    level: float
+    snr: float
+    fold: bool
+    cut: bool
+    at_edge: bool
+    crossing: bool
+
+    @property
+    def clean(self) -> bool:
+        return not (self.fold or self.cut or self.at_edge or self.crossing)
+
+
+def footprint(green: Floats) -> tuple[tuple[int, int, int, int], Mask, float] | None:
+    """Return window, mask and level of a ghost's picture; None when it is dark."""
+    lit = green[green > 1e-3 * float(green.max(initial=0.0))]
+    if lit.size < 4:
+        return None
+    mask = green > 0.5 * float(np.median(lit))
+    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+    top, left = int(rows[0]), int(columns[0])
+    height, width = int(rows[-1]) + 1 - top, int(columns[-1]) + 1 - left
+    return (left, top, width, height), mask[top : top + height, left : left + width], float(np.median(green[mask]))
+
+
+def true_ghosts(setup: Setup, pose: Pose, scale: float, sigma: NDArray[np.float32]) -> list[TrueGhost]:
+    """Return the truth of every ghost that noise does not hide, brightest first."""
+    images = {name: image[..., 1] for name, image in ghost_layers(setup, pose, scale)}
+    total = sum(images.values(), np.zeros(setup.size_px[::-1]))
+    forms = _forms(setup, pose)
+    found = []
+    for name, green in images.items():
+        seen = footprint(green)
+        if seen is None:
+            continue
+        (left, top, width, height), mask, level = seen
+        inside = np.s_[top : top + height, left : left + width]
+        snr = level / float(np.median(sigma[inside][mask]))
+        if not snr > _FAINTEST:
+            continue
+        others = (total[inside] - green[inside])[mask] > CROSSING_LIGHT * green[inside][mask]
+        fold, cut = forms.get(name, (False, False))
+        at_edge = left == 0 or top == 0 or left + width == setup.size_px[0] or top + height == setup.size_px[1]
+        crossing = bool(others.mean() > CROSSING_PART)
+        light = (green[inside][::2, ::2] / level).astype(np.float16)
+        found.append(TrueGhost(name, seen[0], mask, light, level, snr, fold, cut, at_edge, crossing))
+    return sorted(found, key=lambda one: -one.level)
+
+
+def _forms(setup: Setup, pose: Pose) -> dict[str, tuple[bool, bool]]:
+    """Tell of every path whether it folds, and whether several rims cut it."""
+    settled = settle(project_of(setup, pose, "passes"))
+    shot = make_shots(settled, make_opening(settled, None))[0]
+    return {path.name: form for path in ghost_paths(settled.lens) if (form := _form(shot, path)) is not None}
+
+
+def _form(shot: Shot, path: LightPath) -> tuple[bool, bool] | None:
+    tilt, radius = shot.incidence.tilt, shot.opening.radius
+    region = find_region(shot.packed, path, tilt, radius, shot.view_radius)
+    if region is None:
+        return None
+    x0, x1, y0, y1 = region.box
+    across, along = np.linspace(x0, x1, _RAYS[0]), np.linspace(y0, y1, _RAYS[1])
+    px, py = (each.ravel() for each in np.meshgrid(across, along))
+    rays = trace_points(shot.packed, len(shot.packed.wavelengths_nm) // 2, path, tilt, np.stack([px, py], axis=1))
+    stops = rays[:, STOP_X:].reshape(len(rays), -1, 2)
+    at_stop = np.hypot(stops[..., 0], stops[..., 1]).max(axis=1)
+    passes = (rays[:, ALIVE] > 0.5) & (rays[:, REL] <= 1.0) & (at_stop <= radius)
+    if passes.sum() < 30:
+        return None
+    # the other half is its mirror image, so across the mirror the moment is about 0
+    spread = np.sqrt(np.mean(px[passes] ** 2) * np.var(py[passes]))
+    area = 2.0 * passes.sum() * (across[1] - across[0]) * (along[1] - along[0])
+    grid = _RAYS[::-1]
+    x, y, open_ = rays[:, X].reshape(grid), rays[:, Y].reshape(grid), passes.reshape(grid)
+    whole = open_[1:, 1:] & open_[1:, :-1] & open_[:-1, 1:] & open_[:-1, :-1]
+    turned = np.diff(x, axis=1)[:-1] * np.diff(y, axis=0)[:, :-1] - np.diff(y, axis=1)[:-1] * np.diff(x, axis=0)[:, :-1]
+    over = float(np.mean(turned[whole] > 0.0)) if whole.any() else 0.0
+    return min(over, 1.0 - over) > FOLD, bool(area < CUT * 4.0 * pi * spread)

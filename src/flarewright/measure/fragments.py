@@ -1,0 +1,131 @@
+"""Fragments: a path's body and its core, found as two ghosts, become one where one explains the views as well."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+
+import numpy as np
+
+from ..kernels.measure_pupil import FIRST_G, FIRST_I
+from .fit import Patch, Shape, cost_of, free_numbers, patches_of, refine, render
+from .found import Found, by_light, rest_of
+from .numbers import Floats
+from .views import Pixels, View
+
+# part of the squares explained by the smaller of two ghosts that one ghost may lose
+_LOST = 0.15
+# centres may part by this much of the larger one's size, at the largest field; and the views that both must share
+_APART, _SHARED = 0.4, 0.5
+# how wide the pupil's middle is drawn where fits of one ghost begin: 1 is even, little is a bright core
+_CORES = (1.0, 0.4, -0.2)
+# views that a trial looks at
+_FEW = 10
+
+
+def joined(
+    ghosts: Sequence[Found],
+    views: Sequence[View],
+    *,
+    pool: ThreadPoolExecutor | None = None,
+    tell: Callable[[str], None] = lambda _: None,
+) -> list[Found]:
+    """Join pairs of ghosts that are one.
+
+    Parameters
+    ----------
+    ghosts : sequence of Found
+    views : sequence of View
+        Glow taken off; what shall not count has infinite variance.
+    pool : executor, optional
+    tell : callable
+        Gets a line for each pair that became one.
+
+    Returns
+    -------
+    list of Found
+        All colours of a joined one have green's shape.
+
+    Notes
+    -----
+    A lens of revolution maps the pupil by g(u), u the square of the distance from its middle (`measure_pupil`): a core
+    is where g is little in the middle of the pupil, and no fit that began with an even disc gets there by itself.
+    """
+    out = list(ghosts)
+    rest = rest_of(out, views, 1)
+    for ghost in [out[k] for k in reversed(by_light(out))]:
+        for other in _hosts(ghost, out):
+            one = _as_one(other, ghost, views, rest, pool)
+            if one is None:
+                continue
+            out = [each for each in out if each is not ghost and each is not other] + [one]
+            rest = rest_of(out, views, 1)
+            size = abs(other.shapes[1].numbers[FIRST_G])
+            tell(f"a ghost at speed {ghost.shapes[1].numbers[0]:.0f} px is a part of one of size {size:.0f} px")
+            break
+    return out
+
+
+def _hosts(ghost: Found, ghosts: Sequence[Found]) -> list[Found]:
+    """Return the larger ghosts that one may be a part of, the nearest first."""
+    own, size = ghost.shapes[1].numbers, abs(float(ghost.shapes[1].numbers[FIRST_G]))
+    hosts = []
+    for other in ghosts:
+        theirs = other.shapes[1].numbers
+        larger = abs(float(theirs[FIRST_G]))
+        shared = min(ghost.last, other.last) - max(ghost.first, other.first) + 1
+        apart = abs(float(own[0] - theirs[0])) / max(larger, 1e-9)
+        if other is not ghost and larger >= size and apart < _APART and shared > _SHARED * (ghost.last - ghost.first):
+            hosts.append((apart, other))
+    return [other for _, other in sorted(hosts, key=lambda pair: pair[0])[:2]]
+
+
+def _as_one(
+    host: Found, part: Found, views: Sequence[View], rest: Sequence[Pixels], pool: ThreadPoolExecutor | None
+) -> Found | None:
+    """Fit one ghost to the light of two; None when it explains the views worse."""
+    both = Found(host.shapes, min(host.first, part.first), max(host.last, part.last))
+    few = np.unique(np.linspace(both.first, both.last, _FEW).round().astype(int))
+    shape, core = host.shapes[1], part.shapes[1]
+    as_two, as_one = [], []
+    for k in few:
+        own = rest[k] + render(shape, views[k])
+        as_two.append(_green(views[k], own))
+        if not host.first <= k <= host.last:
+            own = own - render(shape, views[k])
+        as_one.append(_green(views[k], own + render(core, views[k]) if part.first <= k <= part.last else own))
+    patches = patches_of(shape, as_one, 1)
+    if not patches:
+        return None
+    width = views[0].size_px[0]
+
+    def fitted(start: Shape, look: Sequence[Patch], order: int, steps: int) -> Shape:
+        free = free_numbers(order, start.discs, 1)
+        return refine(start, look, free, width=width, steps=steps, tails=False, pool=pool).shape
+
+    # what one ghost misses shall not pass for an outlier
+    trials = [fitted(start, patches, 1, 5) for start in _starts(shape, core)]
+    best = fitted(min(trials, key=lambda trial: cost_of(trial, patches, tails=False)), patches, 2, 8)
+    apart = patches_of(shape, as_two, 1)
+    two = cost_of(fitted(shape, apart, 2, 8), apart, tails=False)
+    explained = cost_of(shape, patches, tails=False) - two
+    if best.numbers[FIRST_I] <= 0.0 or cost_of(best, patches, tails=False) - two > _LOST * explained:
+        return None
+    return replace(both, shapes=(best, best, best))
+
+
+def _green(view: View, pixels: Floats) -> View:
+    return view.showing(np.broadcast_to(pixels.astype(np.float32)[..., None], view.pixels.shape))
+
+
+def _starts(shape: Shape, core: Shape) -> list[Shape]:
+    """Return where fits of one ghost begin: as large as the larger one, with all light, more or less in its core."""
+    starts = []
+    for part in _CORES:
+        numbers = shape.numbers.copy()
+        size = float(numbers[FIRST_G])
+        numbers[FIRST_G], numbers[FIRST_G + 1] = part * size, numbers[FIRST_G + 1] + (1.0 - part) * size
+        numbers[FIRST_I] += max(float(core.numbers[FIRST_I]), 0.0)
+        starts.append(replace(shape, numbers=numbers))
+    return starts

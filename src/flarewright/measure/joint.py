@@ -1,0 +1,171 @@
+"""The light of all ghosts at once: with their shapes known, what every one adds is linear, so it is solved, not sought.
+
+Fitting one ghost after the other settles only slowly how overlapping ghosts share their light. Solved together, each
+gets what no other explains better, and a fragment that the others can stand in for is told by how little is lost
+without it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..kernels.measure_edges import sum_along_rows, sum_changes_along_rows
+from ..kernels.measure_mesh import draw_with_changes, window_of
+from ..kernels.measure_pupil import FIRST_I
+from .fit import MODEL_ERROR, Indices, Shape, priors, scaled
+from .found import CHANNELS, Found
+from .numbers import Floats
+from .views import View, halved
+
+# light is solved in pictures halved until they are no wider, of no more constellations than this
+_WIDTH, _VIEWS = 120, 25
+# part of the squares where a ghost is that it alone must explain
+NEEDED = 0.03
+# numbers of a ghost's light that are solved: 1, u, v, w
+_TERMS = np.arange(FIRST_I, FIRST_I + 4)
+
+
+@dataclass(frozen=True)
+class _Picture:
+    """One view: what each number of light would add, shape (P, 4 G), what is seen, and the weights.
+
+    An even background is nobody's: the means are taken off. `there`, shape (P, G), is where ghosts are.
+    """
+
+    basis: NDArray[np.float32]
+    there: NDArray[np.bool_]
+    pixels: Floats
+    weight: Floats
+
+
+def lit(
+    ghosts: Sequence[Found], views: Sequence[View], *, needed: float = NEEDED, pool: ThreadPoolExecutor | None = None
+) -> list[Found]:
+    """Solve the light of all ghosts and colours together, and leave out ghosts that the others can stand in for.
+
+    Parameters
+    ----------
+    ghosts : sequence of Found
+    views : sequence of View
+        Glow taken off; what shall not count has infinite variance.
+    needed : float
+        Part of the squares that a ghost must explain alone, judged by green.
+    pool : executor, optional
+
+    Returns
+    -------
+    list of Found
+    """
+    if not ghosts:
+        return []
+    kept = np.arange(len(ghosts))
+    values: dict[int, Floats] = {}
+    for m in (1, 0, 2):
+        pictures = _pictures(ghosts, views, m, pool)
+        prior = np.concatenate([priors(ghost.shapes[m], _TERMS, views[0].size_px[0]) for ghost in ghosts])
+        matrix: Floats = np.zeros((prior.size, prior.size))
+        side: Floats = np.zeros(prior.size)
+        np.fill_diagonal(matrix, prior)
+        for one in pictures:
+            matrix += (one.basis.T * one.weight) @ one.basis
+            side += one.basis.T @ (one.weight * one.pixels)
+        if m == 1:
+            kept = _needed(matrix, side, pictures, needed)
+        at = _columns(kept)
+        solved = np.linalg.solve(matrix[np.ix_(at, at)], side[at])
+        values[m] = np.asarray(solved, dtype=np.float64).reshape(-1, _TERMS.size)
+    return [_with_light(ghosts[int(k)], [values[m][n] for m in range(CHANNELS)]) for n, k in enumerate(kept)]
+
+
+def _columns(kept: Indices) -> Indices:
+    """Return where the numbers of some ghosts stand among those of all."""
+    return np.asarray((_TERMS.size * kept[:, None] + np.arange(_TERMS.size)).ravel())
+
+
+def _needed(matrix: Floats, side: Floats, pictures: Sequence[_Picture], least: float) -> Indices:
+    """Return the ghosts that stay when the least needed one is left out, again and again.
+
+    What the squares grow by without some of the numbers, all others solved anew, is x' (C)^-1 x with x their values
+    and C their part of the inverse matrix.
+    """
+    kept = np.arange(side.size // _TERMS.size)
+    while kept.size:
+        at = _columns(kept)
+        inverse = np.linalg.inv(matrix[np.ix_(at, at)])
+        values = inverse @ side[at]
+        left = [one.pixels - one.basis[:, at] @ values for one in pictures]
+        gains = np.empty(kept.size)
+        for n, k in enumerate(kept):
+            own = slice(_TERMS.size * n, _TERMS.size * (n + 1))
+            grown = float(values[own] @ np.linalg.solve(inverse[own, own], values[own]))
+            rest = sum(
+                float(one.there[:, k] @ (one.weight * misfit**2)) for one, misfit in zip(pictures, left, strict=True)
+            )
+            # u is 1/2 on average over the pupil; a ghost that darkens is none
+            gains[n] = grown / max(grown + rest, 1e-300) if values[own][0] + 0.5 * values[own][1] > 0.0 else -1.0
+        worst = int(np.argmin(gains))
+        if gains[worst] >= least:
+            break
+        kept = np.delete(kept, worst)
+    return kept
+
+
+def _pictures(
+    ghosts: Sequence[Found], views: Sequence[View], channel: int, pool: ThreadPoolExecutor | None
+) -> list[_Picture]:
+    """Draw what each number of each ghost's light would add to some views."""
+    times = max(0, int(np.ceil(np.log2(views[0].size_px[0] / _WIDTH))))
+    few = np.unique(np.linspace(0, len(views) - 1, min(len(views), _VIEWS)).round().astype(int))
+
+    def one(k: int) -> _Picture:
+        view = views[k]
+        pixels = halved(view.pixels[..., channel], times).astype(float)
+        variance = halved(view.variance[..., channel], times, variance=True).astype(float)
+        height, width = pixels.shape
+        basis = np.zeros((height, width, len(ghosts), _TERMS.size), np.float32)
+        model = np.zeros((height, width))
+        for n, ghost in enumerate(ghosts):
+            if ghost.first <= k <= ghost.last:
+                model += _add(ghost.shapes[channel], view.sigma, scaled(view.frame, times), basis[:, :, n])
+        level = np.maximum(np.abs(model), np.abs(pixels))
+        weight = np.where(np.isfinite(variance), 1.0 / (variance + (MODEL_ERROR * level) ** 2), 0.0).ravel()
+        columns = basis.reshape(height * width, -1)
+        total = max(float(weight.sum()), 1e-300)
+        seen = np.where(weight > 0.0, pixels.ravel(), 0.0)
+        there = columns[:, :: _TERMS.size] != 0.0
+        columns = columns - ((weight @ columns) / total).astype(np.float32)
+        return _Picture(columns, there, seen - float(weight @ seen) / total, weight)
+
+    return list((map if pool is None else pool.map)(one, [int(k) for k in few]))
+
+
+def _add(shape: Shape, sigma: float, frame: Floats, basis: NDArray[np.float32]) -> Floats:
+    """Fill what the numbers of one shape's light add, shape (H, W, 4); return the picture as it is."""
+    height, width = basis.shape[:2]
+    out = np.zeros((height, width))
+    left, top, w, h = window_of(shape.numbers, shape.discs, sigma, frame, width, height)
+    if not w:
+        return out
+    plane, changes = np.zeros((h, w + 1)), np.zeros((h, w + 1, _TERMS.size))
+    draw_with_changes(shape.numbers, shape.discs, sigma, _TERMS, frame, left, top, plane, changes)
+    sum_along_rows(plane)
+    sum_changes_along_rows(changes)
+    basis[top : top + h, left : left + w] = changes[:, :w]
+    out[top : top + h, left : left + w] = plane[:, :w]
+    return out
+
+
+def _with_light(ghost: Found, values: Sequence[Floats]) -> Found:
+    """Return a ghost with other numbers of light."""
+    shapes = []
+    for shape, light in zip(ghost.shapes, values, strict=True):
+        numbers = shape.numbers.copy()
+        numbers[_TERMS] = light
+        shapes.append(replace(shape, numbers=numbers))
+    red, green, blue = shapes
+    return replace(ghost, shapes=(red, green, blue))

@@ -1,0 +1,79 @@
+"""Light solved for all ghosts at once, and fragments that become one ghost."""
+
+import numpy as np
+import pytest
+from planted_run import GHOSTS, LARGEST, NOISE, shape, views
+
+from flarewright.measure.fit import Shape, render
+from flarewright.measure.found import Found
+from flarewright.measure.fragments import joined
+from flarewright.measure.joint import lit
+
+FEW = np.linspace(2.0, LARGEST, 9)
+
+
+def found(one: Shape, count: int = 9) -> Found:
+    return Found((one, one, one), 0, count - 1)
+
+
+def dimmer(one: Shape, factor: float) -> Shape:
+    numbers = one.numbers.copy()
+    numbers[20:30] *= factor
+    return Shape(numbers, one.discs)
+
+
+def misfit(ghosts, shown) -> float:
+    """Return the root mean square of what ghosts leave of views, over the noise."""
+    left = [
+        view.pixels[..., 1] - sum(render(ghost.shapes[1], view) for ghost in ghosts if ghost.first <= k <= ghost.last)
+        for k, view in enumerate(shown)
+    ]
+    return float(np.sqrt(np.mean(np.square(left))) / NOISE)
+
+
+def test_overlapping_ghosts_get_the_light_that_is_theirs():
+    # they overlap in all views: one lies within the other
+    planted = (shape(-40.0, 34.0, 0.5), shape(-46.0, 20.0, 0.4))
+    shown = views(planted, angles=FEW)
+    wrong = [found(dimmer(planted[0], 1.7)), found(dimmer(planted[1], 0.2))]
+    right = lit(wrong, shown)
+    assert misfit(wrong, shown) > 3.0
+    assert misfit(right, shown) < 1.2
+    for ghost, truth in zip(right, planted, strict=True):
+        for one in ghost.shapes:
+            assert one.numbers[20] + 0.5 * one.numbers[21] == pytest.approx(
+                truth.numbers[20] + 0.5 * truth.numbers[21], rel=0.03
+            )
+
+
+def test_a_ghost_that_others_stand_in_for_is_left_out():
+    shown = views((GHOSTS[0],), angles=FEW)
+    twice = [found(dimmer(GHOSTS[0], 0.5)), found(dimmer(GHOSTS[0], 0.5)), found(GHOSTS[1])]
+    kept = lit(twice, shown)
+    assert len(kept) == 1
+    assert kept[0].shapes[1].numbers[0] == GHOSTS[0].numbers[0]
+    assert lit([], shown) == []
+
+
+def test_ghosts_are_lit_only_where_they_are():
+    shown = views((GHOSTS[0],), angles=FEW[:5]) + views((), angles=FEW[5:])
+    assert misfit(lit([found(dimmer(GHOSTS[0], 0.5), 5)], shown), shown) < 1.2
+
+
+def test_a_core_and_its_body_become_one_ghost():
+    # light that lands in the middle from half of the pupil: g is small there
+    whole = shape(-50.0, 30.0, 0.4)
+    whole.numbers[10], whole.numbers[11] = 9.0, 21.0
+    shown = views((whole,), angles=FEW)
+    body, core = shape(-50.0, 29.0, 0.4), shape(-49.0, 8.0, 0.4)
+    pieces = lit([found(body), found(core)], shown, needed=0.0)
+    assert len(pieces) == 2
+    one = joined(pieces, shown)
+    assert len(one) == 1
+    assert misfit(lit(one, shown), shown) < 0.5 * misfit(pieces, shown)
+
+
+def test_two_ghosts_stay_two():
+    planted = (shape(-40.0, 34.0, 0.25), shape(-55.0, 14.0, 0.6))
+    shown = views(planted, angles=FEW)
+    assert len(joined([found(one) for one in planted], shown)) == 2
