@@ -14,6 +14,7 @@ from flarewright.optics.spectrum import band_weights
 from flarewright.render import looking
 from flarewright.render.few_colors import gathered_weights
 from flarewright.render.many_stars import Stars, draw_stars
+from flarewright.render.path_color import seen_of
 from flarewright.render.prepare import settle
 from flarewright.render.render import render
 from flarewright.render.shot import make_opening, make_shots
@@ -157,7 +158,7 @@ def test_gathered_weights_keep_the_flux_of_every_wavelength():
     )
     weights = shot.weights(shot.packed.wavelengths_nm)
     shown = tuple(sorted(bundle.traced))
-    gathered = gathered_weights(shot.packed, bundle, tilt, weights, shown)
+    gathered = gathered_weights(shot.packed, bundle, tilt, weights, shown, seen_of(shot, shot.to_pixels))
     count = len(weights)
     flux = np.array([
         _flux(bundle, trace_bundle(shot.packed, w, bundle, tilt), path, shot) for w in range(count)

@@ -59,8 +59,13 @@ ROOTS = {
     "matrices": (
         "matrix.draw_matrix_ghosts",
         "i8[::1], i8[::1], i8[::1], i8[::1], f8[::1], none, f8[::1], f8[:,::1], f8[:,:,::1], f8, f8, f8, f8, f8, "
-        "f8[:,::1], f8, none, f8, f8[:,::1], f8[::1], f8, f8[:,::1], f8[:,:,::1]",
+        "f8[:,::1], f8, none, f8, f8[:,::1], f8[::1], f8, f8[:,:,::1], f8[:,:,::1]",
         1.9,
+    ),
+    "mirrors": (
+        "matrix.mirror_squares",
+        "i8[::1], i8[::1], i8[::1], i8[::1], f8[::1], none, f8[::1], f8[::1], f8, f8, f8, f8, f8, f8, f8[:,::1]",
+        0.4,
     ),
     "blade wings": (
         "resample.blend_blade_wings",

@@ -12,6 +12,8 @@ from .trace import REFLECT, STOP
 
 # straight edges that stand for the round rim of the entrance
 RIM = 64
+# crossings of the stop by a path of two reflections
+MOST_CROSSINGS = 3
 # side of the square that stands for a point, pixels
 SPOT = 0.05
 
@@ -65,8 +67,8 @@ def path_matrices(rows, actions, curvature, z_vertex, n_gap, sensor_z, to_stop):
 
 
 @inner
-def paraxial_weight(rows, actions, curvature, curvature_x, z_vertex, n_gap, reflectance, y, u, x, ux):
-    """Multiply R and T along one paraxial ray, at its angles of incidence.
+def paraxial_sines(rows, actions, curvature, curvature_x, z_vertex, n_gap, y, u, x, ux, squares):
+    """Follow one paraxial ray along a path and keep its angles of incidence.
 
     Parameters
     ----------
@@ -74,21 +76,18 @@ def paraxial_weight(rows, actions, curvature, curvature_x, z_vertex, n_gap, refl
         As in `path_matrices`.
     curvature_x : ndarray, shape (K,), or None
         Curvatures across, where they are others; None: the ray stays in its plane, x and ux are not looked at.
-    reflectance : ndarray, shape (K, M)
-        As in `kernels.trace.trace_nodes`.
     y, u : float
         Height on the plane of the first vertex and slope.
     x, ux : float
         The same across.
-
-    Returns
-    -------
-    float
+    squares : ndarray, shape (S,) or longer
+        Filled with the squared sine on the side of the lower index at every step, 1 under total reflection; 0 at the
+        stop.
     """
-    weight, heading, here = 1.0, 1.0, 0.0
-    samples = reflectance.shape[1]
+    heading, here = 1.0, 0.0
     for step in range(rows.size):
         row = rows[step]
+        squares[step] = 0.0
         y += heading * (z_vertex[row] - here) * u
         if curvature_x is not None:
             x += heading * (z_vertex[row] - here) * ux
@@ -102,21 +101,104 @@ def paraxial_weight(rows, actions, curvature, curvature_x, z_vertex, n_gap, refl
             across = ux + curvature_x[row] * heading * x
             slope = sqrt(slope * slope + across * across)
         sine = slope / sqrt(1.0 + slope * slope) * (1.0 if n1 <= n2 else n1 / n2)
-        place = sqrt(max(1.0 - sine * sine, 0.0)) * (samples - 1)
-        cell = min(int(place), samples - 2)
-        r = reflectance[row, cell] + (place - cell) * (reflectance[row, cell + 1] - reflectance[row, cell])
+        squares[step] = min(sine * sine, 1.0)
         if actions[step] == REFLECT:
-            weight *= r
             u += 2.0 * power * y
             if curvature_x is not None:
                 ux += 2.0 * curvature_x[row] * heading * x
             heading = -heading
         else:
-            weight *= 1.0 - r
             u = (n1 - n2) / n2 * power * y + n1 / n2 * u
             if curvature_x is not None:
                 ux = (n1 - n2) / n2 * curvature_x[row] * heading * x + n1 / n2 * ux
+
+
+@inner
+def paraxial_weight(rows, actions, reflectance, squares):
+    """Multiply R and T along one paraxial ray, at its angles of incidence.
+
+    Parameters
+    ----------
+    rows, actions : ndarray, shape (S,), int64
+    reflectance : ndarray, shape (K, M)
+        As in `kernels.trace.trace_nodes`.
+    squares : ndarray, shape (S,) or longer
+        From `paraxial_sines`.
+
+    Returns
+    -------
+    float
+    """
+    weight = 1.0
+    samples = reflectance.shape[1]
+    for step in range(rows.size):
+        if actions[step] == STOP:
+            continue
+        row = rows[step]
+        place = sqrt(1.0 - squares[step]) * (samples - 1)
+        cell = min(int(place), samples - 2)
+        r = reflectance[row, cell] + (place - cell) * (reflectance[row, cell + 1] - reflectance[row, cell])
+        weight *= r if actions[step] == REFLECT else 1.0 - r
     return weight
+
+
+@inner
+def _meridians(rows, actions, curvature, curvature_x, z_vertex, n_gap, sensor_z, nearness, crossings, to_stop, across):
+    """Fill the matrices to the stop in both planes through the axis; return a and b of the whole path in each."""
+    a, b, _, _ = path_matrices(rows, actions, curvature, z_vertex, n_gap, sensor_z, to_stop)
+    # the rays of a near light spread: their slope grows with their height
+    a += nearness * b
+    ax, bx = a, b
+    if curvature_x is not None:
+        ax, bx, _, _ = path_matrices(rows, actions, curvature_x, z_vertex, n_gap, sensor_z, across)
+        ax += nearness * bx
+    for c in range(crossings):
+        to_stop[c, 0, 0] += nearness * to_stop[c, 0, 1]
+        if curvature_x is not None:
+            across[c, 0, 0] += nearness * across[c, 0, 1]
+    return a, b, ax, bx
+
+
+@compiled
+def mirror_squares(
+    rows, actions, starts, crossings, curvature, curvature_x, z_vertex, n_gap, sensor_z,
+    entrance, slope, slope_x, nearness, iris_radius, squares,
+):  # fmt: skip
+    """Tell at which angles the rays that `draw_matrix_ghosts` takes colours from meet their mirrors.
+
+    Parameters
+    ----------
+    rows, actions, starts, crossings, curvature, curvature_x, z_vertex
+        As in `draw_matrix_ghosts`.
+    n_gap : ndarray, shape (K + 1,)
+    sensor_z, entrance, slope, slope_x, nearness, iris_radius : float
+        As there.
+    squares : ndarray, shape (P, M)
+        Filled with the squared sine on the side of the lower index at each mirror of each path.
+    """
+    longest = 0
+    for p in range(starts.size - 1):
+        longest = max(longest, starts[p + 1] - starts[p])
+    each = np.empty(longest)
+    to_stop = np.empty((MOST_CROSSINGS, 2, 2))
+    across = to_stop if curvature_x is None else np.empty((MOST_CROSSINGS, 2, 2))
+    for p in range(starts.size - 1):
+        path_rows, path_actions = rows[starts[p] : starts[p + 1]], actions[starts[p] : starts[p + 1]]
+        _meridians(
+            path_rows, path_actions, curvature, curvature_x, z_vertex, n_gap, sensor_z, nearness, crossings[p],
+            to_stop, across,
+        )  # fmt: skip
+        centre = _centre(to_stop, slope, iris_radius, entrance)
+        beside = 0.0 if curvature_x is None else _centre(across, slope_x, iris_radius, entrance)
+        paraxial_sines(
+            path_rows, path_actions, curvature, curvature_x, z_vertex, n_gap,
+            centre, slope + nearness * centre, beside, slope_x + nearness * beside, each,
+        )  # fmt: skip
+        mirror = 0
+        for step in range(path_rows.size):
+            if path_actions[step] == REFLECT:
+                squares[p, mirror] = each[step]
+                mirror += 1
 
 
 @compiled
@@ -152,7 +234,7 @@ def draw_matrix_ghosts(
     iris_radius : float
     mask, mask_half, axes, to_pixels, gain
         As in `draw_bundle`.
-    rgb : ndarray, shape (W, 3)
+    rgb : ndarray, shape (P, W, 3)
     plane : ndarray, shape (H, W, 3), float64
         Differences of flux along the rows, added to (`kernels.raster.sum_rows`).
 
@@ -164,33 +246,31 @@ def draw_matrix_ghosts(
     height, width = plane.shape[0], plane.shape[1]
     polygon, other = np.zeros((MAX_VERTICES, PSTOP + 6)), np.zeros((MAX_VERTICES, PSTOP + 6))
     values = np.empty(MAX_VERTICES)
-    to_stop = np.empty((3, 2, 2))
-    across = to_stop if curvature_x is None else np.empty((3, 2, 2))
+    longest = 0
+    for p in range(starts.size - 1):
+        longest = max(longest, starts[p + 1] - starts[p])
+    squares = np.empty(longest)
+    to_stop = np.empty((MOST_CROSSINGS, 2, 2))
+    across = to_stop if curvature_x is None else np.empty((MOST_CROSSINGS, 2, 2))
     rim = _rim(entrance)
     for p in range(starts.size - 1):
         path_rows, path_actions = rows[starts[p] : starts[p + 1]], actions[starts[p] : starts[p + 1]]
         for w in range(n_gap.shape[0]):
-            a, b, _, _ = path_matrices(path_rows, path_actions, curvature, z_vertex, n_gap[w], sensor_z, to_stop)
-            # the rays of a near light spread: their slope grows with their height
-            a += nearness * b
-            ax, bx = a, b
-            if curvature_x is not None:
-                ax, bx, _, _ = path_matrices(path_rows, path_actions, curvature_x, z_vertex, n_gap[w], sensor_z, across)
-                ax += nearness * bx
-            for c in range(crossings[p]):
-                to_stop[c, 0, 0] += nearness * to_stop[c, 0, 1]
-                if curvature_x is not None:
-                    across[c, 0, 0] += nearness * across[c, 0, 1]
+            a, b, ax, bx = _meridians(
+                path_rows, path_actions, curvature, curvature_x, z_vertex, n_gap[w], sensor_z, nearness, crossings[p],
+                to_stop, across,
+            )  # fmt: skip
             count = _project_entrance(polygon, rim, slope, slope_x, a, b, ax, bx, to_stop, across, crossings[p], axes)
             count = cut_by_blades(polygon, count, crossings[p], edges, other, values)
             if count == 0:
                 continue
             centre = _centre(to_stop, slope, iris_radius, entrance)
             beside = 0.0 if curvature_x is None else _centre(across, slope_x, iris_radius, entrance)
-            weight = paraxial_weight(
-                path_rows, path_actions, curvature, curvature_x, z_vertex, n_gap[w], reflectance[w],
-                centre, slope + nearness * centre, beside, slope_x + nearness * beside,
+            paraxial_sines(
+                path_rows, path_actions, curvature, curvature_x, z_vertex, n_gap[w],
+                centre, slope + nearness * centre, beside, slope_x + nearness * beside, squares,
             )  # fmt: skip
+            weight = paraxial_weight(path_rows, path_actions, reflectance[w], squares)
             flux = gain * weight * abs(polygon_area(polygon, count, PP, PQ))
             for k in range(count):
                 x, y = polygon[k, PX], polygon[k, PY]
@@ -204,12 +284,12 @@ def draw_matrix_ghosts(
             even = flux / area
             if mask is not None:
                 fill_through_mask(
-                    polygon, count, crossings[p], mask, mask_half, even, 0.0, 0.0, even, even, rgb[w], plane,
+                    polygon, count, crossings[p], mask, mask_half, even, 0.0, 0.0, even, even, rgb[p, w], plane,
                 )  # fmt: skip
                 continue
             count = cut_to_rectangle(polygon, count, other, values, float(width), float(height))
             if count >= 3:
-                fill_polygon(polygon, count, even, 0.0, 0.0, even, even, rgb[w], plane)
+                fill_polygon(polygon, count, even, 0.0, 0.0, even, even, rgb[p, w], plane)
 
 
 @inner

@@ -25,6 +25,7 @@ __all__ = [
     "FIRST_NM",
     "LAST_NM",
     "band_contents",
+    "band_parts",
     "band_weights",
     "cie_1931",
     "planck",
@@ -197,14 +198,43 @@ def band_weights(spectrum: Spectrum, wavelengths_nm: ArrayLike, colorspace: Colo
     beyond the first and the last, so sum_k C_k f(l_k) integrates exactly the f that is linear between nodes: a
     ghost's brightness is smooth in wavelength. Lines are split between their two neighbours, not smeared.
     """
-    nodes = np.atleast_1d(np.asarray(wavelengths_nm, dtype=np.float64))
+    wave, xyz = _stimulus(spectrum)
+    weights: Floats = _hats(wave, wavelengths_nm) @ xyz @ xyz_to_rgb_matrix(colorspace).T
+    return weights
+
+
+def band_parts(spectrum: Spectrum, wavelengths_nm: ArrayLike, colorspace: Colorspace, curve_nm: ArrayLike) -> Floats:
+    """Divide `band_weights` among the points of a curve that the spectrum is to be multiplied by.
+
+    Parameters
+    ----------
+    spectrum, wavelengths_nm, colorspace
+        As in `band_weights`.
+    curve_nm : array_like, shape (L,)
+        Where the curve is given, rising; it is linear between, and constant beyond.
+
+    Returns
+    -------
+    ndarray, shape (L, N, 3)
+        Summed over L with the curve's values, the weights of the spectrum times the curve; with ones, `band_weights`.
+
+    Raises
+    ------
+    FlarewrightError, ValueError
+        As `band_weights`.
+    """
+    wave, xyz = _stimulus(spectrum)
+    rgb = xyz @ xyz_to_rgb_matrix(colorspace).T
+    parts: Floats = np.einsum("lw,nw,wc->lnc", _hats(wave, curve_nm), _hats(wave, wavelengths_nm), rgb, optimize=True)
+    return parts
+
+
+def _hats(wave: Floats, nodes_nm: ArrayLike) -> Floats:
+    """Piecewise-linear hats on rising nodes, constant beyond the first and the last, shape (N, len(wave))."""
+    nodes = np.atleast_1d(np.asarray(nodes_nm, dtype=np.float64))
     if nodes.ndim != 1 or nodes.size == 0 or bool(np.any(np.diff(nodes) <= 0.0)):
         raise ValueError("traced wavelengths must rise")
-    wave, xyz = _stimulus(spectrum)
-    identity = np.eye(nodes.size)
-    hats = np.stack([np.interp(wave, nodes, row) for row in identity])
-    weights: Floats = hats @ xyz @ xyz_to_rgb_matrix(colorspace).T
-    return weights
+    return np.stack([np.interp(wave, nodes, row) for row in np.eye(nodes.size)])
 
 
 def band_contents(spectrum: Spectrum, wavelengths_nm: ArrayLike) -> tuple[tuple[Floats, Floats], ...]:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernels.trace import ALIVE, REL, WEIGHT
+from ..kernels.trace import WEIGHT
 from ..optics.bundle import Bundle, trace_points
 from ..optics.pack import PackedLens
+from .path_color import Bools, spread_rays
 
 Floats = NDArray[np.float64]
 
@@ -15,12 +18,19 @@ Floats = NDArray[np.float64]
 SAMPLE = 48
 # a wavelength that carries less than this part of the brightest cannot stand for its neighbours
 LEAST_PART = 0.1
+# nor can it where more of its rays than this part are not seen at the other
+MOST_UNLIKE = 0.1
 
 __all__ = ["gathered_weights"]
 
 
 def gathered_weights(
-    packed: PackedLens, bundle: Bundle, tilt: float, weights: Floats, shown: tuple[int, ...]
+    packed: PackedLens,
+    bundle: Bundle,
+    tilt: float,
+    weights: Floats,
+    shown: tuple[int, ...],
+    seen: Callable[[Floats], Bools],
 ) -> Floats | None:
     """Give the light of all traced wavelengths to a few of them.
 
@@ -35,12 +45,14 @@ def gathered_weights(
         What each wavelength adds to each channel.
     shown : tuple of int
         The wavelengths that are drawn, rising.
+    seen : callable
+        Tells which traced rays (`optics.bundle.trace_points`) pass and land in the picture.
 
     Returns
     -------
     ndarray, shape (len(shown), 3), or None
-        What each drawn wavelength adds in place of its neighbours too. None where they cannot: too few rays pass, or
-        the path is dark at one of them.
+        What each drawn wavelength adds in place of its neighbours too. None where they cannot: no ray is seen, the
+        path is dark at one of them, or it is cut elsewhere, or lands elsewhere, at the ends of the spectrum.
 
     Notes
     -----
@@ -48,23 +60,36 @@ def gathered_weights(
     the spectrum, times what it passes in comparison with them: coatings reflect by wavelength, and a ghost keeps its
     flux in each. The comparison is the mean over the same rays, spread over the bundle.
     """
-    passing = np.ones(len(bundle.pupil), dtype=np.bool_)
-    for w in shown:
-        data = bundle.traced[w]
-        passing &= (data[:, ALIVE] > 0.0) & (data[:, REL] <= 1.0)
-    where = np.flatnonzero(passing)
-    if where.size < SAMPLE // 4:
+    where = spread_rays(bundle, shown, seen, SAMPLE)
+    if where.size == 0 or not _seen_alike(packed, bundle, tilt, shown, seen):
         return None
-    where = where[:: -(-where.size // SAMPLE)]
     count = len(weights)
     flux = np.empty(count)
     for w in range(count):
         held = bundle.traced.get(w)
         rays = trace_points(packed, w, bundle.path, tilt, bundle.pupil[where]) if held is None else held[where]
-        flux[w] = float((rays[:, WEIGHT] * rays[:, ALIVE]).sum())
+        flux[w] = float(rays[seen(rays), WEIGHT].sum())
     drawn = flux[list(shown)]
     if not drawn.min() > LEAST_PART * flux.max():
         return None
     hats = np.stack([np.interp(np.arange(count), shown, row) for row in np.eye(len(shown))])
     gathered: Floats = (hats * flux / drawn[:, None]) @ weights
     return gathered
+
+
+def _seen_alike(
+    packed: PackedLens, bundle: Bundle, tilt: float, shown: tuple[int, ...], seen: Callable[[Floats], Bools]
+) -> bool:
+    """Tell whether the same rays are seen at the ends of the spectrum as at the drawn wavelengths next to them."""
+    where = spread_rays(bundle, (), seen, 2 * SAMPLE)
+    last = len(packed.wavelengths_nm) - 1
+    for end, near in ((0, shown[0]), (last, shown[-1])):
+        if end == near:
+            continue
+        there, here = (
+            seen(trace_points(packed, end, bundle.path, tilt, bundle.pupil[where])),
+            seen(bundle.traced[near][where]),
+        )
+        if (there != here).sum() > MOST_UNLIKE * max(here.sum(), 1):
+            return False
+    return True

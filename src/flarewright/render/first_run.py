@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from ..kernels.first_run import absent, compile_together, cores
-from ..model import Project
+from ..model import Bare, Project
+from ..optics.pack import resolve_coatings
 from .prepare import settle
 
 # what every command calls that traces rays
@@ -29,15 +30,19 @@ def compile_for_render(project: Project, threads: int | None = None) -> None:
     scattering = _SCATTERING if project.scatter is not None and project.scatter.model != "none" else ()
     if not absent((*_TRACING, *scattering)):
         return
-    iris = settle(project).iris
+    settled = settle(project)
+    iris = settled.iris
+    coated = any(coating not in (None, Bare()) for coating in resolve_coatings(settled.lens, settled.coating))
     names = [*_TRACING, *scattering]
     if project.quality.mode == "final":
         names += ["draw" if iris.mask is None else "draw masked", "densities", "pixels", "double"]
+        if coated and not scattering:
+            names += ["hits"]
         if project.quality.ringing != "off":
             names += ["draw ringing", "open cells"]
     elif project.quality.mode == "draft" and iris.mask is None:
         # a draft through a mask is rare: its kernel is compiled when it is called
-        names += ["matrices"]
+        names += ["matrices", "mirrors"] if coated else ["matrices"]
     if project.output.starburst:
         names += ["fan wings" if iris.blades == 0 or iris.mask is not None else "blade wings"]
     compile_together(names, min(threads or cores(), cores()))

@@ -13,13 +13,14 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernels.matrix import draw_matrix_ghosts, path_matrices
+from ..kernels.matrix import draw_matrix_ghosts, mirror_squares, path_matrices
 from ..kernels.raster import sum_rows
 from ..optics.color import luminance_weights
 from ..optics.paths import LightPath
 from .art import Frame, PathArt
 from .canvas import DETAIL_CONTRAST, DETAILS, Plane, merge
 from .grade import coarseness, finish
+from .path_color import draft_weights
 from .shot import Shot
 from .spread import shape_kernel, spread_within
 
@@ -54,13 +55,24 @@ def draw_draft(
         # its two meridians are the lens' own, whatever the light's
         slope_x, slope = float(axes[1, 0]) * slope, float(axes[1, 1]) * slope
         axes = np.eye(2)
-    draw_matrix_ghosts(
+    steps = (
         np.concatenate([path.rows for path in paths]), np.concatenate([path.actions for path in paths]), starts,
-        np.array([path.stop_crossings for path in paths]), packed.curvature, packed.curvature_x,
-        packed.z_vertex, packed.n_gap,
-        packed.reflectance, packed.sensor_z, float(packed.semi[first]), slope, slope_x,
-        nearness, opening.edges, opening.radius, opening.mask, opening.half, axes, shot.to_pixels, shot.gain,
-        shot.weights(packed.wavelengths_nm) * rgb, differences,
+        np.array([path.stop_crossings for path in paths]), packed.curvature, packed.curvature_x, packed.z_vertex,
+    )  # fmt: skip
+    entrance = float(packed.semi[first])
+    if shot.curves is None:
+        weights = np.repeat(shot.weights(packed.wavelengths_nm)[None], len(paths), axis=0)
+    else:
+        squares = np.empty((len(paths), 2))
+        mirror_squares(
+            *steps, packed.n_gap[len(packed.n_gap) // 2], packed.sensor_z, entrance, slope, slope_x, nearness,
+            opening.radius, squares,
+        )  # fmt: skip
+        weights = draft_weights(shot, paths, squares)
+    draw_matrix_ghosts(
+        *steps, packed.n_gap, packed.reflectance, packed.sensor_z, entrance, slope, slope_x, nearness,
+        opening.edges, opening.radius, opening.mask, opening.half, axes, shot.to_pixels, shot.gain, weights * rgb,
+        differences,
     )  # fmt: skip
 
 

@@ -28,6 +28,7 @@ from .art import PLAIN, Frame, PathArt
 from .canvas import DETAIL_CONTRAST, DETAILS, Canvas, Plane, blank, merge
 from .few_colors import gathered_weights
 from .grade import coarseness, finish
+from .path_color import seen_of, traced_bend
 from .shot import Shot
 from .sources import NARROW_PX, halvings, motion, spread_border
 from .spread import shape_kernel, spread_within
@@ -230,7 +231,8 @@ def draw_final(
         tolerance=quality.tolerance_px, scale=scale, view_radius=item.view_radius, one_color=few and one_color,
     )  # fmt: skip
     count = len(shot.packed.wavelengths_nm)
-    if few and _drawn_in_few(item, bundle, canvas.plane(detail), to_pixels):
+    bend = traced_bend(shot, path, bundle, item.to_pixels)
+    if few and _drawn_in_few(item, bundle, bend, canvas.plane(detail), to_pixels):
         return
     traced = [trace_bundle(shot.packed, w, bundle, tilt) for w in range(count)]
     rings = None
@@ -244,7 +246,7 @@ def draw_final(
     steps = [(w, k / n) for w, n in enumerate(pieces) for k in range(n)] + [(count - 1, 0.0)]
     fine_nm = np.interp([w + part for w, part in steps], np.arange(count), shot.packed.wavelengths_nm)
     patterns = None if rings is None else rings.textures(fine_nm, canvas.plane(detail))
-    for k, ((w, part), rgb) in enumerate(zip(steps, shot.weights(fine_nm) * item.art.rgb, strict=True)):
+    for k, ((w, part), rgb) in enumerate(zip(steps, shot.weights(fine_nm, bend) * item.art.rgb, strict=True)):
         if stop is not None and stop.is_set():
             return
         if not rgb.any():
@@ -275,12 +277,12 @@ def _places(item: FinalPass, to_pixels: Floats, w: int, part: float) -> list[tup
     return places
 
 
-def _drawn_in_few(item: FinalPass, bundle: Bundle, plane: Plane, to_pixels: Floats) -> bool:
+def _drawn_in_few(item: FinalPass, bundle: Bundle, bend: Floats | None, plane: Plane, to_pixels: Floats) -> bool:
     """Draw a ghost whose steps of colour nobody sees at its grid's wavelengths alone, if these can stand for all."""
     shot, path, opening = item.shot, item.path, item.shot.opening
     shown = tuple(sorted(bundle.traced))
-    colors = shot.weights(shot.packed.wavelengths_nm) * item.art.rgb
-    weights = gathered_weights(shot.packed, bundle, shot.incidence.tilt, colors, shown)
+    colors = shot.weights(shot.packed.wavelengths_nm, bend) * item.art.rgb
+    weights = gathered_weights(shot.packed, bundle, shot.incidence.tilt, colors, shown, seen_of(shot, item.to_pixels))
     if weights is None:
         return False
     for w, rgb in zip(shown, weights, strict=True):

@@ -16,12 +16,13 @@ from ..model.grating import SensorGrating
 from ..model.light import Spectrum
 from ..optics.border import closed
 from ..optics.bundle import Incidence, incidence, least_distance
+from ..optics.coating_curves import CURVE_NM, CoatingCurves, coating_curves
 from ..optics.diffraction import Soil
 from ..optics.dirt import lay_elements, rasterise
 from ..optics.iris import blade_edges, outline, transmission
 from ..optics.pack import PackedLens, facing, pack_lens, resolve_coatings
 from ..optics.source import parts
-from ..optics.spectrum import band_weights, traced_wavelengths
+from ..optics.spectrum import band_parts, band_weights, traced_wavelengths
 from .prepare import Settled
 
 if TYPE_CHECKING:
@@ -93,6 +94,8 @@ class Shot:
         point.
     grating : SensorGrating or None
         What the sensor's pixels make of the light that it reflects.
+    curves : CoatingCurves or None
+        What coatings do between the traced wavelengths; None where straight lines tell that.
     """
 
     light: Light
@@ -107,6 +110,7 @@ class Shot:
     share: float = 1.0
     border: Floats | None = None
     grating: SensorGrating | None = None
+    curves: CoatingCurves | None = None
 
     @property
     def gain(self) -> float:
@@ -119,9 +123,16 @@ class Shot:
         half_width = 0.5 * self.size_px[0] / self.to_pixels[2]
         return float(np.hypot(half_width, 0.5 * self.size_px[1] / self.to_pixels[3]))
 
-    def weights(self, wavelengths_nm: Floats) -> Floats:
-        """Return the RGB weights of wavelengths for this light, shape (N, 3)."""
-        return _weights(self.light.spectrum, tuple(wavelengths_nm), self.colorspace)
+    def weights(self, wavelengths_nm: Floats, bend: Floats | None = None) -> Floats:
+        """Return the RGB weights of wavelengths for this light, shape (N, 3), or (P, N, 3) for P paths.
+
+        `bend`, shape (L,) or (P, L), multiplies the spectrum (`render.path_color`).
+        """
+        look = self.light.spectrum, tuple(wavelengths_nm), self.colorspace
+        if bend is None:
+            return _weights(*look)
+        weights: Floats = np.tensordot(bend, _parts(*look), axes=1)
+        return weights
 
 
 def moved(shot: Shot, slope: Floats) -> Shot:
@@ -148,6 +159,11 @@ def moved(shot: Shot, slope: Floats) -> Shot:
 @lru_cache(maxsize=512)
 def _weights(spectrum: Spectrum, wavelengths_nm: tuple[float, ...], colorspace: Colorspace) -> Floats:
     return band_weights(spectrum, np.array(wavelengths_nm), colorspace)
+
+
+@lru_cache(maxsize=256)
+def _parts(spectrum: Spectrum, wavelengths_nm: tuple[float, ...], colorspace: Colorspace) -> Floats:
+    return band_parts(spectrum, np.array(wavelengths_nm), colorspace, CURVE_NM)
 
 
 def make_opening(settled: Settled, mask: Floats | None) -> Opening:
@@ -244,6 +260,8 @@ def make_shots(settled: Settled, opening: Opening) -> tuple[Shot, ...]:
     sensor = project.camera.sensor
     to_pixels = np.array([width / 2.0, height / 2.0, width / sensor[0], height / sensor[1]])
     coatings = resolve_coatings(settled.lens, settled.coating)
+    bridged = project.quality.bridge and project.quality.mode != "reference"
+    curves = coating_curves(settled.lens, coatings, settled.sensor) if bridged else None
     packs: dict[tuple[float, ...], PackedLens] = {}
     shots: list[Shot] = []
     for number, light in enumerate(project.lights):
@@ -270,6 +288,7 @@ def make_shots(settled: Settled, opening: Opening) -> tuple[Shot, ...]:
                     share=part.share,
                     border=closed(part.corners) if light.extended else None,
                     grating=project.camera.sensor_grating,
+                    curves=curves if len(wavelengths_nm) > 1 else None,
                 )
             )
         shots += whole if project.holdout is None and light.holdout is None else _unhidden(settled, light, whole)

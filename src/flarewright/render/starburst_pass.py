@@ -18,6 +18,7 @@ from ..optics.diffraction import BladeWings, Pattern, Soil, pupil_pattern
 from ..optics.paths import direct_path
 from .direct import PUPIL_SPAN, DirectImage, defocus_mm, traced_pupil, traced_spot
 from .many_stars import Stars, draw_stars, fits
+from .path_color import direct_flux
 from .prepare import Settled
 from .shot import Shot
 from .sources import motion
@@ -171,7 +172,7 @@ def _many_lights(scene: _Scene, group: list[tuple[Shot, DirectImage]], threads: 
     pixels = shot.to_pixels
     places = np.array([image.position_mm for _, image in group]) * [pixels[2], -pixels[3]] + pixels[:2]
     throughputs = [lit.light.intensity * image.throughput_mm2 for lit, image in group]
-    flux = np.array([np.interp(fine_nm, shot.packed.wavelengths_nm, throughput) for throughput in throughputs])
+    flux = np.array([direct_flux(shot, scene.settled.lens, throughput, fine_nm) for throughput in throughputs])
     mean = flux.mean(axis=0)
     colors = shot.weights(fine_nm) * (scene.look.intensity * pattern.transmittance)
     whole, each = mean @ colors, flux @ colors
@@ -195,8 +196,8 @@ def _one_light(scene: _Scene, parts: list[tuple[Shot, DirectImage]]) -> NDArray[
     # the brightest part stands for the others: its place, and its pupil
     shot, image = max(parts, key=lambda pair: _flux(*pair))
     fine_nm = _diffracted_wavelengths(shot)
-    throughput = sum(part.light.intensity * found.throughput_mm2 for part, found in parts)
-    flux = np.interp(fine_nm, shot.packed.wavelengths_nm, throughput) * scene.look.intensity
+    throughput: Floats = np.sum([part.light.intensity * found.throughput_mm2 for part, found in parts], axis=0)
+    flux = direct_flux(shot, scene.settled.lens, throughput, fine_nm) * scene.look.intensity
     if not flux.any():
         return None
     pixel = (1.0 / float(shot.to_pixels[2]), 1.0 / float(shot.to_pixels[3]))

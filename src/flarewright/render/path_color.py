@@ -1,0 +1,182 @@
+"""The colours of a path between the traced wavelengths, where coatings bend them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..kernels.trace import ALIVE, REL, STOP_X, X, Y
+from ..model import Lens
+from ..optics.bundle import Bundle
+from ..optics.coating_curves import CURVE_NM, bends, mirror_squares_traced, passed
+from ..optics.paths import LightPath, direct_path
+from .shot import Shot
+
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+# so many rays of a bundle stand for the angles at which all of it meets the mirrors
+RAYS = 12
+# and these are looked for among so many triangles of its grid
+TRIANGLES = 512
+
+__all__ = ["direct_bend", "direct_flux", "draft_weights", "seen_of", "spread_rays", "traced_bend"]
+
+
+def traced_bend(shot: Shot, path: LightPath, bundle: Bundle, to_pixels: Floats) -> Floats | None:
+    """Compare what a ghost's rays carry with straight lines between the traced wavelengths.
+
+    Parameters
+    ----------
+    shot : Shot
+    path : LightPath
+    bundle : Bundle
+        Traced at one wavelength at least.
+    to_pixels : ndarray, shape (4,)
+        The shot's, or the ghost's own: coatings reflect by the angle, so what is seen of it counts, if anything is.
+
+    Returns
+    -------
+    ndarray, shape (L,), or None
+        What multiplies the light's spectrum (`Shot.weights`); None where nothing bends, or no ray passes.
+    """
+    if shot.curves is None:
+        return None
+    held = sorted(bundle.traced)
+    middle = held[len(held) // 2]
+    chosen = spread_rays(bundle, (middle,), seen_of(shot, to_pixels), RAYS)
+    if chosen.size == 0:
+        chosen = spread_rays(bundle, (middle,), lambda rays: _passes(rays, shot.opening.radius), RAYS)
+    if chosen.size == 0:
+        return None
+    squares = mirror_squares_traced(shot.packed, path, shot.incidence.tilt, bundle.pupil[chosen])
+    if len(squares) == 0:
+        return None
+    bend: Floats = bends(passed(shot.curves, [path], squares[None]), shot.packed.wavelengths_nm)[0]
+    return bend
+
+
+def spread_rays(
+    bundle: Bundle, waves: Sequence[int], passes: Callable[[Floats], Bools], count: int
+) -> NDArray[np.intp]:
+    """Choose rays of a bundle that stand for its light.
+
+    Parameters
+    ----------
+    bundle : Bundle
+    waves : sequence of int
+        Traced wavelengths at which each of them must pass; of all rays if there are none.
+    passes : callable
+        Tells which traced rays do.
+    count : int
+
+    Returns
+    -------
+    ndarray of int
+        Nodes of the bundle, spread evenly over the pupil's area: a node comes as often as its triangles are large, for
+        the grid is fine at rims and folds. Empty where none passes.
+    """
+    triangles = bundle.triangles[:: max(1, len(bundle.triangles) // TRIANGLES)]
+    nodes = triangles.ravel()
+    corners = bundle.pupil[triangles]
+    along, across = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    share = np.repeat(np.abs(along[:, 0] * across[:, 1] - along[:, 1] * across[:, 0]), 3)
+    for w in waves:
+        share *= passes(bundle.traced[w][nodes])
+    reached = np.cumsum(share)
+    if reached.size == 0 or not reached[-1] > 0.0:
+        return np.empty(0, dtype=np.intp)
+    chosen: NDArray[np.intp] = nodes[np.searchsorted(reached, (np.arange(count) + 0.5) / count * reached[-1])]
+    return chosen
+
+
+def seen_of(shot: Shot, to_pixels: Floats) -> Callable[[Floats], Bools]:
+    """Tell which traced rays meet no rim, cross the stop in the circle around the iris, and land in the picture.
+
+    Parameters
+    ----------
+    shot : Shot
+    to_pixels : ndarray, shape (4,)
+        The shot's, or a ghost's own.
+
+    Returns
+    -------
+    callable
+        From rays as in `optics.bundle.trace_points`, shape (N, 5 + 2 C), to a mask of shape (N,).
+    """
+    width, height = shot.size_px
+
+    def seen(rays: Floats) -> Bools:
+        upright = -rays[:, [X, Y]] @ shot.incidence.axes
+        column, row = to_pixels[0] + to_pixels[2] * upright[:, 0], to_pixels[1] - to_pixels[3] * upright[:, 1]
+        lands = (column >= 0.0) & (column < width) & (row >= 0.0) & (row < height)
+        return np.asarray(_passes(rays, shot.opening.radius) & lands)
+
+    return seen
+
+
+def _passes(rays: Floats, iris_radius: float) -> Bools:
+    at_stop = rays[:, STOP_X:].reshape(len(rays), -1, 2)
+    within = (np.hypot(at_stop[..., 0], at_stop[..., 1]) <= iris_radius).all(axis=1)
+    return np.asarray((rays[:, ALIVE] > 0.0) & (rays[:, REL] <= 1.0) & within)
+
+
+def direct_bend(shot: Shot, lens: Lens) -> Floats | None:
+    """Do the same for light that no surface reflects.
+
+    Parameters
+    ----------
+    shot : Shot
+    lens : Lens
+
+    Returns
+    -------
+    ndarray, shape (L,), or None
+    """
+    if shot.curves is None:
+        return None
+    through = passed(shot.curves, [direct_path(lens)], np.zeros((1, 1, 0)))
+    bend: Floats = bends(through, shot.packed.wavelengths_nm)[0]
+    return bend
+
+
+def direct_flux(shot: Shot, lens: Lens, throughput: Floats, fine_nm: Floats) -> Floats:
+    """Interpolate the direct light's flux between the traced wavelengths.
+
+    Parameters
+    ----------
+    shot : Shot
+    lens : Lens
+    throughput : ndarray, shape (W,)
+        At the traced wavelengths.
+    fine_nm : ndarray, shape (F,)
+
+    Returns
+    -------
+    ndarray, shape (F,)
+    """
+    flux: Floats = np.interp(fine_nm, shot.packed.wavelengths_nm, throughput)
+    bend = direct_bend(shot, lens)
+    return flux if bend is None else flux * np.interp(fine_nm, CURVE_NM, bend)
+
+
+def draft_weights(shot: Shot, paths: Sequence[LightPath], squares: Floats) -> Floats:
+    """Return the RGB weights of the traced wavelengths for each of some paths.
+
+    Parameters
+    ----------
+    shot : Shot
+    paths : sequence of LightPath
+        Of two reflections each.
+    squares : ndarray, shape (P, 2)
+        From `kernels.matrix.mirror_squares`.
+
+    Returns
+    -------
+    ndarray, shape (P, W, 3)
+    """
+    assert shot.curves is not None, "nothing bends"
+    traced_nm = shot.packed.wavelengths_nm
+    return shot.weights(traced_nm, bends(passed(shot.curves, paths, squares[:, None]), traced_nm))

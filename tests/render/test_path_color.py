@@ -1,0 +1,106 @@
+"""The rays that stand for a ghost's colour, and faint ghosts that are drawn in one colour."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from flarewright.kernels.trace import ALIVE, REL, STOP_X
+from flarewright.model import Camera, Everywhere, Light, Project, Quality, QuarterWave
+from flarewright.optics.bundle import Bundle
+from flarewright.optics.paths import direct_path, ghost_path
+from flarewright.render.canvas import blank, merge
+from flarewright.render.ghosts_final import draw_final, find_final
+from flarewright.render.path_color import direct_flux, seen_of, spread_rays, traced_bend
+from flarewright.render.prepare import load_lens, settle
+from flarewright.render.shot import make_opening, make_shots
+
+FILM = Everywhere(coating=QuarterWave(center_wavelength_nm=550.0))
+SIZE = (160, 90)
+
+
+def shot_of(lens: str, field: tuple[float, float], **quality):
+    project = Project(
+        lens=lens,
+        lights=(Light(field_deg=field),),
+        camera=Camera(size_px=SIZE),
+        quality=Quality(**quality),
+        coating=FILM,
+    )
+    settled = settle(project)
+    return project, make_shots(settled, make_opening(settled, None))[0]
+
+
+def grid(fine: int) -> Bundle:
+    """Two squares side by side, the right one divided finely; all rays pass and land in the middle."""
+    pupil, triangles = [], []
+
+    def square(x: float, y: float, side: float) -> None:
+        first = len(pupil)
+        pupil.extend([(x, y), (x + side, y), (x + side, y + side), (x, y + side)])
+        triangles.extend([(first, first + 1, first + 2), (first, first + 2, first + 3)])
+
+    square(0.0, 0.0, 1.0)
+    for k in range(fine):
+        for m in range(fine):
+            square(1.0 + k / fine, m / fine, 1.0 / fine)
+    data = np.zeros((len(pupil), STOP_X + 2))
+    data[:, ALIVE], data[:, REL] = 1.0, 0.5
+    path = direct_path(load_lens("tessar-brendel"))
+    return Bundle(path, np.array(pupil), np.array(triangles), {0: data}, 1)
+
+
+def test_rays_are_chosen_by_area():
+    bundle = grid(12)
+    chosen = spread_rays(bundle, (0,), lambda rays: rays[:, ALIVE] > 0.0, 40)
+    assert len(chosen) == 40
+    # half of the area holds 576 of 580 nodes
+    assert 0.4 <= (bundle.pupil[chosen, 0] > 1.0).mean() <= 0.6
+
+
+def test_only_rays_that_pass_are_chosen():
+    bundle = grid(12)
+    bundle.traced[0][bundle.pupil[:, 1] > 0.5, ALIVE] = 0.0
+    chosen = spread_rays(bundle, (0,), lambda rays: rays[:, ALIVE] > 0.0, 40)
+    assert (bundle.pupil[chosen, 1] <= 0.5).all()
+    bundle.traced[0][:, ALIVE] = 0.0
+    assert spread_rays(bundle, (0,), lambda rays: rays[:, ALIVE] > 0.0, 40).size == 0
+
+
+def test_rays_beside_the_picture_are_not_seen():
+    _, shot = shot_of("tessar-brendel", (8.0, 5.0))
+    rays = np.zeros((3, STOP_X + 2))
+    rays[:, ALIVE], rays[:, REL] = 1.0, 0.5
+    rays[1, 0] = 100.0
+    rays[2, STOP_X] = 2.0 * shot.opening.radius
+    assert seen_of(shot, shot.to_pixels)(rays).tolist() == [True, False, False]
+
+
+def test_a_faint_ghost_keeps_its_flux_where_only_its_rim_is_in_the_picture():
+    """Of this one a thousandth is seen, at angles of its own: its mean colour is not that part's."""
+    project, shot = shot_of("nikkor-85-f1.4", (5.0, 0.0), wavelengths=15)
+    item = find_final(shot, ghost_path(load_lens("nikkor-85-f1.4"), 16, 15))
+    sums = []
+    for visibility in (float("inf"), 1e-3, 1e-4):
+        canvas = blank(SIZE)
+        draw_final(item, project.quality, canvas, visibility)
+        sums.append(merge(canvas.planes, SIZE).sum(axis=(0, 1), dtype=np.float64))
+    for few in sums[1:]:
+        assert np.abs(few - sums[0]).max() < 0.05 * np.abs(sums[0]).max()
+
+
+def test_bare_glass_and_single_wavelengths_do_not_bend():
+    _, coated = shot_of("tessar-brendel", (8.0, 5.0), wavelengths=7)
+    assert coated.curves is not None
+    assert shot_of("tessar-brendel", (8.0, 5.0), wavelengths=1)[1].curves is None
+    assert shot_of("tessar-brendel", (8.0, 5.0), wavelengths=7, bridge=False)[1].curves is None
+    assert traced_bend(shot_of("tessar-brendel", (8.0, 5.0), wavelengths=1)[1], None, None, None) is None
+
+
+def test_the_direct_light_follows_its_films():
+    """Between two wavelengths around the film's best the lens passes more than either."""
+    lens = load_lens("tessar-brendel")
+    _, shot = shot_of("tessar-brendel", (0.0, 0.0), wavelengths=5)
+    nodes = shot.packed.wavelengths_nm
+    flux = direct_flux(shot, lens, np.ones(5), np.array([*nodes, 0.5 * (nodes[1] + nodes[2])]))
+    np.testing.assert_allclose(flux[:-1], 1.0, atol=1e-3)
+    assert flux[-1] > 1.003
