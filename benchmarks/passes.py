@@ -1,7 +1,7 @@
 """Every pass that a picture may have, as a ratio to the same picture without it, on a small frame.
 
-Each picture is drawn once to warm up; after that all are drawn in turns, so that a machine that is busy for a while is so
-for all of them, and the medians are compared.
+Each picture is drawn once to warm up; after that all are drawn in turns, so that a machine that is busy for a while is
+so for all of them, and the medians are compared.
 """
 
 from __future__ import annotations
