@@ -10,6 +10,7 @@ from flarewright.design.ghosts import differentiate, evaluate, placed_ghosts
 from flarewright.design.prescription import Structure, structure_of, vector_of
 from flarewright.errors import LensError
 from flarewright.kernels import design_ghosts as dg
+from flarewright.kernels.design_search import irradiance_of_ghosts
 from flarewright.model import Lines
 from flarewright.optics.paraxial import D_LINE_NM, first_order, path_matrices, vertex_positions
 from flarewright.optics.paths import ghost_path, ghost_paths
@@ -136,6 +137,16 @@ def test_a_ghost_lands_where_the_draft_draws_it_and_is_as_bright():
         seen += 1
     assert seen >= 4
     assert max(levels) / min(levels) < 1.05
+
+
+@pytest.mark.parametrize("name", LENSES[:2])
+def test_irradiance_alone_is_that_with_derivatives(name):
+    lens = load_lens(name)
+    structure, q = structure_of(lens), vector(lens)
+    known = differentiate(structure, q, 100.0)
+    light = np.empty(len(structure.pairs))
+    irradiance_of_ghosts(q, structure.stop, structure.mirrors, known.values, light)
+    assert light == pytest.approx(known.log_irradiance, rel=1e-12)
 
 
 def test_what_design_cannot_do_is_said():

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from ..kernels import design_ghosts as columns
 from ..kernels.design_fitness import HIDDEN, sorted_misfit
 from ..kernels.design_match import match
+from ..kernels.design_search import irradiance_of_ghosts
 from ..model.design import Bounds
-from .ghosts import differentiate, evaluate
+from .ghosts import evaluate
 from .prescription import Structure
 from .rims import STEEPEST
 
@@ -292,14 +293,16 @@ def own_objective(
     Objective
         Ghosts that cannot be seen at a light are no targets of it.
     """
-    found = differentiate(structure, vector, entrance)
+    values = evaluate(structure, vector[None], entrance)[0]
+    irradiance = np.empty(len(values))
+    irradiance_of_ghosts(vector, structure.stop, structure.mirrors, values, irradiance)
     targets, names, spans = [], [], [0]
     for light, slope in enumerate(slopes):
-        here = seen(found.values, float(slope))
+        here = seen(values, float(slope))
         for g, (j, i) in enumerate(structure.pairs):
             if here[g, 1] != HIDDEN:
                 radius = here[g, 1] if signed else abs(here[g, 1])
-                targets.append((here[g, 0], radius, found.log_irradiance[g]))
+                targets.append((here[g, 0], radius, irradiance[g]))
                 names.append(f"{j}-{i}" if len(slopes) == 1 else f"{j}-{i} at light {light}")
         spans.append(len(targets))
     table = np.array(targets).reshape(-1, 3)

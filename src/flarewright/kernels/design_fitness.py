@@ -8,7 +8,7 @@ import numpy as np
 
 from ._jit import compiled, inner
 from .design_ghosts import COLUMNS, PLACE, RADIUS, REACH_THESIS, WORK_ROWS, list_ghosts
-from .design_search import WISHES, light_values, rematch, to_prescription, total_cost, wish_values
+from .design_search import WISHES, light_counts, light_values, rematch, to_prescription, total_cost, wish_values
 
 # which fitness
 OURS, ALGORITHM_1 = 0, 1
@@ -185,9 +185,7 @@ def fitness_of_genes(
     table = np.empty((count, most) if kind == OURS else (1, 1))
     reals, flags, taken = np.empty((3, most + 1)), np.empty(most + 1, np.bool_), np.empty(most, np.bool_)
     found = np.empty((most, 2))
-    lit = False
-    for t in range(count):
-        lit = lit or weights[t, 2] > 0.0
+    lit = light_counts(weights)
     for b in range(genes.shape[0]):
         stop = decode(genes[b], stops, pattern, places, low, high, full, x, glass)
         fill_mirrors(stop, glass, mirrors)

@@ -442,5 +442,7 @@ def ghosts_with_derivatives(q, stop, mirrors, entrance, values, jacobian, light,
     rows = (q.size - 1) // 3
     work, trail, slopes = np.empty((WORK_ROWS, rows)), np.empty(TRAIL * rows), np.zeros((4, rows))
     common = np.empty((6, q.size))
-    differentiate_ghosts(q, rows, stop, mirrors, entrance, True, work, trail, slopes, common, values, jacobian)
+    # always, but no constant: the search calls the same kernel with a variable
+    with_scale = light.size >= 0
+    differentiate_ghosts(q, rows, stop, mirrors, entrance, with_scale, work, trail, slopes, common, values, jacobian)
     brightness_of_ghosts(q, rows, stop, mirrors, values, jacobian, light, light_by)

@@ -42,6 +42,18 @@ def to_prescription(x, logs, q):
 
 
 @inner
+def light_counts(weights):
+    """Return whether the irradiance of any target counts.
+
+    What is told by a function is no constant to the compiler, which would make kernels of their own for yes and for no.
+    """
+    for t in range(weights.shape[0]):
+        if weights[t, T_LIGHT] > 0.0:
+            return True
+    return False
+
+
+@inner
 def light_values(q, rows, stop, mirrors, values, light):
     """Fill the logarithm of each ghost's irradiance, as `brightness_of_ghosts` does."""
     through = 0.0
@@ -68,6 +80,23 @@ def light_values(q, rows, stop, mirrors, values, light):
                     )  # fmt: skip
                     ghost += 1
                 between += np.log(1.0 - ri * ri)
+
+
+@compiled
+def irradiance_of_ghosts(q, stop, mirrors, values, light):
+    """Compute the logarithm of each ghost's irradiance with bare surfaces, the light's being 1.
+
+    Parameters
+    ----------
+    q : ndarray, shape (1 + 3 K,)
+    stop, mirrors
+        As in `kernels.design_ghosts.ghosts_of_many`.
+    values : ndarray, shape (G, COLUMNS)
+        Of the same prescription.
+    light : ndarray, shape (G,)
+        Filled.
+    """
+    light_values(q, (q.size - 1) // 3, stop, mirrors, values, light)
 
 
 @inner
@@ -368,9 +397,7 @@ def polish_many(
     wished, beam, row = np.empty(WISHES + 2 * rows), np.empty(rows + 2), np.empty(size)
     x, trial, q = np.empty(size), np.empty(size), np.empty(size)
     chosen = np.empty(count, np.int64)
-    lit = False
-    for t in range(count):
-        lit = lit or weights[t, T_LIGHT] > 0.0
+    lit = light_counts(weights)
     for b in range(starts.shape[0]):
         for v in range(size):
             x[v] = min(max(starts[b, v], low[v]), high[v])
