@@ -8,7 +8,7 @@ from planted import planted
 
 from flarewright.design.candidate import outcomes
 from flarewright.design.constraints import breaches
-from flarewright.design.finish import finish, traced_misfits, weighted_fitness
+from flarewright.design.finish import finish, traced_misfits
 from flarewright.design.ghosts import evaluate
 from flarewright.design.prescription import structure_of, vector_of
 from flarewright.design.search import solve
@@ -87,11 +87,11 @@ def test_a_lens_is_finished_where_first_order_ends():
     moved = known.search_point(vector)
     moved[known.free] += np.random.default_rng(0).normal(size=known.free.size) * 0.002 * known.longest
     done = finish(wide, structure, known, moved, structure.pairs)
-    assert np.abs(done.before).max() > 0.02
-    assert np.abs(done.after).max() < 0.02 * np.abs(done.before).max()
+    assert np.abs(done.before.off).max() > 0.02
+    assert np.abs(done.after.off).max() < 0.02 * np.abs(done.before.off).max()
     assert np.all((done.x >= known.low) & (done.x <= known.high))
     off = traced_misfits(wide, structure, known.prescription(done.x), structure.pairs)
-    assert np.array_equal(off, done.after)
+    assert np.array_equal(off.off, done.after.off)
 
 
 def test_final_quality_makes_lenses_whose_traced_ghosts_are_nearer():
@@ -103,7 +103,25 @@ def test_final_quality_makes_lenses_whose_traced_ghosts_are_nearer():
     for one in outcomes(state, problem, count=2):
         before, after = one.fitness_traced
         assert after <= before
-        assert weighted_fitness(problem, one.residuals) == pytest.approx(after)
+        off = traced_misfits(problem, one.structure, one.vector, one.ghosts)
+        assert off.cost == pytest.approx(after)
+        assert one.residuals == pytest.approx(off.off)
         assert not breaches(problem, one.structure, one.vector)
-    best = outcomes(state, problem, count=1)[0]
-    assert best.fitness_traced[1] < 0.5 * best.fitness_traced[0]
+    # the best is better than the lens that first order calls the best
+    found = outcomes(state, problem, count=2)
+    assert found[0].fitness_traced[1] == min(one.fitness_traced[1] for one in found)
+    (first,) = outcomes(state, replace(problem, traced=False), count=1)
+    assert first.fitness_traced is None
+    rough = traced_misfits(problem, first.structure, first.vector, first.ghosts)
+    assert found[0].fitness_traced[1] < rough.cost
+
+
+def test_a_ghost_that_no_rays_make_is_told():
+    problem, structure, vector = planted()
+    vector[0] = 4.0
+    (gone,) = np.flatnonzero(np.isnan(traced_ghosts(structure, vector, 0.1, 100.0)[:, 0]))
+    here = replace(problem, objective=replace(problem.objective, slopes=np.array([0.1])))
+    found = traced_misfits(here, structure, vector, structure.pairs)
+    assert np.flatnonzero(found.lost).tolist() == [gone]
+    weighted = ((here.objective.weights[:, :2] * found.off) ** 2).sum()
+    assert found.cost == pytest.approx((weighted + 1.0) / len(found.off))

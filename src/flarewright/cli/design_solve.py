@@ -181,7 +181,8 @@ def _print(
             print(f"lens-{number} breaks {', '.join(f'{each.name} by {each.amount:.2g}' for each in one.breaks)}")
         if one.fitness_traced is not None:
             print(f"lens-{number}: weighted misfit of traced ghosts {one.fitness_traced[1]:.3g} "
-                  f"({one.fitness_traced[0]:.3g} before they were finished)")  # fmt: skip
+                  f"({one.fitness_traced[0]:.3g} before they were finished)"
+                  + (f"; too few rays make {', '.join(one.lost)}" if one.lost else ""))  # fmt: skip
         if one.fitness_any_index is not None:
             print(f"lens-{number}: fitness {one.fitness:.3g} mm^2 with {', '.join(one.glasses.values())} "
                   f"({one.fitness_any_index:.3g} with any index)")  # fmt: skip

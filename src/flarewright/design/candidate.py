@@ -15,7 +15,7 @@ from ..model import Iris, Lens, Medium, Stop, Surface
 from ..optics.paraxial import first_order
 from ..render.prepare import complete_lens
 from .constraints import Breach, breaches, kept, stiff
-from .finish import finish, weighted_fitness
+from .finish import finish, traced_misfits
 from .objective import fitness, fitness_thesis, misfits
 from .prescription import Structure
 from .rims import clear_radii
@@ -29,6 +29,8 @@ APART = (0.15, 0.004, 0.05)
 POLISHING_STEPS = 200
 # a search all of whose minima break hard constraints is not gone through to the end
 MOST_FAILURES = 40
+# so many ghosts are traced to choose the lenses that are worth finishing
+TRACED = 2000
 
 
 @dataclass(frozen=True)
@@ -56,10 +58,12 @@ class Outcome:
     fitness_any_index : float or None
         Fitness before the indices became those of glasses.
     fitness_traced : (float, float) or None
-        Mean squared misfit of traced ghosts by the weights of the search (parts of radii where these are relative),
-        before and after they were finished; `residuals` are traced then.
+        Misfit of traced ghosts (`finish.TracedMisfits.cost`) before and after they were finished; `residuals` are
+        traced then.
     breaks : tuple of Breach
         Hard constraints that it does not keep; only of `nearest_outcomes`.
+    lost : tuple of str
+        Targets of whose ghosts too few traced rays arrive; only where lenses are finished with these.
     """
 
     lens: Lens
@@ -74,6 +78,7 @@ class Outcome:
     fitness_any_index: float | None = None
     fitness_traced: tuple[float, float] | None = None
     breaks: tuple[Breach, ...] = ()
+    lost: tuple[str, ...] = ()
 
 
 def lens_of(
@@ -150,6 +155,8 @@ def outcomes(state: State, problem: Problem, *, count: int = 5, name: str = "Des
     for run in state.runs:
         pool = list(merge(pool, run.members, KEPT))
     pool.sort(key=lambda one: one.cost)
+    if problem.traced:
+        pool = _by_tracing(pool, problem)
     # the best lens with any index need not be the best with glasses
     enough = count if problem.glasses is None else 2 * count
     chosen: list[Candidate] = []
@@ -170,10 +177,23 @@ def outcomes(state: State, problem: Problem, *, count: int = 5, name: str = "Des
             found.append(outcome)
         else:
             failures += 1
-    found.sort(key=lambda one: one.cost)
+    found.sort(key=lambda one: one.cost if one.fitness_traced is None else one.fitness_traced[1])
     return tuple(
         replace(one, lens=one.lens.replace(name=f"{name} {number}")) for number, one in enumerate(found[:count], 1)
     )
+
+
+def _by_tracing(pool: list[Candidate], problem: Problem) -> list[Candidate]:
+    """Put those first whose traced ghosts are nearest: of lenses alike to first order some are much better."""
+    aim = problem.objective
+    judged = pool[: int(np.clip(TRACED / len(aim.targets), 16, 200))]
+
+    def cost(one: Candidate) -> float:
+        vector = problem.variables(one.structure).prescription(one.x)
+        residuals, _, ghosts = misfits(aim, one.structure, vector)
+        return np.inf if residuals is None else traced_misfits(problem, one.structure, vector, ghosts).cost
+
+    return [*sorted(judged, key=cost), *pool[len(judged) :]]
 
 
 def nearest_outcomes(
@@ -225,11 +245,12 @@ def _outcome(one: Candidate, problem: Problem, name: str, iris: Iris | None) -> 
     residuals, _, ghosts = misfits(aim, one.structure, vector)
     if residuals is None:
         return None
-    traced = None
+    traced, lost = None, tuple[str, ...]()
     if problem.traced:
         done = finish(problem, one.structure, known, inside.x, ghosts)
-        vector, residuals = known.prescription(done.x), done.after
-        traced = weighted_fitness(problem, done.before), weighted_fitness(problem, done.after)
+        vector, residuals = known.prescription(done.x), done.after.off
+        traced = done.before.cost, done.after.cost
+        lost = tuple(name for name, gone in zip(aim.names, done.after.lost, strict=True) if gone)
     try:
         radii = clear_radii(one.structure, vector, aim.slopes, aim.entrance, edge=problem.bounds.edge)
         lens = lens_of(one.structure, vector, radii, name=name, iris=iris, media=media)
@@ -238,5 +259,5 @@ def _outcome(one: Candidate, problem: Problem, name: str, iris: Iris | None) -> 
     return Outcome(
         lens, one.structure, vector, inside.cost, fitness(aim, one.structure, vector),
         fitness_thesis(aim, one.structure, vector), residuals, ghosts, names, any_index,
-        traced,
+        traced, lost=lost,
     )  # fmt: skip

@@ -20,7 +20,9 @@ from .variables import Variables
 Floats = NDArray[np.float64]
 Pairs = tuple[tuple[int, int], ...]
 
-STEPS, TRIES = 60, 6
+STEPS, TRIES = 60, 12
+# what a ghost costs that is lost: as much as one that misses by its own radius
+LOST = 1.0
 # derivatives by differences where so many ghosts times variables are not too much work, and how often at most
 FEW, ANEW = 1500, 8
 # steps of differences: log lengths, curvatures (1/mm), indices
@@ -32,6 +34,26 @@ _HALVINGS = 12
 
 
 @dataclass(frozen=True)
+class TracedMisfits:
+    """How far the ghosts of a lens are off by traced rays.
+
+    Attributes
+    ----------
+    off : ndarray, shape (N, 2)
+        Place and size of each target's ghost, less the target's, mm; of a lost one to first order.
+    lost : ndarray of bool, shape (N,)
+        Ghosts of which too few rays arrive to tell a disc.
+    cost : float
+        Mean of squares by the weights of the search: mm^2, or parts of radii where these are relative; a lost ghost
+        counts `LOST` more.
+    """
+
+    off: Floats
+    lost: NDArray[np.bool_]
+    cost: float
+
+
+@dataclass(frozen=True)
 class Finished:
     """A lens finished with traced rays.
 
@@ -39,16 +61,15 @@ class Finished:
     ----------
     x : ndarray, shape (1 + 3 K,)
         Search variables.
-    before, after : ndarray, shape (N, 2)
-        Place and size of each target's ghost by traced rays, less the target's, mm.
+    before, after : TracedMisfits
     """
 
     x: Floats
-    before: Floats
-    after: Floats
+    before: TracedMisfits
+    after: TracedMisfits
 
 
-def traced_misfits(problem: Problem, structure: Structure, vector: Floats, ghosts: Pairs) -> Floats:
+def traced_misfits(problem: Problem, structure: Structure, vector: Floats, ghosts: Pairs) -> TracedMisfits:
     """Tell for every target how far its ghost is off by traced rays.
 
     Parameters
@@ -61,24 +82,28 @@ def traced_misfits(problem: Problem, structure: Structure, vector: Floats, ghost
 
     Returns
     -------
-    ndarray, shape (N, 2)
-        Place and size, mm; of a ghost of which too few rays arrive, to first order.
+    TracedMisfits
     """
     aim = problem.objective
     at = {pair: g for g, pair in enumerate(structure.pairs)}
     first_order = evaluate(structure, vector[None], aim.entrance)[0]
-    out = np.zeros((len(aim.targets), 2))
+    off, lost = np.zeros((len(aim.targets), 2)), np.zeros(len(aim.targets), np.bool_)
     for light, slope in enumerate(aim.slopes):
         span = slice(int(aim.spans[light]), int(aim.spans[light + 1]))
         pairs = ghosts[span]
         found = traced_ghosts(structure, vector, float(slope), aim.entrance, pairs)
         rough = first_order[[at[pair] for pair in pairs]]
         rough = np.stack([rough[:, columns.PLACE] * slope, rough[:, columns.RADIUS]], axis=1).reshape(-1, 2)
+        lost[span] = ~np.isfinite(found).all(axis=1)
         found = np.where(np.isfinite(found), found, rough)
         if not aim.signed:
             found[:, 1] = np.abs(found[:, 1])
-        out[span] = found - aim.targets[span, :2]
-    return np.where(aim.weights[:, :2] > 0.0, out, 0.0)
+        off[span] = found - aim.targets[span, :2]
+    counts = aim.weights[:, :2] > 0.0
+    lost &= counts.any(axis=1)
+    off = np.where(counts, off, 0.0)
+    cost = (float(((aim.weights[:, :2] * off) ** 2).sum()) + LOST * int(lost.sum())) / len(off)
+    return TracedMisfits(off, lost, cost)
 
 
 def finish(problem: Problem, structure: Structure, known: Variables, x: Floats, ghosts: Pairs) -> Finished:
@@ -112,11 +137,15 @@ def finish(problem: Problem, structure: Structure, known: Variables, x: Floats, 
         return out
 
     def residuals(at: Floats) -> Floats:
-        ours = problem.objective.weights[:, :2] * traced_misfits(problem, structure, known.prescription(at), ghosts)
-        return np.concatenate([ours.ravel(), missed(at)])
+        ours = traced_misfits(problem, structure, known.prescription(at), ghosts)
+        gone = np.sqrt(LOST) * ours.lost
+        return np.concatenate([(problem.objective.weights[:, :2] * ours.off).ravel(), gone, missed(at)])
 
     begin, old, damping = x, residuals(x), 1e-3
-    J = np.concatenate([_first_order(problem, structure, known, x, ghosts), _by_differences(known, x, missed)])
+    J = np.concatenate([
+        _first_order(problem, structure, known, x, ghosts), np.zeros((len(ghosts), known.free.size)),
+        _by_differences(known, x, missed),
+    ])  # fmt: skip
     anew = ANEW if len(ghosts) * known.free.size <= FEW else 0
     exact = False
     for _ in range(STEPS):
@@ -140,14 +169,8 @@ def _kept(
 ) -> Finished:
     """Go as far as the hard constraints let, and not where it is worse."""
     end = _inside(problem, structure, known, begin, end)
-    off = [traced_misfits(problem, structure, known.prescription(one), ghosts) for one in (begin, end)]
-    before, after = (weighted_fitness(problem, one) for one in off)
-    return Finished(begin, off[0], off[0]) if after >= before else Finished(end, off[0], off[1])
-
-
-def weighted_fitness(problem: Problem, misfits: Floats) -> float:
-    """Mean of squared misfits, shape (N, 2), by the weights of the search: mm^2, or parts of radii where relative."""
-    return float(((problem.objective.weights[:, :2] * misfits) ** 2).sum()) / len(misfits)
+    before, after = (traced_misfits(problem, structure, known.prescription(one), ghosts) for one in (begin, end))
+    return Finished(begin, before, before) if after.cost >= before.cost else Finished(end, before, after)
 
 
 def _first_order(problem: Problem, structure: Structure, known: Variables, x: Floats, ghosts: Pairs) -> Floats:

@@ -46,7 +46,7 @@ def verdict(outcome: Outcome | None, proven: tuple[Obstacle, ...] = (), conflict
         return "impossible"
     if conflict:
         return "contradictory"
-    if outcome is None or outcome.breaks:
+    if outcome is None or outcome.breaks or outcome.lost:
         return "unsolved"
     worst = float(np.abs(outcome.residuals).max())
     return "met" if worst < MET else ("nearly" if worst < NEARLY else "unsolved")
@@ -106,6 +106,7 @@ def summary(
                         "ghost": f"{j}-{i}",
                         "place_error_mm": float(place),
                         "radius_error_mm": float(size),
+                        **({"lost": name in one.lost} if one.fitness_traced is not None else {}),
                     }
                     for name, (j, i), (place, size) in zip(
                         problem.objective.names, one.ghosts, one.residuals, strict=True
@@ -275,7 +276,8 @@ def _traced(one: Outcome) -> str:
     if one.fitness_traced is None:
         return ""
     before, after = one.fitness_traced
-    return f"; finished with traced rays: weighted misfit {before:.3g} before, {after:.3g} now; errors below are traced"
+    told = f"; finished with traced rays: weighted misfit {before:.3g} before, {after:.3g} now; errors below are traced"
+    return told + (f", but of {', '.join(one.lost)} too few rays arrive" if one.lost else "")
 
 
 def _page(data: dict[str, Any], sections: str, target: bytes) -> str:
