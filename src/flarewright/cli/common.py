@@ -143,20 +143,36 @@ def write_text(output: Path, text: str) -> None:
 
 
 @contextmanager
-def remembered(cache: Path | None) -> Iterator[dict[str, Any]]:
-    """Read pictures drawn before from a file, and keep them and new ones there, after an interruption too."""
-    if cache is None:
+def remembered(cache: Path | None, output: Path | None = None) -> Iterator[dict[str, Any]]:
+    """Read pictures drawn before from a file, and keep them and new ones there, after an interruption too.
+
+    Parameters
+    ----------
+    cache : path or None
+        Where they stay. None: an interrupted run leaves them beside its output (NAME.partial.npz), where the next run
+        finds them; it takes them away when it has ended.
+    output : path or None
+    """
+    partial = None if output is None else output.with_suffix(".partial.npz")
+    kept = cache or partial
+    if kept is None:
         yield {}
         return
     from ..io.flare_cache import read_cache, write_cache
 
-    memory = read_cache(cache) if cache.exists() else {}
+    memory = read_cache(kept) if kept.exists() else {}
     before = sum(map(len, memory.values()))
+    if cache is None and before:
+        tell([f"{kept}: goes on with {before} pictures that an interrupted run had drawn"])
+    done = False
     try:
         yield memory
+        done = True
     finally:
-        if sum(map(len, memory.values())) > before:
-            write_cache(cache, memory)
+        if cache is None and done:
+            kept.unlink(missing_ok=True)
+        elif sum(map(len, memory.values())) > before:
+            write_cache(kept, memory)
 
 
 @contextmanager

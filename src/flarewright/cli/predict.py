@@ -190,7 +190,7 @@ def _curves(
             f"--to {wanted.to_deg:g} is beyond what this flare knows; choose degrees above "
             f"{flares.sampled.least_deg:g} and up to {reach:g}"
         )
-    with progress_bar() as told, remembered(cache) as memory:
+    with progress_bar() as told, remembered(cache, output) as memory:
         found = predict_occurrence(flares, wanted, told, memory)
     if glare_of is not None:
         found = replace(found, glare=_glare(glare_of, threads))

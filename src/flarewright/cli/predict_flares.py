@@ -134,7 +134,14 @@ def model_flare(
 
 
 def scene_flare(
-    camera: SceneCamera, light: SceneLight, diameter_deg: float, *, quality: str, shown: bool, threads: int | None
+    camera: SceneCamera,
+    light: SceneLight,
+    diameter_deg: float,
+    distance_m: float | None,
+    *,
+    quality: str,
+    shown: bool,
+    threads: int | None,
 ) -> tuple[Flare, Frame]:
     """Return the flare of a light in a camera of a scene, and the camera's frame.
 
@@ -145,6 +152,8 @@ def scene_flare(
         Of which the spectrum counts.
     diameter_deg : float
         Across it.
+    distance_m : float or None
+        None: far away.
     quality : {"draft", "final"}
         Of pictures for statistics.
     shown : bool
@@ -156,6 +165,8 @@ def scene_flare(
     from ..predict.lens_flare import lens_flare, square_flare, statistics_quality
 
     project = camera_project(camera, light, diameter_deg)
+    if distance_m is not None:
+        project = project.replace(lights=(project.lights[0].replace(distance=1e3 * distance_m),))
     if shown:
         flare = lens_flare(project.replace(quality={"mode": "final", "wavelengths": SHOWN_NM}), threads=threads)
         return flare, flare.sensor

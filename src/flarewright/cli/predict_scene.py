@@ -69,7 +69,7 @@ def predict_scene(path: Path, wishes: SceneWishes) -> None:
     camera = None if wishes.near is None else _camera_number(scene, wishes.near)
     maker = partial(_named, quality=wishes.quality, threads=wishes.threads)
     _compile(scene, wishes.threads)
-    with progress_bar() as told, remembered(wishes.cache) as memory:
+    with progress_bar() as told, remembered(wishes.cache, wishes.output) as memory:
         plan = plan_scene(scene, partial(maker, shown=False), told, memory)
         ranked = ranking(plan)
         found = None
@@ -107,12 +107,12 @@ def _camera_number(scene: Scene, name: str) -> int:
     return names.index(name)
 
 
-def _named(camera: Any, light: Any, diameter_deg: float, **how: Any) -> Any:
+def _named(camera: Any, light: Any, diameter_deg: float, distance_m: float | None, **how: Any) -> Any:
     """Build a flare, and say of what camera a mistake is."""
     from .predict_flares import scene_flare
 
     try:
-        return scene_flare(camera, light, diameter_deg, **how)
+        return scene_flare(camera, light, diameter_deg, distance_m, **how)
     except FlarewrightError as error:
         words = str(error)
         raise ProjectError(words if words.startswith(camera.name) else f"camera {camera.name}: {words}") from None

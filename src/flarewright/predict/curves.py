@@ -36,7 +36,7 @@ class Curves:
         Columns in the order of `statistics.NAMES`.
     roll_deg : float
     worst_step : float
-        Largest error of a straight line between two samples that is expected where sampling ended, as `tolerance`.
+        Largest error of a line between two samples that is expected where sampling ended, as `tolerance`.
     """
 
     constellation_deg: Floats
@@ -49,9 +49,13 @@ class Curves:
         return self.values[:, NAMES.index(name)]
 
     def at(self, constellation_deg: float) -> Statistics:
-        """Return the statistics by straight lines between the samples."""
-        found = [float(np.interp(constellation_deg, self.constellation_deg, column)) for column in self.values.T]
-        return Statistics(*found)
+        """Return the statistics between the samples, see `between`; beyond them those of the first or last."""
+        angles = self.constellation_deg
+        k = int(np.clip(np.searchsorted(angles, constellation_deg) - 1, 0, max(len(angles) - 2, 0)))
+        if len(angles) == 1:
+            return Statistics(*map(float, self.values[0]))
+        part = float(np.clip((constellation_deg - angles[k]) / (angles[k + 1] - angles[k]), 0.0, 1.0))
+        return Statistics(*map(float, between(self.values[k], self.values[k + 1], part)))
 
 
 @dataclass(frozen=True)
@@ -75,6 +79,24 @@ class Check:
             return np.asarray(np.where(self.rendered > 0.0, self.predicted / self.rendered, np.nan))
 
 
+def between(a: Floats, b: Floats, part: float) -> Floats:
+    """Interpolate statistics: straight lines of their logarithms, and of themselves where one of them is 0.
+
+    Parameters
+    ----------
+    a, b : ndarray, shape (5,)
+    part : float
+        0: at a, 1: at b.
+
+    Notes
+    -----
+    Towards the edge of the field flare falls by decades, where straight lines of the values lie far too high.
+    """
+    positive = (a > 0.0) & (b > 0.0)
+    logs = np.log(np.where(positive, a, 1.0)) * (1.0 - part) + np.log(np.where(positive, b, 1.0)) * part
+    return np.asarray(np.where(positive, np.exp(logs), a * (1.0 - part) + b * part))
+
+
 def sample_curves(
     table: FlareTable,
     *,
@@ -84,7 +106,7 @@ def sample_curves(
     most: int = 64,
     progress: Progress | None = None,
 ) -> Curves:
-    """Draw the flare at constellations chosen so that straight lines between them are good enough.
+    """Draw the flare at constellations chosen so that lines between them (`between`) are good enough.
 
     Parameters
     ----------
@@ -133,7 +155,7 @@ def sample_curves(
         middle = 0.5 * (a + b)
         found = draw(middle)
         peak = np.max(list(known.values()), axis=0)
-        line = 0.5 * (known[a] + known[b])
+        line = between(known[a], known[b], 0.5)
         off = np.abs(found - line) / np.maximum(np.sqrt(np.maximum(found, FAINT * peak) * peak), 1e-30)
         error = float(off[_FOLLOWED].max())
         if b - a > 2.0 * LEAST_DEG:

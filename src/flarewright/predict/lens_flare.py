@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Sequence
+from math import acos, cos, degrees, radians
 
+from ..errors import LensError
 from ..model import Camera, Dirt, Layer, Output, Project, Quality
 from ..optics.constellation import field_angles
 from ..render.prepare import Settled, as_lens, settle
@@ -15,6 +17,8 @@ from .wavelengths import luminous_lines
 
 # field angles are below 90 degrees, and grazing light carries nothing
 REACH_DEG = 85.0
+# nearer along the axis than so many focal lengths a light stands between lens and hood
+LEAST_FRONT = 2.0
 # pixels across what is drawn for statistics; a flare is smooth but for its brightest spots
 SIDE_PX = 192
 
@@ -52,7 +56,8 @@ def lens_flare(project: Project, *, threads: int | None = None) -> Flare:
     Parameters
     ----------
     project : Project
-        Its first light is moved about; its spectrum and disc stay, its intensity becomes 1.
+        Its first light is moved about; its spectrum and disc stay, its intensity becomes 1. The distance of a near
+        light is taken from the camera to it, whatever its direction.
     threads : int, optional
 
     Returns
@@ -65,7 +70,7 @@ def lens_flare(project: Project, *, threads: int | None = None) -> Flare:
     FlarewrightError
         As `settle`, and later as `render`.
     """
-    light = project.lights[0].replace(intensity=1.0, distance=None, field_deg=(0.0, 0.0))
+    light = project.lights[0].replace(intensity=1.0, field_deg=(0.0, 0.0))
     prepared = project.replace(lights=(light,), output=Output(layers="passes", starburst=False))
     settled = settle(prepared)
     # the lens is loaded once; what `settle` reads from the project besides it costs nothing
@@ -73,7 +78,9 @@ def lens_flare(project: Project, *, threads: int | None = None) -> Flare:
     summary = render(prepared.replace(quality=Quality(mode="draft", wavelengths=3))).summary
 
     def draw(constellation_deg: float, roll_deg: float) -> Sequence[Layer]:
-        there = light.replace(field_deg=field_angles(constellation_deg, roll_deg))
+        # the renderer measures along the axis
+        along = None if light.distance is None else light.distance * cos(radians(constellation_deg))
+        there = light.replace(field_deg=field_angles(constellation_deg, roll_deg), distance=along)
         return render(prepared.replace(lights=(there,)), threads=threads).layers
 
     width, height = prepared.camera.sensor
@@ -86,10 +93,23 @@ def lens_flare(project: Project, *, threads: int | None = None) -> Flare:
         efl=settled.order.efl,
         scene_scale=float(summary["scene_irradiance_per_radiance"]),
         turns_by_deg=_turns_by(settled),
-        reach_deg=REACH_DEG,
+        reach_deg=_reach(light.distance, settled.order.efl),
         fingerprint=hashlib.sha256(prepared.model_dump_json().encode()).hexdigest(),
         remarks=settled.remarks,
     )
+
+
+def _reach(distance: float | None, efl: float) -> float:
+    """Return the largest constellation: a near light must stay in front of the lens."""
+    if distance is None:
+        return REACH_DEG
+    front = LEAST_FRONT * abs(efl)
+    if distance <= front:
+        raise LensError(
+            f"a light {distance:.4g} mm from the camera stands in or right at the lens; move it at least "
+            f"{front:.4g} mm away"
+        )
+    return min(REACH_DEG, degrees(acos(front / distance)))
 
 
 def square_flare(project: Project, quality: Quality, *, threads: int | None = None) -> tuple[Flare, Frame]:

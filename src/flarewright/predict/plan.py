@@ -20,14 +20,19 @@ from .table import FlareTable, Memory
 from .tracks import CameraTrack, Sighting, camera_track, moments, sightings
 
 Floats = NDArray[np.float64]
-FlareMaker = Callable[[SceneCamera, SceneLight, float], tuple[Flare, Frame]]
+FlareMaker = Callable[[SceneCamera, SceneLight, float, float | None], tuple[Flare, Frame]]
 
 # between drawn constellations, degrees; lights smaller than this are drawn as points
 STEP_DEG, POINT_DEG = 2.0, 1.0
 # nearer than so many focal lengths a light's ghosts are no longer those of a distant one
 NEAR = 50.0
+# a distance that changes by less than this factor changes no ghost much
+STAYS = 2.0
 
-__all__ = ["FlareMaker", "Pair", "Plan", "Ranked", "plan_scene", "ranking", "rounded_diameter", "tables_of"]
+__all__ = [
+    "FlareMaker", "Pair", "Plan", "Ranked", "near_or_far", "plan_scene", "ranking", "rounded_diameter",
+    "rounded_distance", "tables_of",
+]  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -149,7 +154,8 @@ def tables_of(
     scene : Scene
     seen : sequence of sequence of Sighting
     maker : callable
-        (camera, light, diameter_deg) to a flare for tables and the camera's frame.
+        (camera, light, diameter_deg, distance_m) to a flare for tables and the camera's frame; a distance of None is
+        far away.
     memory : dict, optional
         Pictures drawn before, by the flares' fingerprints; new ones are added to it.
 
@@ -163,7 +169,7 @@ def tables_of(
     for camera, row in zip(scene.cameras, seen, strict=True):
         tables = []
         for light, sighting in zip(scene.lights, row, strict=True):
-            flare, frame = maker(camera, light, rounded_diameter(sighting))
+            flare, frame = near_or_far(maker, camera, light, sighting)
             key = flare.fingerprint, frame
             if key not in known:
                 drawn = {} if memory is None else memory.setdefault(flare.fingerprint, {})
@@ -171,6 +177,26 @@ def tables_of(
             tables.append(known[key])
         out.append(tuple(tables))
     return tuple(out)
+
+
+def near_or_far(maker: FlareMaker, camera: SceneCamera, light: SceneLight, sighting: Sighting) -> tuple[Flare, Frame]:
+    """Return the flare of a light as far away as it is, and the camera's frame."""
+    size = rounded_diameter(sighting)
+    flare, frame = maker(camera, light, size, None)
+    distance = rounded_distance(sighting, flare.efl)
+    return (flare, frame) if distance is None else maker(camera, light, size, distance)
+
+
+def rounded_distance(sighting: Sighting, efl_mm: float | None) -> float | None:
+    """Return the distance a light is drawn at, m: its middle one over time, rounded so that few are drawn.
+
+    None where it never comes within `NEAR` focal lengths, or the focal length is not known: a measured flare's light
+    stood where it stood. Else half an octave's multiple of 1 m.
+    """
+    lit = sighting.illuminance_lx > 0.0
+    if efl_mm is None or not lit.any() or sighting.distance_m[lit].min() >= 1e-3 * NEAR * abs(efl_mm):
+        return None
+    return float(2.0 ** (0.5 * round(2.0 * log2(float(np.median(sighting.distance_m[lit]))))))
 
 
 def rounded_diameter(sighting: Sighting) -> float:
@@ -256,11 +282,12 @@ def _doubts(camera: SceneCamera, light: SceneLight, flare: Flare, pair: Pair) ->
             f"{camera.name} was measured from {flare.least_deg:g} to {flare.reach_deg:g} degrees; {light.name} stands "
             f"elsewhere in {unknown:.0%} of the times, which count as without flare"
         )
-    nearest = float(pair.sighting.distance_m.min())
-    if flare.efl is not None and nearest < 1e-3 * NEAR * flare.efl:
+    drawn = rounded_distance(pair.sighting, flare.efl)
+    lit = pair.sighting.distance_m[pair.sighting.illuminance_lx > 0.0]
+    if drawn is not None and float(lit.max() / lit.min()) > STAYS:
         told.append(
-            f"{light.name} comes within {nearest:.3g} m of {camera.name}, nearer than {NEAR:g} focal lengths: its "
-            "ghosts are drawn as those of a distant light"
+            f"{light.name} comes within {lit.min():.3g} m of {camera.name} and goes {lit.max():.3g} m away: its ghosts "
+            f"are drawn as if it stayed {drawn:.3g} m away, its brightness follows"
         )
     return told
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from .contrast import washed_share
 from .curves import Progress
 from .flare import luminance
-from .plan import FlareMaker, Plan, Ranked, rounded_diameter
+from .plan import FlareMaker, Plan, Ranked, near_or_far
 
 # pairs of camera and light
 PICTURES = 6
@@ -48,7 +48,7 @@ def render_worst(plan: Plan, ranked: Sequence[Ranked], maker: FlareMaker, progre
     plan : Plan
     ranked : sequence of Ranked
     maker : callable
-        (camera, light, diameter_deg) to a flare to be looked at, over the camera's frame.
+        (camera, light, diameter_deg, distance_m) to a flare to be looked at, over the camera's frame.
     progress : callable
 
     Returns
@@ -61,7 +61,7 @@ def render_worst(plan: Plan, ranked: Sequence[Ranked], maker: FlareMaker, progre
     for k, one in enumerate(chosen):
         seen = plan.pairs[one.camera][one.light].sighting
         camera, light = scene.cameras[one.camera], scene.lights[one.light]
-        flare, _ = maker(camera, light, rounded_diameter(seen))
+        flare, _ = near_or_far(maker, camera, light, seen)
         factor = float(seen.illuminance_lx[one.worst]) / flare.scene_scale
         drawn = flare.picture(float(seen.constellation_deg[one.worst]), float(seen.roll_deg[one.worst]))
         picture = (drawn * factor).astype(np.float32)

@@ -1,0 +1,146 @@
+"""Lights nearer than fifty focal lengths are drawn where they are; an interrupted prediction goes on."""
+
+import json
+from math import cos, radians, sin
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from flarewright.cli.app import run
+from flarewright.cli.common import remembered
+from flarewright.model import Camera, Light, Output, Project, Quality
+from flarewright.optics.color import luminance_weights
+from flarewright.predict import table
+from flarewright.predict.curves import Curves, between
+from flarewright.predict.lens_flare import square_flare, statistics_quality
+from flarewright.predict.plan import rounded_distance
+from flarewright.predict.table import FlareTable
+from flarewright.predict.tracks import Sighting
+from flarewright.render.render import render
+
+
+def test_a_near_light_makes_the_flare_that_a_direct_render_shows():
+    away, angle = 300.0, 14.0
+    project = Project(
+        lens="heliar-tronnier", f_number=5.6, lights=(Light(field_deg=(0.0, 0.0), distance=away),),
+        camera=Camera(size_px=(240, 160), sensor_mm=(36.0, 24.0)), iris={},
+    )  # fmt: skip
+    flare, frame = square_flare(project, statistics_quality("final"))
+    found = FlareTable(flare, frame).at(angle, 0.0)
+    there = Light(field_deg=(angle, 0.0), distance=away * cos(radians(angle)))
+    shot = project.replace(lights=(there,), quality=Quality(), output=Output(starburst=False))
+    light = render(shot).layers[0].pixels.astype(float) @ luminance_weights("rec709")
+    assert found.mean == pytest.approx(light.mean(), rel=0.01)
+    # which a distant light's is not
+    far, _ = square_flare(project.replace(lights=(Light(field_deg=(0.0, 0.0)),)), statistics_quality("final"))
+    assert abs(FlareTable(far, frame).at(angle, 0.0).mean / found.mean - 1.0) > 0.05
+    assert far.fingerprint != flare.fingerprint
+    assert flare.reach_deg < far.reach_deg == 85.0
+
+
+@pytest.mark.parametrize(
+    ("distances", "lux", "drawn"),
+    [
+        ((10.0, 12.0), (1.0, 1.0), None),
+        ((1.0, 1.0), (1.0, 1.0), 1.0),
+        ((1.4, 1.5), (1.0, 1.0), 2.0**0.5),
+        ((0.2, 30.0), (0.0, 1.0), None),
+        ((0.2, 30.0), (0.0, 0.0), None),
+        ((np.inf, np.inf), (1.0, 1.0), None),
+    ],
+)
+def test_distances_are_rounded_where_they_matter(distances, lux, drawn):
+    nothing = np.zeros(2)
+    sighting = Sighting(nothing, nothing, np.array(lux), nothing, np.array(distances))
+    assert rounded_distance(sighting, 100.0) == (None if drawn is None else pytest.approx(drawn))
+    assert rounded_distance(sighting, None) is None
+
+
+SCENE = """
+schema_version = 1
+[[cameras]]
+name = "A"
+lens = "heliar-tronnier"
+f_number = 8.0
+position_m = [0.0, 0.0, 0.0]
+aim_m = [0.0, 10.0, 0.0]
+[[lights]]
+name = "torch"
+position_m = [{x}, {y}, 0.0]
+intensity_cd = 100.0
+"""
+
+
+def test_a_scene_with_a_near_lamp_draws_it_near_and_one_in_the_lens_is_told(tmp_path, capsys):
+    def veil(away):
+        path = tmp_path / "s.toml"
+        path.write_text(SCENE.format(x=away * sin(radians(14.0)), y=away * cos(radians(14.0))))
+        assert run(["predict", str(path), "--quality", "draft", "--json"]) == 0
+        return json.loads(capsys.readouterr().out)["ranking"][0]["worst_veil_cd_m2"] * away**2
+
+    # but for the inverse square a far lamp's flare is the same wherever it stands, and a near one's is another
+    assert veil(400.0) == pytest.approx(veil(40.0), rel=1e-6)
+    assert abs(veil(0.3) / veil(400.0) - 1.0) > 0.005
+    (tmp_path / "s.toml").write_text(SCENE.format(x=0.01, y=0.1))
+    assert run(["predict", str(tmp_path / "s.toml")]) == 2
+    assert "stands in or right at the lens" in capsys.readouterr().err
+
+
+def test_between_samples_decades_are_divided_evenly():
+    a, b = np.array([1.0, 1.0, 4.0, 0.0, 1e-3]), np.array([1e-4, 1.0, 1.0, 2.0, 1e-3])
+    np.testing.assert_allclose(between(a, b, 0.5), [1e-2, 1.0, 2.0, 1.0, 1e-3])
+    curves = Curves(np.array([0.0, 10.0]), np.stack([a, b]), 0.0, 0.0)
+    assert curves.at(5.0).sum_mm2 == pytest.approx(1e-2)
+    assert curves.at(-1.0).sum_mm2 == 1.0
+    assert curves.at(99.0).sum_mm2 == pytest.approx(1e-4)
+
+
+def test_a_tail_that_falls_by_decades_is_met_between_few_samples():
+    """Straight lines of the values lie three quarters too high where light falls tenfold from sample to sample."""
+    angles = np.linspace(0.0, 60.0, 7)
+    truth = lambda angle: 10.0 ** (-0.1 * angle)  # noqa: E731
+    curves = Curves(angles, np.repeat(truth(angles)[:, None], 5, axis=1), 0.0, 0.0)
+    for angle in np.linspace(0.0, 60.0, 31):
+        assert curves.at(angle).mean == pytest.approx(truth(angle), rel=1e-9)
+
+
+def test_an_interrupted_prediction_goes_on_beside_its_output(tmp_path, capsys, monkeypatch):
+    page = tmp_path / "h.html"
+    arguments = ["predict", "heliar-tronnier", "--fstop", "8", "--quality", "draft", "--samples", "14", "-o", str(page)]
+    drawn = 0
+    real = table.luminance
+
+    def counted(picture, most):
+        nonlocal drawn
+        if drawn == most:
+            raise KeyboardInterrupt
+        drawn += 1
+        return real(picture)
+
+    monkeypatch.setattr(table, "luminance", lambda picture: counted(picture, 5))
+    assert run(arguments) == 130
+    assert not page.exists()
+    assert (tmp_path / "h.partial.npz").is_file()
+    capsys.readouterr()
+    drawn = 0
+    monkeypatch.setattr(table, "luminance", lambda picture: counted(picture, -1))
+    assert run([*arguments, "--json"]) == 0
+    told = capsys.readouterr()
+    assert "goes on with 5 pictures" in told.err
+    again = drawn
+    # what an interrupted run had drawn is not drawn again, and nothing is left behind
+    assert not (tmp_path / "h.partial.npz").exists()
+    drawn = 0
+    assert run([*arguments, "--json"]) == 0
+    assert capsys.readouterr().out == told.out
+    assert drawn == again + 5
+
+
+def test_a_given_cache_stays_and_nothing_is_kept_without_output(tmp_path):
+    with remembered(Path(tmp_path / "c.npz"), tmp_path / "o.html") as memory:
+        memory["x"] = {(0.0, 0.0): np.zeros((2, 2), np.float32)}
+    assert (tmp_path / "c.npz").is_file()
+    with remembered(None, None) as memory:
+        assert memory == {}
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["c.npz"]
