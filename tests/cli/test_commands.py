@@ -453,6 +453,12 @@ def python(code):
     return subprocess.run([sys.executable, "-c", code], check=False, capture_output=True, text=True, timeout=60)
 
 
+def test_the_package_runs_as_a_module():
+    words = [sys.executable, "-m", "flarewright", "--version"]
+    done = subprocess.run(words, check=False, capture_output=True, text=True, timeout=60)
+    assert (done.returncode, done.stdout) == (0, f"flarewright {__version__}\n")
+
+
 def test_import_and_help_load_nothing_heavy():
     heavy = "{'numpy', 'numba', 'scipy', 'OpenEXR', 'flarewright.model'} & set(sys.modules)"
     for code in (
