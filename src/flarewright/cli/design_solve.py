@@ -6,7 +6,7 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from ..design.genes import Measure
     from ..design.search import Problem, State
     from ..design.solvers import Choice
-    from ..model import Project
+    from ..model import Iris, Project
 
 EPILOG = (
     "Examples:\n\nflarewright design solve shot.toml -o found --time 60\n\n"
@@ -124,8 +124,6 @@ def search(
     data : dict
         Facts for JSON.
     """
-    from ..design.candidate import nearest_outcomes, outcomes
-    from ..design.constraints import without_ghosts
     from ..design.impossible import obstacles
     from ..design.report import summary, write_folder
     from ..design.solvers import Limits, chosen, make_ready, solve_with
@@ -146,12 +144,7 @@ def search(
             solver, problem, limits=Limits(time_s, searches, progress, asked), seed=state.seed, measure=measure,
             threads=threads, state=state,
         ).state  # fmt: skip
-    naming: Any = {"count": lenses, "name": name or f"After {settled.lens.name}", "iris": settled.iris}
-    found = outcomes(state, problem, **naming)
-    conflict: tuple[Breach, ...] = ()
-    if not found and problem.bounds.hard:
-        conflict = without_ghosts(problem, seed=state.seed)
-        found = nearest_outcomes(state, problem, **naming)
+    found, conflict = _found(state, problem, lenses, name or f"After {settled.lens.name}", settled.iris)
     remarks = write_folder(folder, project, problem, state, found, proven, conflict)
     data = summary(state, found, problem, proven, conflict)
     tell([*(settled.remarks if name is None else ()), *remarks])
@@ -160,6 +153,20 @@ def search(
     elif talk:
         _print(folder, problem, found, str(data["verdict"]), conflict)
     return problem, found, data
+
+
+def _found(
+    state: State, problem: Problem, count: int, name: str, iris: Iris | None
+) -> tuple[tuple[Outcome, ...], tuple[Breach, ...]]:
+    """Return the best lenses; where none keeps the hard limits the nearest, and what lenses of any ghosts break."""
+    from ..design.candidate import nearest_outcomes, outcomes
+    from ..design.constraints import without_ghosts
+
+    found = outcomes(state, problem, count=count, name=name, iris=iris)
+    if found or not problem.bounds.hard:
+        return found, ()
+    nearest = nearest_outcomes(state, problem, count=count, name=name, iris=iris)
+    return nearest, without_ghosts(problem, seed=state.seed)
 
 
 def _print(

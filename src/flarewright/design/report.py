@@ -100,22 +100,22 @@ def summary(
                         "glasses": {str(row): glass for row, glass in one.glasses.items()},
                     }
                 ),
-                "ghosts": [
-                    {
-                        "target": name,
-                        "ghost": f"{j}-{i}",
-                        "place_error_mm": float(place),
-                        "radius_error_mm": float(size),
-                        **({"lost": name in one.lost} if one.fitness_traced is not None else {}),
-                    }
-                    for name, (j, i), (place, size) in zip(
-                        problem.objective.names, one.ghosts, one.residuals, strict=True
-                    )
-                ],
+                "ghosts": _ghost_data(one, problem),
             }
             for number, one in enumerate(found, 1)
         ],
     }
+
+
+def _ghost_data(one: Outcome, problem: Problem) -> list[dict[str, Any]]:
+    """Return how far the ghost of each target is off."""
+    return [
+        {
+            "target": name, "ghost": f"{j}-{i}", "place_error_mm": float(place), "radius_error_mm": float(size),
+            **({} if one.fitness_traced is None else {"lost": name in one.lost}),
+        }
+        for name, (j, i), (place, size) in zip(problem.objective.names, one.ghosts, one.residuals, strict=True)
+    ]  # fmt: skip
 
 
 def _traced_data(one: Outcome) -> dict[str, float]:
