@@ -5,8 +5,8 @@ import pytest
 from planted_run import GHOSTS, SIZE, views
 
 from flarewright.measure.fit import render
-from flarewright.measure.glow import halo_radiance, offsets, star_radiance
-from flarewright.measure.glow_fit import fit_halo, fit_star, glow, register
+from flarewright.measure.glow import halo_at, halo_radiance, offsets, star_at, star_radiance
+from flarewright.measure.glow_fit import fit_halo, fit_star, followed, glow, register
 from flarewright.model.ghost_model import Halo, Star
 
 HALO = Halo(
@@ -68,3 +68,29 @@ def test_glow_taken_off_leaves_the_ghosts():
     left = (view.pixels - glow(view, known))[..., 1]
     raw = view.pixels[..., 1]
     assert np.abs(left - ghosts)[far].mean() < 0.3 * np.abs(raw - ghosts)[far].mean()
+
+
+def test_halo_star_and_veil_are_followed_over_the_constellations():
+    # the lens shades its own star; a large faint ghost brightens the whole picture
+    fading, veil = np.linspace(1.0, 0.3, 14), np.linspace(0.0, 0.6, 14)
+    some = []
+    for k, view in enumerate(shown(star=True)):
+        x, y = offsets(view.light_px, SIZE, 1.0)
+        light = fading[k] * (halo_radiance(HALO, x, y) + 0.8 * star_radiance(STAR, x, y)) + veil[k] * np.array(
+            [1, 2, 1]
+        )
+        noise = np.random.default_rng(k).normal(0.0, 0.02, light.shape)
+        # an unknown ghost is not the halo's
+        light[20:50, 60:90] += 3.0
+        some.append(view.showing((light + noise).astype(np.float32)))
+    masks = [np.hypot(*offsets(view.light_px, SIZE, 1.0)) > 14.0 for view in some]
+    halo, star = followed(some, [view.pixels for view in some], masks, HALO, STAR)
+    for k, view in enumerate(some[1:-1], 1):
+        x, y = offsets(view.light_px, SIZE, 1.0)
+        got = halo_at(halo, view.constellation_deg, x, y) + star_at(star, view.constellation_deg, x, y)
+        known = masks[k].copy()
+        known[20:50, 60:90] = False
+        off = (got - view.pixels)[known]
+        assert abs(float(np.mean(off))) < 0.01
+        assert float(np.sqrt(np.mean(off**2))) < 0.04
+    assert np.array([part for _, part in star.strength])[1:-1] == pytest.approx(0.8 * fading[1:-1], abs=0.06)

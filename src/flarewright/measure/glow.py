@@ -46,3 +46,25 @@ def star_radiance(star: Star, x: Floats, y: Floats) -> Floats:
     # the nearest spike only: beside it, a spike's own circle is farther than the next one's
     ridge = np.exp(-0.5 * (radius * np.sin(off) / star.width_px) ** 2)
     return np.asarray(ridge[..., None] * _law(radius, star.radius_px, star.radiance))
+
+
+def strength_at(strength: tuple[tuple[float, float], ...], constellation_deg: float) -> float:
+    """Return how much of a halo or star there is at a constellation."""
+    if not strength:
+        return 1.0
+    angles, parts = zip(*strength, strict=True)
+    return float(np.interp(constellation_deg, angles, parts))
+
+
+def halo_at(halo: Halo, constellation_deg: float, x: Floats, y: Floats) -> Floats:
+    """Return the halo's radiance at a constellation and at offsets from the light, shape (..., 3)."""
+    light = strength_at(halo.strength, constellation_deg) * halo_radiance(halo, x, y)
+    if halo.even:
+        angles, levels = zip(*halo.even, strict=True)
+        light = light + [np.interp(constellation_deg, angles, [level[m] for level in levels]) for m in range(3)]
+    return np.asarray(light)
+
+
+def star_at(star: Star, constellation_deg: float, x: Floats, y: Floats) -> Floats:
+    """Return the star's radiance at a constellation and at offsets from the light, shape (..., 3)."""
+    return strength_at(star.strength, constellation_deg) * star_radiance(star, x, y)

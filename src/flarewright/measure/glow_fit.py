@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..model.ghost_model import Halo, Rgb3, Star
+from .glow import halo_radiance, offsets, star_radiance
 from .numbers import Floats
 from .views import Pixels, View, halved
 
@@ -23,6 +24,9 @@ _RINGS = 20
 _DIRECTIONS = 1440
 _SPIKY = 1.25
 _MOST_SPIKES = 48
+# how strong halo and star are is learned from about so many pixels of a view, in so many rounds; the part of them that
+# their laws may miss
+_SAMPLES, _ROUNDS, _GLOW_ERROR = 8000, 12, 0.1
 
 
 @dataclass(frozen=True)
@@ -128,6 +132,81 @@ def fit_halo(views: Sequence[View], pixels: Sequence[Pixels], low: float = LOW) 
 
 def _rgb(level: NDArray[np.floating]) -> Rgb3:
     return max(float(level[0]), 0.0), max(float(level[1]), 0.0), max(float(level[2]), 0.0)
+
+
+def followed(
+    views: Sequence[View], pixels: Sequence[Pixels], masks: Sequence[NDArray[np.bool_]], halo: Halo | None,
+    star: Star | None,
+) -> tuple[Halo | None, Star | None]:  # fmt: skip
+    """Return halo and star with how strong they are at each constellation.
+
+    Parameters
+    ----------
+    views : sequence of View
+        By rising constellation.
+    pixels : sequence of ndarray, shape (H, W, 3)
+        What they show beside the ghosts; not a number where nothing was measured.
+    masks : sequence of ndarray of bool, shape (H, W)
+        Where to look.
+    halo, star : Halo or None, Star or None
+
+    Returns
+    -------
+    halo, star
+
+    Notes
+    -----
+    Least squares in every view, light that is missed (ghosts not known) counting less and less. The rims of a lens
+    shade the light's image as the constellation grows, and so all that spreads from it.
+    """
+    parts = np.ones((len(views), 5))
+    for k, (view, picture, mask) in enumerate(zip(views, pixels, masks, strict=True)):
+        x, y = offsets(view.light_px, view.size_px, 1.0)
+        shapes = np.zeros((*picture.shape, 5))
+        if halo is not None:
+            shapes[..., 0] = halo_radiance(halo, x, y)
+        if star is not None:
+            shapes[..., 1] = star_radiance(star, x, y)
+        for m in range(3):
+            shapes[..., m, 2 + m] = 1.0
+        known = np.isfinite(picture) & mask[..., None]
+        every = max(1, int(np.sqrt(np.count_nonzero(known) / _SAMPLES)))
+        spots = np.zeros(known.shape, bool)
+        spots[::every, ::every] = known[::every, ::every]
+        parts[k] = _strengths(shapes[spots], picture[spots].astype(float), view.variance[spots].astype(float))
+    padded = np.concatenate([parts[:1], parts, parts[-1:]])
+    smooth = np.median(np.stack([padded[:-2], padded[1:-1], padded[2:]]), axis=0)
+    told = [(view.constellation_deg, *map(float, row)) for view, row in zip(views, smooth, strict=True)]
+    return (
+        None if halo is None else halo.model_copy(update={
+            "strength": tuple((row[0], row[1]) for row in told), "even": tuple((row[0], row[3:6]) for row in told),
+        }),
+        None if star is None else star.model_copy(update={"strength": tuple((row[0], row[2]) for row in told)}),
+    )  # fmt: skip
+
+
+def _strengths(basis: Floats, seen: Floats, variance: Floats) -> Floats:
+    """Return factors at least 0 by weighted least squares, outliers counting less."""
+    scale = basis.max(axis=0, initial=0.0)
+    free = scale > 0.0
+    parts = np.where(free, 1.0, 0.0) * (np.arange(scale.size) < 2)
+    for _ in range(_ROUNDS):
+        model = basis @ parts
+        # equal parts of the light count alike
+        spread = np.sqrt(variance + (_GLOW_ERROR * np.maximum(model, seen)) ** 2)
+        weight = 1.0 / (spread**2 * (1.0 + ((seen - model) / (2.0 * spread)) ** 2))
+        picked = free.copy()
+        while picked.any():
+            part = basis[:, picked] / scale[picked]
+            solved = np.linalg.lstsq((part.T * weight) @ part, (part.T * weight) @ seen, rcond=1e-9)[0] / scale[picked]
+            if (solved >= 0.0).all():
+                break
+            # what would take light away is left out
+            picked[np.flatnonzero(picked)[int(np.argmin(solved * scale[picked]))]] = False
+        parts = np.zeros(scale.size)
+        if picked.any():
+            parts[picked] = solved
+    return parts
 
 
 def fit_star(known: Registered) -> Star | None:

@@ -17,7 +17,7 @@ from ..model.ghost_model import AberrationGhost, BezierGhost, Curves, GhostModel
 from ..model.layer import Layer
 from ..render.compose import beauty
 from .curves import pose_at, posed
-from .glow import halo_radiance, offsets, star_radiance
+from .glow import halo_at, offsets, star_at
 from .numbers import NUMBERS, bezier_numbers, channel_numbers, field, frame, visible
 
 Floats = NDArray[np.float64]
@@ -94,9 +94,11 @@ def replay(
     at = light_px(model, constellation_deg, roll_deg)
     x, y = offsets((at[0] * scale, at[1] * scale + top), size, scale)
     if model.star is not None:
-        layers.append(Layer("starburst", (gain * star_radiance(model.star, x, y)).astype(np.float32), (0, 0, *size)))
+        light = gain * star_at(model.star, constellation_deg, x, y)
+        layers.append(Layer("starburst", light.astype(np.float32), (0, 0, *size)))
     if model.halo is not None:
-        layers.append(Layer("halo", (gain * halo_radiance(model.halo, x, y)).astype(np.float32), (0, 0, *size)))
+        light = gain * halo_at(model.halo, constellation_deg, x, y)
+        layers.append(Layer("halo", light.astype(np.float32), (0, 0, *size)))
     whole = beauty(layers, size)
     singles = _single(model, constellation_deg, roll_deg, size, gain) if single else []
     drawn = (whole, *layers, *singles)

@@ -21,8 +21,8 @@ from .find import Candidate
 from .fit import Shape, render
 from .found import Found
 from .fragments import joined
-from .glow import halo_radiance, offsets, star_radiance
-from .glow_fit import fit_halo, fit_star, glow, register
+from .glow import halo_at, offsets, star_at
+from .glow_fit import fit_halo, fit_star, followed, glow, register
 from .joint import lit
 from .journal import Journal
 from .numbers import channel_numbers
@@ -237,14 +237,19 @@ def fit_ghosts(
         settled = settle(found, dim.views, how=settling, pool=pool, tell=tell, progress=next(parts), journal=journal)
         for _ in range(again):
             # the quantile held ghosts too; with them known, the glow is better known and leaves more to be found
-            bare = fit_halo(views, [without(settled, view, k) for k, view in enumerate(views)])
-            dim = replace(dim, halo=bare, views=beside(views, bare, dim.star))
+            dim = _dimmed_anew(dim, views, settled)
             settled += _more(settled, dim.views, most - len(settled), pool, tell, next(parts), journal)
             settled = settle(
                 settled, dim.views, how=settling, pool=pool, tell=tell, progress=next(parts), journal=journal
             )
-    dim = replace(dim, halo=fit_halo(views, [without(settled, view, k) for k, view in enumerate(views)]))
-    return _model(run, to_model(settled, views), dim, views)
+    return _model(run, to_model(settled, views), _dimmed_anew(dim, views, settled), views)
+
+
+def _dimmed_anew(dim: Dimmed, views: Sequence[View], ghosts: Sequence[Found]) -> Dimmed:
+    """Learn halo and star anew from what is left beside the ghosts, and take these off the views."""
+    left = [without(ghosts, view, k) for k, view in enumerate(views)]
+    halo, star = followed(views, left, masks_of(views), fit_halo(views, left), dim.star)
+    return Dimmed(beside(views, halo, star), halo, star)
 
 
 def _parts(count: int, progress: Progress) -> list[Progress]:
@@ -259,9 +264,9 @@ def beside(views: Sequence[View], halo: Halo | None, star: Star | None) -> list[
         x, y = offsets(view.light_px, view.size_px, 1.0)
         light = np.zeros(view.pixels.shape, np.float32)
         if halo is not None:
-            light += halo_radiance(halo, x, y).astype(np.float32)
+            light += halo_at(halo, view.constellation_deg, x, y).astype(np.float32)
         if star is not None:
-            light += star_radiance(star, x, y).astype(np.float32)
+            light += star_at(star, view.constellation_deg, x, y).astype(np.float32)
         variance = np.where(mask[..., None], view.variance + (LEFT_BEHIND * light) ** 2, np.inf).astype(np.float32)
         out.append(replace(view, pixels=view.pixels - light, variance=variance))
     return out

@@ -157,10 +157,17 @@ class Halo(Frozen):
         Rising distances from the light's image.
     radiance : tuple of Rgb
         At those distances; in between the logarithms are interpolated, beyond the last it is 0.
+    strength : tuple of (float, float)
+        Rising constellations, degrees, and how much of the halo there is; linear between them; empty: 1 throughout.
+    even : tuple of (float, Rgb)
+        Rising constellations, degrees, and radiance that is the same in the whole picture: veil, and ghosts too large
+        and faint to be told apart; linear between them; empty: none.
     """
 
     radius_px: tuple[float, ...] = Field(min_length=2)
     radiance: tuple[Rgb3, ...]
+    strength: tuple[tuple[float, float], ...] = ()
+    even: tuple[tuple[float, Rgb3], ...] = ()
 
     @model_validator(mode="after")
     def _rising(self) -> Halo:
@@ -186,6 +193,8 @@ class Star(Frozen):
         Rising distances from the light's image.
     radiance : tuple of Rgb
         On a spike's ridge at those distances, as in `Halo`.
+    strength : tuple of (float, float)
+        As in `Halo`: the lens' rims shade the light's image, and with it the star.
     """
 
     spikes: int = Field(ge=2, le=72)
@@ -193,6 +202,7 @@ class Star(Frozen):
     width_px: float = Field(gt=0.0)
     radius_px: tuple[float, ...] = Field(min_length=2)
     radiance: tuple[Rgb3, ...]
+    strength: tuple[tuple[float, float], ...] = ()
 
 
 class Reference(Frozen):
