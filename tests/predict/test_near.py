@@ -88,12 +88,13 @@ def test_a_scene_with_a_near_lamp_draws_it_near_and_one_in_the_lens_is_told(tmp_
 
 
 def test_between_samples_decades_are_divided_evenly():
-    a, b = np.array([1.0, 1.0, 4.0, 0.0, 1e-3]), np.array([1e-4, 1.0, 1.0, 2.0, 1e-3])
-    np.testing.assert_allclose(between(a, b, 0.5), [1e-2, 1.0, 2.0, 1.0, 1e-3])
+    # a decade and more, nothing, a factor of four, from darkness, a cliff
+    a, b = np.array([1.0, 1.0, 4.0, 0.0, 1.0]), np.array([0.04, 1.0, 1.0, 2.0, 1e-3])
+    np.testing.assert_allclose(between(a, b, 0.5), [0.2, 1.0, 2.0, 1.0, 0.5005])
     curves = Curves(np.array([0.0, 10.0]), np.stack([a, b]), 0.0, 0.0)
-    assert curves.at(5.0).sum_mm2 == pytest.approx(1e-2)
+    assert curves.at(5.0).sum_mm2 == pytest.approx(0.2)
     assert curves.at(-1.0).sum_mm2 == 1.0
-    assert curves.at(99.0).sum_mm2 == pytest.approx(1e-4)
+    assert curves.at(99.0).sum_mm2 == pytest.approx(0.04)
 
 
 def test_a_tail_that_falls_by_decades_is_met_between_few_samples():

@@ -20,6 +20,8 @@ Progress = Callable[[float, str], None]
 FIRST, LEAST_DEG = 13, 0.2
 # what is fainter than this part of a curve's maximum need not be followed closely
 FAINT = 1e-3
+# a factor between neighbouring samples that no slope has
+CLIFF = 30.0
 
 __all__ = ["Check", "Curves", "bins_of", "check_curves", "sample_curves"]
 
@@ -80,7 +82,7 @@ class Check:
 
 
 def between(a: Floats, b: Floats, part: float) -> Floats:
-    """Interpolate statistics: straight lines of their logarithms, and of themselves where one of them is 0.
+    """Interpolate statistics: straight lines of their logarithms, and of themselves at cliffs.
 
     Parameters
     ----------
@@ -90,11 +92,12 @@ def between(a: Floats, b: Floats, part: float) -> Floats:
 
     Notes
     -----
-    Towards the edge of the field flare falls by decades, where straight lines of the values lie far too high.
+    Towards the edge of the field flare falls by decades, where straight lines of the values lie too high. Where it
+    falls more than `CLIFF` times from one sample to the next, a ghost has left the frame, and nobody knows where.
     """
-    positive = (a > 0.0) & (b > 0.0)
-    logs = np.log(np.where(positive, a, 1.0)) * (1.0 - part) + np.log(np.where(positive, b, 1.0)) * part
-    return np.asarray(np.where(positive, np.exp(logs), a * (1.0 - part) + b * part))
+    slope = np.maximum(a, b) < CLIFF * np.minimum(a, b)
+    logs = np.log(np.where(slope, a, 1.0)) * (1.0 - part) + np.log(np.where(slope, b, 1.0)) * part
+    return np.asarray(np.where(slope, np.exp(logs), a * (1.0 - part) + b * part))
 
 
 def sample_curves(
