@@ -1,6 +1,7 @@
 """The proof of the measurement, as a table.
 
     python -m benchmarks.measure LENS ... [--width 720] [--merge real|ideal] [--keep FOLDER] [--json FILE]
+    python -m benchmarks.measure --speed
 
 A synthetic camera (`tests/measure/synthetic_camera.py`) photographs each lens at the even ones of 100 constellations;
 the model is found and fitted from those alone, and judged at the odd ones against the noise-free truth, outside 40 (of
@@ -18,6 +19,7 @@ from typing import Any
 
 from benchmarks.measure.judge import judge
 from benchmarks.measure.shoot import setup_of, shoot
+from benchmarks.measure.speed import replay_speed
 
 from flarewright.io.captures import read_camera, read_captures
 from flarewright.io.ghost_model_file import write_ghost_model
@@ -54,7 +56,8 @@ def prove(lens: str, folder: Path, given: argparse.Namespace) -> dict[str, Any]:
 def main() -> None:
     """Judge lenses and print their scores."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.measure", description=__doc__)
-    parser.add_argument("lens", nargs="+")
+    parser.add_argument("lens", nargs="*")
+    parser.add_argument("--speed", action="store_true", help="how fast a model replays")
     parser.add_argument("--width", type=int, default=720)
     parser.add_argument("--count", type=int, default=100, help="constellations, both kinds")
     parser.add_argument("--f-number", type=float, default=5.6)
@@ -62,7 +65,9 @@ def main() -> None:
     parser.add_argument("--keep", type=Path, help="a folder for photographs and models, taken up again")
     parser.add_argument("--json", type=Path, help="also write the scores here")
     given = parser.parse_args()
-    rows = []
+    rows = [replay_speed()] if given.speed else []
+    for row in rows:
+        print(json.dumps(row), flush=True)
     with tempfile.TemporaryDirectory() as made:
         for lens in given.lens:
             folder = (given.keep or Path(made)) / f"{lens}-{given.width}-{given.f_number:g}"

@@ -60,6 +60,7 @@ class Setup:
     zoom: float | None = None
     quality: str = "draft"
     wavelengths: int = 3
+    tolerance_px: float = 0.25  # of the renderer's grid of rays
     roll_deg: float = 0.0
     exposures_s: tuple[float, ...] = (1 / 512, 1 / 32, 2.0)
     iso: float = 100.0
@@ -170,7 +171,7 @@ def project_of(setup: Setup, pose: Pose, layers: str) -> fw.Project:
         lens=setup.lens, f_number=setup.f_number, zoom=setup.zoom,
         lights=(fw.Light(field_deg=pose.field_deg, diameter_deg=setup.light_diameter_deg),),
         camera=fw.Camera(size_px=big, sensor_mm=(big[0] * pixel, big[1] * pixel)),
-        quality=fw.Quality(mode=setup.quality, wavelengths=setup.wavelengths),
+        quality=fw.Quality(mode=setup.quality, wavelengths=setup.wavelengths, tolerance_px=setup.tolerance_px),
         output=fw.Output(layers=layers, starburst=layers != "ghosts"), **iris, **coating,
     )  # fmt: skip
 

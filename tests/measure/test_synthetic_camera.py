@@ -66,3 +66,13 @@ def test_a_perfect_table_turns_as_told_and_an_ideal_frame_is_the_truth(scene):
     z = ((frame.radiance - truth.total) / np.sqrt(frame.variance))[frame.valid]
     assert z.std() == pytest.approx(1.0, abs=0.03)
     assert frame.valid.mean() > 0.9
+
+
+def test_truth_is_the_same_at_two_densities_of_rays():
+    coarse = replace(SMALL, lens="flektogon-35", quality="final", size_px=(180, 120), f_number=5.6)
+    fine = replace(coarse, tolerance_px=0.06)
+    pose, scale = poses(coarse)[1], scale_of(coarse)
+    one, other = (truth_of(setup, pose, scale).ghosts.astype(np.float64) for setup in (coarse, fine))
+    assert not np.array_equal(one, other)
+    assert np.sqrt(np.mean((one - other) ** 2) / np.mean(other**2)) < 0.01
+    assert one.sum() == pytest.approx(other.sum(), rel=2e-3)

@@ -1,0 +1,52 @@
+"""How fast a measured flare replays: a hundred planted ghosts of all sizes, in colour, one core."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+import numpy as np
+
+from flarewright.measure.numbers import NUMBERS, channel_of
+from flarewright.measure.replay import draw_packed, pack
+from flarewright.model.ghost_model import AberrationGhost, GhostModel
+
+SIZE = (960, 540)
+_ANGLES = (4.0, 10.0, 18.0, 25.0)
+
+
+def planted(count: int = 100, seed: int = 0) -> GhostModel:
+    """Return a model of ghosts of radius 10 to 140 pixels, a little aberrated, with no, one or two rims."""
+    rng = np.random.default_rng(seed)
+    ghosts = []
+    for k in range(count):
+        numbers = np.zeros(NUMBERS)
+        size = float(np.exp(rng.uniform(np.log(10.0), np.log(140.0))))
+        numbers[:4] = rng.uniform(-500.0, 500.0), 0.05 * size, -0.05 * size, 20.0 * rng.normal()
+        numbers[10:14] = size, 0.08 * size * rng.normal(), 0.05 * size, -0.05 * size
+        numbers[20:23] = size**2 * np.array([1.0, 0.2 * rng.normal(), 0.05])
+        numbers[30:36] = 0.8, 0.0, 1.2, -1.2, 0.0, 1.5
+        discs = k % 3
+        numbers[30 + 3 * discs :] = 0.0
+        channel = channel_of(numbers, discs)
+        ghosts.append(AberrationGhost(name=str(k), red=channel, green=channel, blue=channel, visible_deg=(0.0, 30.0)))
+    return GhostModel(
+        size_px=SIZE, axis_px=(480.0, 270.0), focal_px=900.0, largest_deg=28.0, constellation_deg=(0.0, 28.0),
+        ghosts=tuple(ghosts),
+    )  # fmt: skip
+
+
+def replay_speed(repeat: int = 5) -> dict[str, Any]:
+    """Return ghosts in colour a second of CPU time: the median over the constellations of the best of some runs."""
+    model = planted()
+    packed = pack(model)
+    rates = []
+    for angle in _ANGLES:
+        draw_packed(packed, model, angle, 10.0, SIZE)
+        best = float("inf")
+        for _ in range(repeat):
+            start = time.process_time()
+            draw_packed(packed, model, angle, 10.0, SIZE)
+            best = min(best, time.process_time() - start)
+        rates.append(len(model.ghosts) / best)
+    return {"replay, ghosts a second and core": round(float(np.median(rates))), "by angle": [round(x) for x in rates]}
