@@ -334,7 +334,8 @@ export async function importFile(file, as = '', light = null) {
   const answer = await app.ask(`/api/import?name=${encodeURIComponent(file.name)}${as ? `&as=${as}` : ''}${light === null ? '' : `&light=${light}`}`, file);
   if (!answer) return;
   toast(`Opened ${file.name}`, 'good');
-  if (answer.told?.length) dialog(`${file.name}: what was noticed`, h('ul', { class: 'remarks' }, ...answer.told.map((words) => h('li', {}, sentence(words)))));
+  // beside the picture, for it must stop nobody
+  if (answer.told?.length) toast(h('ul', { class: 'remarks' }, ...answer.told.map((words) => h('li', {}, sentence(words)))), 'info', 20000);
 }
 app.importFile = importFile;
 let over = 0;

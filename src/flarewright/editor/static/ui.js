@@ -15,12 +15,12 @@ export function h(tag, attributes = {}, ...children) {
 let strokes = 0;
 export const stroke = () => `s${Date.now().toString(36)}${strokes++}`;
 
-export function toast(text, kind = 'info') {
-  const box = h('div', { class: `toast ${kind}` }, text);
+export function toast(text, kind = 'info', lasting = kind === 'error' ? 9000 : 4500) {
+  const box = h('div', { class: `toast ${kind}`, onclick: () => box.remove() }, text);
   const shelf = document.getElementById('toasts');
   shelf.append(box);
   while (shelf.children.length > 4) shelf.firstChild.remove();
-  setTimeout(() => box.remove(), kind === 'error' ? 9000 : 4500);
+  setTimeout(() => box.remove(), lasting);
 }
 
 export function number(text) {
