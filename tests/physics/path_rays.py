@@ -17,7 +17,9 @@ from flarewright.render.montecarlo import spectrum_of
 from flarewright.render.shot import Shot
 
 # cells of the front a side; where fewer than so many are known, they are divided into so many a side
-CELLS, FEW, FINER = 128, 200, 4
+CELLS, FEW, FINER, FINEST = 128, 200, 4, 2048
+# rays through a cell beside one that light passes
+NEARER = 6
 # points of a batch in cells that the path is known to pass; and a side, one in each, in all others
 POINTS, COARSE = 12_000, 64
 
@@ -93,7 +95,7 @@ def path_flux(shot: Shot, j: int, i: int, batches: int, seed: int = 0) -> tuple[
     known = _passed(light_at, low, size, np.ones((CELLS, CELLS), dtype=bool), rng)
     if not known.any():
         known = _passed(light_at, low, size, np.ones((FINER * CELLS, FINER * CELLS), dtype=bool), rng)
-    elif known.sum() < FEW:
+    while 0 < known.sum() < FEW and len(known) < FINEST:
         # so little of the front that smaller cells fit it better
         known = _passed(light_at, low, size, np.kron(known, np.ones((FINER, FINER), dtype=bool)), rng)
     side = len(known)
@@ -112,9 +114,22 @@ def path_flux(shot: Shot, j: int, i: int, batches: int, seed: int = 0) -> tuple[
 
 
 def _passed(light_at, low, size, where, rng):
-    """Find those of some cells of the front through which light comes, and their neighbours, shape (side, side)."""
-    cells, side = np.argwhere(where), len(where)
-    met = np.zeros((side + 2, side + 2), dtype=bool)
-    met[tuple(cells.T + 1)] = light_at(low + (cells + rng.random(cells.shape)) / side * size) > 0.0
-    near = [np.roll(met, (a, b), (0, 1)) for a in (-1, 0, 1) for b in (-1, 0, 1)]
-    return np.logical_or.reduce(near)[1:-1, 1:-1]
+    """Find those of some cells of the front through which light comes, and their neighbours, shape (side, side).
+
+    What is found is followed outwards until all around it is dark: a spot of a few cells that one ray a cell half
+    misses would otherwise be known in part only, and nothing would tell so.
+    """
+    side = len(where)
+    met, tried, wanted = (np.zeros((side, side), dtype=bool) for _ in range(3))
+    wanted |= where
+    rays = 1
+    while wanted.any():
+        cells = np.argwhere(wanted)
+        places = (cells[:, None] + rng.random((len(cells), rays, 2))).reshape(-1, 2)
+        met[tuple(cells.T)] |= (light_at(low + places / side * size).reshape(-1, rays) > 0.0).any(axis=1)
+        tried |= wanted if rays > 1 else met
+        near = np.zeros((side + 2, side + 2), dtype=bool)
+        near[1:-1, 1:-1] = met
+        near = np.logical_or.reduce([np.roll(near, (a, b), (0, 1)) for a in (-1, 0, 1) for b in (-1, 0, 1)])[1:-1, 1:-1]
+        wanted, rays = near & ~tried, NEARER
+    return near

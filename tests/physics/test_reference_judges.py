@@ -227,7 +227,7 @@ def test_rays_of_one_path_are_the_references():
 def test_every_path_agrees(lens, stopped):
     """Every path above 1e-4 of the ghost light in the picture: within half a percent, apart from chance.
 
-    Not the zooms: 351 paths and more take minutes.
+    Not the zooms, whose 351 paths and more take minutes: docs/reference.md tells what they gave.
     """
     widest = load_lens(lens).f_number
     f_number = (4.0 if widest < 2.0 else 2.8) * widest if stopped else None
