@@ -19,7 +19,7 @@ SAMPLE = 48
 # a wavelength that carries less than this part of the brightest cannot stand for its neighbours
 LEAST_PART = 0.1
 # nor can it where more of its rays than this part are not seen at the other
-MOST_UNLIKE = 0.1
+MOST_UNLIKE = 0.25
 
 __all__ = ["gathered_weights"]
 
@@ -60,10 +60,12 @@ def gathered_weights(
     the spectrum, times what it passes in comparison with them: coatings reflect by wavelength, and a ghost keeps its
     flux in each. The comparison is the mean over the same rays, spread over the bundle.
     """
+    count = len(weights)
+    if len(shown) == count:
+        return weights
     where = spread_rays(bundle, shown, seen, SAMPLE)
     if where.size == 0 or not _seen_alike(packed, bundle, tilt, shown, seen):
         return None
-    count = len(weights)
     flux = np.empty(count)
     for w in range(count):
         held = bundle.traced.get(w)
@@ -86,10 +88,8 @@ def _seen_alike(
     for end, near in ((0, shown[0]), (last, shown[-1])):
         if end == near:
             continue
-        there, here = (
-            seen(trace_points(packed, end, bundle.path, tilt, bundle.pupil[where])),
-            seen(bundle.traced[near][where]),
-        )
+        here = seen(bundle.traced[near][where])
+        there = seen(trace_points(packed, end, bundle.path, tilt, bundle.pupil[where]))
         if (there != here).sum() > MOST_UNLIKE * max(here.sum(), 1):
             return False
     return True
