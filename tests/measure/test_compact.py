@@ -1,5 +1,7 @@
 """A model made small keeps what foretells left-out constellations, and gets curves only where they are needed."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from planted_run import LARGEST, SIZE, shape, views
@@ -7,13 +9,16 @@ from scipy.interpolate import CubicSpline
 from test_track import ANGLES, drawn, thrice
 
 from flarewright.io.ghost_model_file import read_ghost_model, write_ghost_model
-from flarewright.measure.compact import compact, numbers_in, rounded
-from flarewright.measure.curves import Pose, spline_basis, value_at
-from flarewright.measure.fit import evaluate, free_numbers, patches_of, refine
+from flarewright.measure.compact import compact, curves_of, numbers_in, rounded
+from flarewright.measure.curves import Pose, posed, spline_basis, value_at
+from flarewright.measure.fit import evaluate, free_numbers, patches_of, refine, render
+from flarewright.measure.found import Found
 from flarewright.measure.numbers import channel_of
 from flarewright.measure.orders import needed_numbers, parabola
 from flarewright.measure.replay import replay
 from flarewright.measure.smooth import smooth_curve
+from flarewright.measure.stages import enlarged
+from flarewright.measure.together import halvings
 from flarewright.measure.track import follow
 from flarewright.model.ghost_model import AberrationGhost, Curves, GhostModel
 
@@ -126,3 +131,17 @@ def test_numbers_are_written_as_exactly_as_they_are_known():
     assert rounded(123.456789, 2.0) == 123.5
     assert rounded(0.00123456, 1e-4) == 0.001235
     assert rounded(1.0 / 3.0, 0.0) == 0.333333333
+
+
+def test_wide_pictures_are_asked_in_small_and_shifts_told_in_full_pixels():
+    assert [halvings(width) for width in (240, 241, 480, 720)] == [0, 1, 1, 2]
+    ghost = enlarged(shape(-50.0, 20.0, 1.0), 2.0)
+    pose = Pose(1.3, 4.0, 1.0)
+    seen = []
+    for view in views((), angles=ANGLES[3::3], size=(2 * SIZE[0], 2 * SIZE[1])):
+        light = render(replace(ghost, numbers=posed(ghost.numbers, view.sigma, pose)), view)
+        seen.append(view.showing(np.repeat(light[..., None], 3, axis=2).astype(np.float32)))
+    found = Found((ghost, ghost, ghost), 0, len(seen) - 1)
+    (curves,) = curves_of([found], [(0.0, LARGEST)], seen, lambda *_: None)
+    assert value_at(curves.along_px, 12.0, (0.0, LARGEST)) == pytest.approx(4.0, abs=0.05)
+    assert value_at(curves.brightness, 12.0, (0.0, LARGEST)) == pytest.approx(1.3, abs=0.01)

@@ -19,7 +19,8 @@ from .found import CHANNELS, Found, alone, by_light, exchange, rest_of
 from .numbers import channel_numbers, channel_of
 from .orders import needed_numbers, parabola
 from .smooth import smooth_curve
-from .together import measure_together
+from .stages import coarse, enlarged
+from .together import Shapes, halvings, measure_together
 from .views import Pixels, View
 
 Tell = Callable[[float, str], None]
@@ -189,18 +190,27 @@ def curves_of(
     list of Curves
     """
     said: list[list[_Said]] = [[] for _ in ghosts]
-    for k, view in enumerate(views):
+    times = halvings(views[0].size_px[0])
+    factor = 2.0**times
+    shapes = [_sized(ghost, 1.0 / factor) for ghost in ghosts]
+    for k, full in enumerate(views):
+        view = coarse(full, times)
         there = [g for g, span in enumerate(spans) if span[0] <= view.constellation_deg <= span[1]]
-        here = measure_together([ghosts[g].shapes for g in there], [Pose()] * len(there), view)
+        here = measure_together([shapes[g] for g in there], [Pose()] * len(there), view)
         for g, pose, error, inside in zip(there, here.poses, here.error, here.inside, strict=True):
             if inside > 0.0 and isfinite(error[0]):
-                values = (pose.brightness, pose.along_px, pose.size)
+                values = (pose.brightness, factor * pose.along_px, pose.size)
                 # a ghost too faint to be seen has no place
                 placed = pose.brightness > 0.35
-                told = (error[0], error[1] if placed else np.inf, error[2] if placed else np.inf)
+                told = (error[0], factor * error[1] if placed else np.inf, error[2] if placed else np.inf)
                 said[g].append(_Said(view.constellation_deg, values, told))
         tell((k + 1) / len(views), f"{view.constellation_deg:.1f} degrees")
     return [_curves(each, ghost, span) for each, ghost, span in zip(said, ghosts, spans, strict=True)]
+
+
+def _sized(ghost: Found, factor: float) -> Shapes:
+    red, green, blue = (enlarged(shape, factor) for shape in ghost.shapes)
+    return red, green, blue
 
 
 def _curves(said: Sequence[_Said], ghost: Found, span: tuple[float, float]) -> Curves:

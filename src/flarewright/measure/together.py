@@ -19,6 +19,8 @@ from .views import View
 
 Shapes = tuple[Shape, Shape, Shape]
 
+# ghosts are measured together in pictures halved until they are no wider: three numbers a ghost need no more
+WIDTH = 240
 # brightness, shift and size of each ghost, then an even background of each colour
 PER_GHOST = 3
 # how far a ghost is looked for from where it is foretold: brightness, shift (of its radius and of the picture), size
@@ -27,6 +29,14 @@ _BRIGHTNESS, _RADII, _WIDTHS, _SIZE = 3.0, 0.3, 0.01, 0.2
 _GAIN = 1e-3
 # the derivatives that make a shift and a change of size
 _FREE = np.array([0, *range(FIRST_G, FIRST_I)], dtype=np.int64)
+
+
+def halvings(width: int) -> int:
+    """Return how often pictures so wide are halved to be measured in."""
+    times = 0
+    while width > WIDTH * 2**times:
+        times += 1
+    return times
 
 
 @dataclass(frozen=True)
@@ -77,7 +87,7 @@ def measure_together(
     view : View
         Halo and star taken off.
     steps : int
-        Of Gauss and Newton, at most.
+        Of Gauss and Newton, at most, before outliers count less and after.
     sure : bool
         What the model may miss counts as noise too.
 
@@ -95,20 +105,22 @@ def measure_together(
     size = PER_GHOST * len(ghosts)
     prior = np.zeros(size + CHANNELS)
     prior[:size] = 1.0 / spread.ravel() ** 2
-    matrix, side, cost, count = _normal(ghosts, poses, view, sure)
-    for _ in range(steps):
-        off = np.array([_difference(e, p) for e, p in zip(expected, poses, strict=True)]).reshape(-1, PER_GHOST)
-        pulled = side.copy()
-        pulled[:size] += prior[:size] * off.ravel()
-        step = np.asarray(np.linalg.solve(matrix + np.diag(prior + 1e-12), pulled)[:size], np.float64)
-        trial = [_stepped(*each) for each in zip(poses, step.reshape(-1, PER_GHOST), spread, strict=True)]
-        there = _normal(ghosts, trial, view, sure)
-        if there[2] > cost:
-            break
-        enough = there[2] > (1.0 - _GAIN) * cost
-        poses, (matrix, side, cost, count) = trial, there
-        if enough:
-            break
+    # a ghost far from where it is foretold looks like an outlier: these count less only near the end
+    for doubting in (False, True) if sure else (False,):
+        matrix, side, cost, count = _normal(ghosts, poses, view, sure, doubting)
+        for _ in range(steps):
+            off = np.array([_difference(e, p) for e, p in zip(expected, poses, strict=True)]).reshape(-1, PER_GHOST)
+            pulled = side.copy()
+            pulled[:size] += prior[:size] * off.ravel()
+            step = np.asarray(np.linalg.solve(matrix + np.diag(prior + 1e-12), pulled)[:size], np.float64)
+            trial = [_stepped(*each) for each in zip(poses, step.reshape(-1, PER_GHOST), spread, strict=True)]
+            there = _normal(ghosts, trial, view, sure, doubting)
+            if there[2] > cost:
+                break
+            enough = there[2] > (1.0 - _GAIN) * cost
+            poses, (matrix, side, cost, count) = trial, there
+            if enough:
+                break
     whole = np.linalg.pinv(matrix + np.diag(prior + 1e-12), hermitian=True)[:size, :size]
     # a view that is missed by more than noise makes all of them less certain
     excess = max(1.0, cost / max(count - size, 1))
@@ -140,7 +152,7 @@ def _stepped(pose: Pose, step: Floats, limit: Floats) -> Pose:
 
 
 def _normal(
-    ghosts: Sequence[Shapes], poses: Sequence[Pose], view: View, sure: bool
+    ghosts: Sequence[Shapes], poses: Sequence[Pose], view: View, sure: bool, doubting: bool
 ) -> tuple[Floats, Floats, float, int]:
     """Return the normal matrix, its right side, the cost of a view, and how many numbers it has."""
     size = PER_GHOST * len(ghosts) + CHANNELS
@@ -157,7 +169,7 @@ def _normal(
         # the even background is best known without ghosts; it is refitted with them below
         left = view.pixels[..., m] - picture
         left = np.where(weight > 0.0, left, 0.0)
-        if sure:
+        if doubting:
             weight = weight / (1.0 + weight * left**2 / OUTLIER**2)
         total += float((weight * left**2).sum())
         count += int(np.count_nonzero(weight))

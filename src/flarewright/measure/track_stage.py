@@ -12,8 +12,8 @@ from ..model.ghost_tracks import Tracks
 from .compact import compact
 from .fit import Shape
 from .numbers import channel_numbers
-from .stages import SEARCH_WIDTH, beside, coarse, enlarged, read_views
-from .together import Shapes
+from .stages import beside, coarse, enlarged, read_views
+from .together import Shapes, halvings
 from .track import follow
 from .views import View
 
@@ -39,7 +39,7 @@ def track_ghosts(
     Returns
     -------
     Tracks
-        Shifts in pixels of the frames, though pictures wider than `SEARCH_WIDTH` are followed at half that.
+        Shifts in pixels of the frames, though wide pictures are followed in smaller ones (`WIDTH`).
 
     Raises
     ------
@@ -47,9 +47,7 @@ def track_ghosts(
         When frames cannot be read or are too few, or a ghost has no aberrations to be followed by.
     """
     views = _views(folder, run, model, every)
-    times = 0
-    while run.size_px[0] > SEARCH_WIDTH * 2**times:
-        times += 1
+    times = halvings(run.size_px[0])
     small = [coarse(view, times) for view in views]
     ghosts = [_shapes(ghost, 0.5**times) for ghost in _checked(model)]
     tracks = follow([ghost.name for ghost in model.ghosts], ghosts, small, tell=tell)
