@@ -9,9 +9,9 @@ from scipy.interpolate import CubicSpline
 from test_track import ANGLES, drawn, thrice
 
 from flarewright.io.ghost_model_file import read_ghost_model, write_ghost_model
-from flarewright.measure.compact import compact, curves_of, numbers_in, rounded
+from flarewright.measure.compact import compact, curves_of, held_error, numbers_in, rounded
 from flarewright.measure.curves import Pose, posed, spline_basis, value_at
-from flarewright.measure.fit import evaluate, free_numbers, patches_of, refine, render
+from flarewright.measure.fit import Shape, evaluate, free_numbers, patches_of, refine, render
 from flarewright.measure.found import Found
 from flarewright.measure.numbers import channel_of
 from flarewright.measure.orders import needed_numbers, parabola
@@ -145,3 +145,14 @@ def test_wide_pictures_are_asked_in_small_and_shifts_told_in_full_pixels():
     (curves,) = curves_of([found], [(0.0, LARGEST)], seen, lambda *_: None)
     assert value_at(curves.along_px, 12.0, (0.0, LARGEST)) == pytest.approx(4.0, abs=0.05)
     assert value_at(curves.brightness, 12.0, (0.0, LARGEST)) == pytest.approx(1.3, abs=0.01)
+
+
+def test_rounding_moves_no_picture_though_numbers_alone_are_vague():
+    """Thirty numbers of which twenty are needed know each other; rounded by their own errors they would not."""
+    _, _, patches, fit, _ = fitted()
+    alone = held_error(fit)
+    assert (alone[fit.free] <= fit.uncertainty[fit.free] * 1.01).all()
+    numbers = [rounded(float(a), float(d)) for a, d in zip(fit.shape.numbers, alone, strict=True)]
+    after = sum(evaluate(Shape(np.array(numbers)), fit.free[:0], patch, True, 0.0)[0] for patch in patches)
+    before = sum(evaluate(fit.shape, fit.free[:0], patch, True, 0.0)[0] for patch in patches)
+    assert after - before < 3.0

@@ -16,7 +16,7 @@ from ..model.ghost_tracks import GhostTrack, Tracks
 from .curves import Pose
 from .fit import MODEL_ERROR, Fit, Indices, Shape, cost_of, free_numbers, patches_of, refine
 from .found import CHANNELS, Found, alone, by_light, exchange, rest_of
-from .numbers import channel_numbers, channel_of
+from .numbers import NUMBERS, Floats, channel_numbers, channel_of
 from .orders import needed_numbers, parabola
 from .smooth import smooth_curve
 from .stages import coarse, enlarged
@@ -29,7 +29,7 @@ Tell = Callable[[float, str], None]
 _VIEWS = 48
 # fewer numbers may cost so much of what the views hold
 _WORSE = 0.002
-# numbers are written to this part of their standard deviation
+# numbers are written to this part of the standard deviation that they have with all others held
 _DIGITS = 0.05
 
 
@@ -65,7 +65,7 @@ def compact(
     Numbers of the fit that do not help to foretell left-out constellations are dropped (`orders`) and the others fitted
     once more, all ghosts against each other. Then every frame is asked again how bright, where and how large each ghost
     is, and what differs becomes a curve, its knots chosen by leaving frames out (`smooth`). At last numbers are rounded
-    to a twentieth of their standard deviation.
+    to a twentieth of the standard deviation that each has with the others held, for together they are known far better.
     """
     lived = {track.name: track for track in tracks.ghosts if track.lives}
     kept = [ghost for ghost in model.ghosts if isinstance(ghost, AberrationGhost) and ghost.name in lived]
@@ -230,13 +230,22 @@ def _written(ghost: AberrationGhost, found: Found, span: tuple[float, float], cu
         deviation = None if fit is None else fit.uncertainty
         numbers = shape.numbers
         if deviation is not None:
-            numbers = np.array([rounded(float(a), float(d)) for a, d in zip(numbers, deviation, strict=True)])
+            numbers = np.array([rounded(float(a), float(d)) for a, d in zip(numbers, held_error(fit), strict=True)])
             deviation = np.array([float(f"{d:.2g}") for d in deviation])
         colours.append(channel_of(numbers, shape.discs, deviation))
     out: AberrationGhost = ghost.replace(
         red=colours[0], green=colours[1], blue=colours[2], curves=curves,
         visible_deg=(round(span[0], 4), round(span[1], 4)),
     )  # fmt: skip
+    return out
+
+
+def held_error(fit: Fit | None) -> Floats:
+    """Return each number's standard deviation with all others held: what rounding one of them may cost."""
+    out = np.zeros(NUMBERS)
+    if fit is not None:
+        known = np.diag(np.linalg.pinv(fit.covariance, hermitian=True))
+        out[fit.free] = np.where(known > 0.0, 1.0 / np.sqrt(np.maximum(known, 1e-300)), 0.0)
     return out
 
 
