@@ -88,11 +88,14 @@ def measure(chrome, lens):
         page.mouse.up()
         tab.rest()
         final = tab.js("flarewright.view.stats.final")
+        # what is quickly drawn needs no traced picture in between
+        soon = tab.js("flarewright.view.stats.soon ?? null")
+        soon_told = "" if soon is None else f"traced in three colours {soon:.0f} ms and "
         print(
             f"{lens or 'sample'}: {count / (now - begun_at):.0f} frames/s of {width} px, latency "
             f"{median(stats['latency']):.0f} ms (9 of 10 below {median(stats['latency'], 0.9):.0f}), processor time a "
-            f"frame {server_ms:.0f} ms in the server, {browser_ms:.0f} ms in the browser, final {final:.0f} ms after "
-            f"letting go, start to first picture {first:.1f} s; load {os.getloadavg()[0]:.0f}"
+            f"frame {server_ms:.0f} ms in the server, {browser_ms:.0f} ms in the browser, {soon_told}final "
+            f"{final:.0f} ms after letting go, start to first picture {first:.1f} s; load {os.getloadavg()[0]:.0f}"
         )
         page.close()
         editor.end()

@@ -91,6 +91,16 @@ def test_a_ghost_alone_is_where_it_is_listed_and_its_outline_is_its_border(seen_
     assert not drawn[..., 3][~line & ~inside & (drawn[..., 3] != 70)].any()
 
 
+def test_a_picture_traced_soon_is_nearly_the_final_one(seen_and_picture):
+    """Nine films and three wavelengths: the coatings' curves tell the colours between these."""
+    _, project = seen_and_picture
+    project = project.replace(quality=Quality(wavelengths=7))
+    soon, final = (studio.take(project, grade, View()) for grade in ("soon", "final"))
+    assert np.abs(soon.ghosts - final.ghosts).sum() < 0.02 * np.abs(final.ghosts).sum()
+    np.testing.assert_array_equal(soon.ghosts.shape, final.ghosts.shape)
+    assert studio.staged(project.replace(quality=Quality(wavelengths=2)), "soon").quality.wavelengths == 2
+
+
 def test_hits_know_clipped_shapes():
     # a ghost like an L: its box is hit in a corner where it has no light
     light = np.zeros((4, 4), np.float32)

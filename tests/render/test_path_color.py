@@ -66,6 +66,15 @@ def test_only_rays_that_pass_are_chosen():
     assert spread_rays(bundle, (0,), lambda rays: rays[:, ALIVE] > 0.0, 40).size == 0
 
 
+def test_a_bundle_without_a_triangle_has_no_rays():
+    """A path that passes less than its grid resolves."""
+    bundle = grid(2)
+    empty = Bundle(bundle.path, bundle.pupil, bundle.triangles[:0], bundle.traced, 1)
+    _, shot = shot_of("tessar-brendel", (8.0, 5.0))
+    assert spread_rays(empty, (0,), seen_of(shot, shot.to_pixels), 12).size == 0
+    assert traced_bend(shot, bundle.path, empty, shot.to_pixels) is None
+
+
 def test_rays_beside_the_picture_are_not_seen():
     _, shot = shot_of("tessar-brendel", (8.0, 5.0))
     rays = np.zeros((3, STOP_X + 2))

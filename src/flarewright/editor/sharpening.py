@@ -18,11 +18,15 @@ if TYPE_CHECKING:
 
 # a lens whose final picture takes less needs no draft in front of it
 SOON_S = 0.35
+# one whose final picture takes more is shown traced at few wavelengths first
+LATE_S = 0.7
 TELL_S = 0.12
 
 
 def sharpen(screen: Screen, project: Project, view: View, check: Check) -> None:
     """Draw a project for the screen: a draft, the final picture, then what lies where in it.
+
+    Between the draft and a final picture that takes long stands one that is traced at few wavelengths.
 
     Parameters
     ----------
@@ -49,6 +53,9 @@ def sharpen(screen: Screen, project: Project, view: View, check: Check) -> None:
             screen.match = replace(screen.match, levels=())
         screen.show(draft)
     if not working:
+        untraced = changed or shown is None or shown.grade not in ("soon", "final")
+        if untraced and screen.final_s > LATE_S and project.quality.wavelengths > studio.SOON_WAVELENGTHS:
+            screen.show(studio.take(project, "soon", view, progress=_progress(screen, "traced picture", check)))
         final = studio.take(project, "final", view, progress=_progress(screen, "final picture", check))
         check()
         screen.final_s = final.seconds

@@ -21,12 +21,14 @@ from ..render.working import working_ghosts
 from .view import View
 
 Floats = NDArray[np.float32]
-Grade = Literal["moving", "draft", "final", "working"]
+Grade = Literal["moving", "draft", "soon", "final", "working"]
 Levels = tuple[tuple[float, tuple[str, ...]], ...]
 
 # the viewport's picture fits into this
 WIDEST, HIGHEST = 960, 540
 DRAFT_WAVELENGTHS = 3
+# and those of a first traced picture; coatings tell the colours between them
+SOON_WAVELENGTHS = 3
 # gains of a draft's ghosts: their step, the least and the largest
 # (one that a rim hides now may come out as the hand goes on, so it is never dimmed altogether)
 STEP, LEAST, MOST = 2.0**0.25, 2.0**-1.5, 2.0
@@ -40,7 +42,7 @@ class Picture:
     ----------
     project : Project
         That it shows.
-    grade : {"moving", "draft", "final", "working"}
+    grade : {"moving", "draft", "soon", "final", "working"}
     ghosts, rest : ndarray, shape (H, W, 3)
         The ghosts, and everything else: starburst and scatter.
     seconds : float
@@ -74,7 +76,7 @@ def staged(project: Project, grade: Grade, scale: float = 1.0) -> Project:
     Parameters
     ----------
     project : Project
-    grade : {"moving", "draft", "final", "working"}
+    grade : {"moving", "draft", "soon", "final", "working"}
     scale : float
         Of the picture's sides.
 
@@ -86,9 +88,11 @@ def staged(project: Project, grade: Grade, scale: float = 1.0) -> Project:
         project = project.replace(lens=_loaded(project.lens, lens_path(project.lens).stat().st_mtime_ns))
     camera = project.camera.replace(size_px=view_size(project, scale), sensor_mm=project.camera.sensor)
     own = project.quality
-    if grade == "final":
+    if grade in ("soon", "final"):
         # reference quality is for files: it never ends
         quality = own.replace(mode="final") if own.mode != "final" else own
+        if grade == "soon":
+            quality = quality.replace(wavelengths=min(quality.wavelengths, SOON_WAVELENGTHS), bridge=True)
     else:
         quality = Quality(mode="draft", wavelengths=DRAFT_WAVELENGTHS, paths=own.paths)
     output = Output(layers="passes", starburst=project.output.starburst)
@@ -117,7 +121,7 @@ def take(
     Parameters
     ----------
     project : Project
-    grade : {"moving", "draft", "final", "working"}
+    grade : {"moving", "draft", "soon", "final", "working"}
         "working" draws what `look` asks for by `working_ghosts`.
     look : View
     scale : float

@@ -118,7 +118,7 @@ def seen_of(shot: Shot, to_pixels: Floats) -> Callable[[Floats], Bools]:
 
 
 def _passes(rays: Floats, iris_radius: float) -> Bools:
-    at_stop = rays[:, STOP_X:].reshape(len(rays), -1, 2)
+    at_stop = rays[:, STOP_X:].reshape(len(rays), (rays.shape[1] - STOP_X) // 2, 2)
     within = (np.hypot(at_stop[..., 0], at_stop[..., 1]) <= iris_radius).all(axis=1)
     return np.asarray((rays[:, ALIVE] > 0.0) & (rays[:, REL] <= 1.0) & within)
 

@@ -237,7 +237,7 @@ function working(words, part) {
   what.textContent = meter.hidden ? '' : words;
   bar.style.width = `${100 * part}%`;
 }
-const GRADES = { moving: 'moving', draft: 'draft, by matrices', final: 'final, by traced rays', working: 'working view, by matrices' };
+const GRADES = { moving: 'moving', draft: 'draft, by matrices', soon: 'traced rays, three colours', final: 'final, by traced rays', working: 'working view, by matrices' };
 function status() {
   const { picture, frame, camera } = app.state;
   grade.textContent = `${GRADES[picture.grade] ?? ''}${picture.seconds ? ` · ${Math.round(picture.seconds * 1000)} ms` : ''}`;

@@ -208,6 +208,7 @@ export function viewport(canvas, app) {
     self.show(bitmap, fade);
     self.shownGrade = grade;
     self.shownNumber = app.state.picture.number;
+    if (grade === 'soon' && self.released) self.stats.soon = performance.now() - self.released;
     if (grade === 'final' && self.released) { self.stats.final = performance.now() - self.released; self.released = 0; }
   });
   self.refreshTarget = latest(async () => {
