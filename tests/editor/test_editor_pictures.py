@@ -244,6 +244,28 @@ def test_the_screen_keeps_the_last_good_picture(project):
     assert screen.picture.project == lens
 
 
+def test_a_slow_picture_is_traced_in_three_colours_first():
+    session, _ = begin(None)
+    screen = Screen(session)
+    grades = []
+    show = screen.show
+
+    def told(picture):
+        grades.append(picture.grade)
+        show(picture)
+
+    screen.show = told
+    screen.start()
+    assert screen.wait(60.0)
+    for seconds, wanted in ((5.0, ["draft", "soon", "final"]), (0.01, ["final"])):
+        grades.clear()
+        screen.final_s = seconds
+        light = session.project.lights[0].field_deg
+        session.do("move_light", {"light": 0, "x": light[0] + 1.0, "y": light[1]})
+        assert screen.wait(60.0)
+        assert grades == wanted
+
+
 def test_a_hand_is_followed_and_let_go(project):
     session, _ = begin(None)
     screen = Screen(session)

@@ -53,8 +53,7 @@ def sharpen(screen: Screen, project: Project, view: View, check: Check) -> None:
             screen.match = replace(screen.match, levels=())
         screen.show(draft)
     if not working:
-        untraced = changed or shown is None or shown.grade not in ("soon", "final")
-        if untraced and screen.final_s > LATE_S and project.quality.wavelengths > studio.SOON_WAVELENGTHS:
+        if screen.final_s > LATE_S and project.quality.wavelengths > studio.SOON_WAVELENGTHS:
             screen.show(studio.take(project, "soon", view, progress=_progress(screen, "traced picture", check)))
         final = studio.take(project, "final", view, progress=_progress(screen, "final picture", check))
         check()
