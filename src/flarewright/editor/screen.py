@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -38,7 +39,8 @@ class Screen:
         self.number = 0
         # called when all is drawn and measured
         self.idle: Callable[[], None] | None = None
-        self.final_s = 10.0
+        # how long the last final picture took; none has yet
+        self.final_s = math.inf
         self._lane = Lane("pictures")
         self._busy: tuple[Project, View] | None = None
         session.listeners.append(self._heard)

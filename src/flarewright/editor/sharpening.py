@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -18,8 +19,8 @@ if TYPE_CHECKING:
 
 # a lens whose final picture takes less needs no draft in front of it
 SOON_S = 0.35
-# one whose final picture takes more is shown traced at few wavelengths first
-LATE_S = 0.7
+# one whose final picture takes more, for it has many wavelengths, is shown traced at few of them first
+LATE_S = 3.0
 TELL_S = 0.12
 
 
@@ -53,7 +54,7 @@ def sharpen(screen: Screen, project: Project, view: View, check: Check) -> None:
             screen.match = replace(screen.match, levels=())
         screen.show(draft)
     if not working:
-        if screen.final_s > LATE_S and project.quality.wavelengths > studio.SOON_WAVELENGTHS:
+        if LATE_S < screen.final_s < math.inf and project.quality.wavelengths > studio.SOON_WAVELENGTHS:
             screen.show(studio.take(project, "soon", view, progress=_progress(screen, "traced picture", check)))
         final = studio.take(project, "final", view, progress=_progress(screen, "final picture", check))
         check()
