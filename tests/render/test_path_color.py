@@ -110,6 +110,6 @@ def test_the_direct_light_follows_its_films():
     lens = load_lens("tessar-brendel")
     _, shot = shot_of("tessar-brendel", (0.0, 0.0), wavelengths=5)
     nodes = shot.packed.wavelengths_nm
-    flux = direct_flux(shot, lens, np.ones(5), np.array([*nodes, 0.5 * (nodes[1] + nodes[2])]))
+    (flux,) = direct_flux(shot, lens, [np.ones(5)], np.array([*nodes, 0.5 * (nodes[1] + nodes[2])]))
     np.testing.assert_allclose(flux[:-1], 1.0, atol=1e-3)
     assert flux[-1] > 1.003

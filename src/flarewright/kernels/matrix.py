@@ -176,10 +176,7 @@ def mirror_squares(
     squares : ndarray, shape (P, M)
         Filled with the squared sine on the side of the lower index at each mirror of each path.
     """
-    longest = 0
-    for p in range(starts.size - 1):
-        longest = max(longest, starts[p + 1] - starts[p])
-    each = np.empty(longest)
+    each = np.empty(rows.size)
     to_stop = np.empty((MOST_CROSSINGS, 2, 2))
     across = to_stop if curvature_x is None else np.empty((MOST_CROSSINGS, 2, 2))
     for p in range(starts.size - 1):
@@ -246,10 +243,7 @@ def draw_matrix_ghosts(
     height, width = plane.shape[0], plane.shape[1]
     polygon, other = np.zeros((MAX_VERTICES, PSTOP + 6)), np.zeros((MAX_VERTICES, PSTOP + 6))
     values = np.empty(MAX_VERTICES)
-    longest = 0
-    for p in range(starts.size - 1):
-        longest = max(longest, starts[p + 1] - starts[p])
-    squares = np.empty(longest)
+    squares = np.empty(rows.size)
     to_stop = np.empty((MOST_CROSSINGS, 2, 2))
     across = to_stop if curvature_x is None else np.empty((MOST_CROSSINGS, 2, 2))
     rim = _rim(entrance)

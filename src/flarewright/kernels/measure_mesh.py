@@ -131,17 +131,24 @@ def _join(spots, span, densities):
     rings, spokes = densities.shape[0], densities.shape[1]
     for i in range(rings):
         for first in range(0, spokes, span):
-            light, area = 0.0, 0.0
-            for j in range(first, first + span):
-                one, other = _cell_areas(spots, i, j, spokes)
-                light += densities[i, j, 0] * one
-                area += one
-                if i > 0:
-                    light += densities[i, j, 1] * other
-                    area += other
+            light, area = _cell_light(spots, span, densities, i, first)
             densities[i, first : first + span, 0] = light / area
             if i > 0:
                 densities[i, first : first + span, 1] = light / area
+
+
+@inner
+def _cell_light(spots, span, densities, i, first):
+    """Return the light and the signed area of a cell of `span` spokes that begins at one of them."""
+    light, area = 0.0, 0.0
+    for j in range(first, first + span):
+        one, other = _cell_areas(spots, i, j, densities.shape[1])
+        light += densities[i, j, 0] * one
+        area += one
+        if i > 0:
+            light += densities[i, j, 1] * other
+            area += other
+    return light, area
 
 
 @inner
@@ -389,14 +396,7 @@ def _join_changes(spots, spots_by, span, densities, changes):
     rings, spokes = densities.shape[0], densities.shape[1]
     for i in range(rings):
         for first in range(0, spokes, span):
-            light, area = 0.0, 0.0
-            for j in range(first, first + span):
-                one, other = _cell_areas(spots, i, j, spokes)
-                light += densities[i, j, 0] * one
-                area += one
-                if i > 0:
-                    light += densities[i, j, 1] * other
-                    area += other
+            light, area = _cell_light(spots, span, densities, i, first)
             common = light / area
             for q in range(changes.shape[3]):
                 change = 0.0

@@ -118,8 +118,7 @@ def seen_of(shot: Shot, to_pixels: Floats) -> Callable[[Floats], Bools]:
 
 
 def _passes(rays: Floats, iris_radius: float) -> Bools:
-    at_stop = rays[:, STOP_X:].reshape(len(rays), (rays.shape[1] - STOP_X) // 2, 2)
-    within = (np.hypot(at_stop[..., 0], at_stop[..., 1]) <= iris_radius).all(axis=1)
+    within = (np.hypot(rays[:, STOP_X::2], rays[:, STOP_X + 1 :: 2]) <= iris_radius).all(axis=1)
     return np.asarray((rays[:, ALIVE] > 0.0) & (rays[:, REL] <= 1.0) & within)
 
 
@@ -142,22 +141,22 @@ def direct_bend(shot: Shot, lens: Lens) -> Floats | None:
     return bend
 
 
-def direct_flux(shot: Shot, lens: Lens, throughput: Floats, fine_nm: Floats) -> Floats:
-    """Interpolate the direct light's flux between the traced wavelengths.
+def direct_flux(shot: Shot, lens: Lens, throughputs: Sequence[Floats], fine_nm: Floats) -> Floats:
+    """Interpolate the flux of direct lights between the traced wavelengths.
 
     Parameters
     ----------
     shot : Shot
     lens : Lens
-    throughput : ndarray, shape (W,)
+    throughputs : sequence of ndarray, N of shape (W,)
         At the traced wavelengths.
     fine_nm : ndarray, shape (F,)
 
     Returns
     -------
-    ndarray, shape (F,)
+    ndarray, shape (N, F)
     """
-    flux: Floats = np.interp(fine_nm, shot.packed.wavelengths_nm, throughput)
+    flux: Floats = np.array([np.interp(fine_nm, shot.packed.wavelengths_nm, one) for one in throughputs])
     bend = direct_bend(shot, lens)
     return flux if bend is None else flux * np.interp(fine_nm, CURVE_NM, bend)
 

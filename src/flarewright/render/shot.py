@@ -260,17 +260,18 @@ def make_shots(settled: Settled, opening: Opening) -> tuple[Shot, ...]:
     sensor = project.camera.sensor
     to_pixels = np.array([width / 2.0, height / 2.0, width / sensor[0], height / sensor[1]])
     coatings = resolve_coatings(settled.lens, settled.coating)
-    bridged = project.quality.bridge and project.quality.mode != "reference"
+    quality = project.quality
+    bridged = quality.bridge and quality.mode != "reference" and quality.wavelengths > 1
     curves = coating_curves(settled.lens, coatings, settled.sensor) if bridged else None
     packs: dict[tuple[float, ...], PackedLens] = {}
     shots: list[Shot] = []
     for number, light in enumerate(project.lights):
-        wavelengths_nm = traced_wavelengths(project.quality.wavelengths, light.spectrum)
+        wavelengths_nm = traced_wavelengths(quality.wavelengths, light.spectrum)
         key = tuple(wavelengths_nm)
         if key not in packs:
             packs[key] = pack_lens(settled.lens, settled.order, coatings, wavelengths_nm, sensor=settled.sensor)
         whole = []
-        for part in parts(light, project.quality.source_step_deg):
+        for part in parts(light, quality.source_step_deg):
             changes = {"field_deg": part.field_deg, "intensity": light.intensity * part.share, "holdout": None}
             point = light.replace(**changes, diameter_deg=0.0, shape=None) if light.extended else light
             seen = _seen(settled, packs[key], number, point)

@@ -172,7 +172,7 @@ def _many_lights(scene: _Scene, group: list[tuple[Shot, DirectImage]], threads: 
     pixels = shot.to_pixels
     places = np.array([image.position_mm for _, image in group]) * [pixels[2], -pixels[3]] + pixels[:2]
     throughputs = [lit.light.intensity * image.throughput_mm2 for lit, image in group]
-    flux = np.array([direct_flux(shot, scene.settled.lens, throughput, fine_nm) for throughput in throughputs])
+    flux = direct_flux(shot, scene.settled.lens, throughputs, fine_nm)
     mean = flux.mean(axis=0)
     colors = shot.weights(fine_nm) * (scene.look.intensity * pattern.transmittance)
     whole, each = mean @ colors, flux @ colors
@@ -197,7 +197,7 @@ def _one_light(scene: _Scene, parts: list[tuple[Shot, DirectImage]]) -> NDArray[
     shot, image = max(parts, key=lambda pair: _flux(*pair))
     fine_nm = _diffracted_wavelengths(shot)
     throughput: Floats = np.sum([part.light.intensity * found.throughput_mm2 for part, found in parts], axis=0)
-    flux = direct_flux(shot, scene.settled.lens, throughput, fine_nm) * scene.look.intensity
+    flux = direct_flux(shot, scene.settled.lens, [throughput], fine_nm)[0] * scene.look.intensity
     if not flux.any():
         return None
     pixel = (1.0 / float(shot.to_pixels[2]), 1.0 / float(shot.to_pixels[3]))
