@@ -23,7 +23,8 @@ from .trace import ALIVE, REL, STOP_X, WEIGHT, X, Y
 # polygons thinner than this, in square pixels, are drawn as lines
 SLIVER = 1e-4
 # the bit of all the edges that have none of their own (`_place_nodes`)
-SHARED = np.int64(1 << 61)
+SHARED_BIT = 61
+SHARED = np.int64(1 << SHARED_BIT)
 # a cell whose density departs from a plane by more than this part is drawn triangle by triangle
 ROUGH = 5e-3
 
@@ -276,6 +277,10 @@ def _plane_over_cell(spots, densities, triangles, start, end, mean, unit, drawn)
 @inner
 def _place_nodes(data, mirror, crossings, blades, axes, to_pixels, spots, blocked):
     """Fill the nodes' places in pixels and a bit for every edge that blocks them: 0 is none, -1 a ray that ended."""
+    # most rays pass within all blades
+    inner2 = np.inf
+    for b in range(blades.shape[0]):
+        inner2 = min(inner2, blades[b, 2] * abs(blades[b, 2]))
     for k in range(data.shape[0]):
         x, y = mirror * data[k, X], data[k, Y]
         # the upright picture is the sensor turned by 180 degrees
@@ -284,15 +289,16 @@ def _place_nodes(data, mirror, crossings, blades, axes, to_pixels, spots, blocke
         if data[k, ALIVE] == 0.0:
             blocked[k] = -1
             continue
-        found, bit = np.int64(data[k, REL] > 1.0), np.int64(1)
+        found = np.int64(data[k, REL] > 1.0)
         for c in range(crossings):
             u, v = mirror * data[k, STOP_X + 2 * c], data[k, STOP_X + 2 * c + 1]
+            if u * u + v * v < inner2:
+                continue
             up_x, up_y = u * axes[0, 0] + v * axes[1, 0], u * axes[0, 1] + v * axes[1, 1]
             for b in range(blades.shape[0]):
-                # 24 blades at three crossings are more than there are bits: the last ones share one
-                bit = min(bit << 1, SHARED)
                 if blade_value(blades, b, up_x, up_y) > 0.0:
-                    found |= bit
+                    # 24 blades at three crossings are more than there are bits: the last ones share one
+                    found |= np.int64(1) << min(c * blades.shape[0] + b + 1, SHARED_BIT)
         blocked[k] = found
 
 

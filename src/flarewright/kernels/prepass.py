@@ -113,28 +113,30 @@ def find_box(
     nodes = np.empty(4, dtype=np.int64)
     share = hx * hy * np.cos(tilt)
     accepted = 0
-    doubtful = np.empty(nx * ny, dtype=np.int64)
-    n_doubtful = 0
+    kept = np.zeros(nx * ny, dtype=np.bool_)
     for a in range(nx):
         for b in range(ny):
-            nodes[0], nodes[1] = a * width + b, a * width + b + 1
-            nodes[2], nodes[3] = nodes[0] + width, nodes[1] + width
-            if not rejected(data, nodes, crossings, iris_radius, 0.5):
-                found[0], found[1] = min(found[0], box[0] + a * hx), max(found[1], box[0] + (a + 1) * hx)
-                found[2], found[3] = min(found[2], box[2] + b * hy), max(found[3], box[2] + (b + 1) * hy)
-                _weigh(data, nodes, share, view_radius, sums)
-                accepted += 1
-                sums[4] += 1.0
-            elif _doubtful(data, nodes, nx, ny, crossings, iris_radius):
-                doubtful[n_doubtful] = a * ny + b
-                n_doubtful += 1
+            _cell_corners(a, b, width, nodes)
+            if rejected(data, nodes, crossings, iris_radius, 0.5):
+                continue
+            found[0], found[1] = min(found[0], box[0] + a * hx), max(found[1], box[0] + (a + 1) * hx)
+            found[2], found[3] = min(found[2], box[2] + b * hy), max(found[3], box[2] + (b + 1) * hy)
+            _weigh(data, nodes, share, view_radius, sums)
+            kept[a * ny + b] = True
+            accepted += 1
+            sums[4] += 1.0
     spots = np.array([np.inf, -np.inf, np.inf, -np.inf])
     if accepted < FEW_CELLS:
         # a spot smaller than a cell may hide between the samples
-        corners = np.empty((n_doubtful, 2))
-        for k in range(n_doubtful):
-            corners[k, 0] = box[0] + (doubtful[k] // ny) * hx
-            corners[k, 1] = box[2] + (doubtful[k] % ny) * hy
+        corners = np.empty((nx * ny, 2))
+        n_doubtful = 0
+        for cell in range(nx * ny):
+            _cell_corners(cell // ny, cell % ny, width, nodes)
+            if not kept[cell] and _doubtful(data, nodes, nx, ny, crossings, iris_radius):
+                corners[n_doubtful, 0] = box[0] + (cell // ny) * hx
+                corners[n_doubtful, 1] = box[2] + (cell % ny) * hy
+                n_doubtful += 1
+        corners = corners[:n_doubtful]
         _probe(
             rows, actions, curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, tilt, nearness,
             crossings, iris_radius, corners, hx, hy, _probes(hx, finest_x), _probes(hy, finest_y), spots, sums,
@@ -157,6 +159,13 @@ def find_box(
         found[2 * m] = max(found[2 * m] - step, box[2 * m])
         found[2 * m + 1] = min(found[2 * m + 1] + step, box[2 * m + 1])
     return found, sums, spots
+
+
+@inner
+def _cell_corners(a, b, width, nodes):
+    """Number the four samples at the corners of a cell, row by row in x."""
+    nodes[0], nodes[1] = a * width + b, a * width + b + 1
+    nodes[2], nodes[3] = nodes[0] + width, nodes[1] + width
 
 
 @inner

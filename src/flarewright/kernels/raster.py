@@ -79,31 +79,48 @@ def _step(k, way, count):
 
 
 @inner
-def _fill_strip(flat, blocks, row, depth, xl0, xl1, xr0, xr1, start, gx, density_low, density_high, rgb):
-    """Add a strip of a polygon between two edges: exact coverage times the density at each pixel's centre.
+def _fill_rows(
+    flat, blocks, lanes, row, rows, depth, xl0, xl1, left_slope, xr0, xr1, right_slope, start, gx, gy,
+    density_low, density_high, rgb,
+):  # fmt: skip
+    """Add strips of a polygon, one in each of some rows, between the same two edges.
 
-    `flat` is the picture as one line: an unsigned place in it needs no check for counting from the end, which would
-    keep the loop over a block from becoming one vector.
+    Exact coverage times the density at each pixel's centre. `flat` is the picture as one line: an unsigned place in it
+    needs no check for counting from the end, which would keep the loop over a block from becoming one vector.
     """
     la, lb = min(xl0, xl1), max(xl0, xl1)
     ra, rb = min(xr0, xr1), max(xr0, xr1)
     l_inverse, r_inverse = np.float32(1.0 / max(lb - la, 1e-6)), np.float32(1.0 / max(rb - ra, 1e-6))
     red, green, blue = np.float32(rgb[0] * depth), np.float32(rgb[1] * depth), np.float32(rgb[2] * depth)
     slope, low, high = np.float32(gx), np.float32(density_low), np.float32(density_high)
-    for block in range(int(la) // BLOCK, min(int(rb) // BLOCK, blocks - 1) + 1):
-        x0 = float(BLOCK * block)
-        first = np.float32(start + gx * (x0 + 0.5))
-        l0, l1, r0, r1 = np.float32(la - x0), np.float32(lb - x0), np.float32(ra - x0), np.float32(rb - x0)
-        place = np.uint64((row * blocks + block) * _FLOATS)
-        for m in range(BLOCK):
-            c = np.float32(m)
-            value = min(max(first + slope * c, low), high) * (
-                _covered(c, l0, l1, l_inverse) - _covered(c, r0, r1, r_inverse)
-            )
-            at = place + np.uint64(m)
-            flat[at] += red * value
-            flat[at + np.uint64(BLOCK)] += green * value
-            flat[at + np.uint64(2 * BLOCK)] += blue * value
+    for _ in range(rows):
+        place = np.uint64((row * blocks + int(la) // BLOCK) * _FLOATS)
+        for block in range(int(la) // BLOCK, min(int(rb) // BLOCK, blocks - 1) + 1):
+            x0 = float(BLOCK * block)
+            first = np.float32(start + gx * (x0 + 0.5))
+            if x0 >= lb and x0 + BLOCK <= ra:
+                # inside, where no edge comes; the compiler would take a loop of known length apart
+                for m in range(lanes):
+                    value = min(max(first + slope * np.float32(m), low), high)
+                    at = place + np.uint64(m)
+                    flat[at] += red * value
+                    flat[at + np.uint64(BLOCK)] += green * value
+                    flat[at + np.uint64(2 * BLOCK)] += blue * value
+            else:
+                l0, l1, r0, r1 = np.float32(la - x0), np.float32(lb - x0), np.float32(ra - x0), np.float32(rb - x0)
+                for m in range(BLOCK):
+                    c = np.float32(m)
+                    value = min(max(first + slope * c, low), high) * (
+                        _covered(c, l0, l1, l_inverse) - _covered(c, r0, r1, r_inverse)
+                    )
+                    at = place + np.uint64(m)
+                    flat[at] += red * value
+                    flat[at + np.uint64(BLOCK)] += green * value
+                    flat[at + np.uint64(2 * BLOCK)] += blue * value
+            place += np.uint64(_FLOATS)
+        la, lb, ra, rb = la + left_slope, lb + left_slope, ra + right_slope, rb + right_slope
+        start += gy
+        row += 1
 
 
 @inlined
@@ -242,7 +259,9 @@ def fill_polygon(polygon, count, density, gx, gy, density_low, density_high, rgb
                 right_slope = (polygon[following, PX] - polygon[right, PX]) / (right_end - polygon[right, PY])
                 break
             right = following
-        y_next = min(row + 1.0, min(left_end, right_end))
+        level = min(left_end, right_end)
+        y_next = min(row + 1.0, level)
+        rows = count - count + 1
         if y_next > y and row <= last_row:
             xl, xr = polygon[left, PX], polygon[right, PX]
             yl, yr = polygon[left, PY], polygon[right, PY]
@@ -256,16 +275,20 @@ def fill_polygon(polygon, count, density, gx, gy, density_low, density_high, rgb
                     density_low, density_high, patterns, table, corners, places, light,
                 )  # fmt: skip
             else:
-                base = density + gy * (row + 0.5)
-                _fill_strip(
-                    flat, plane.shape[1], row, y_next - y, xl0, xl1, xr0, xr1, base, gx, density_low, density_high, rgb
-                )
+                if y == row and level >= row + 2.0:
+                    # whole rows without a vertex
+                    rows = min(int(level), last_row + 1) - row
+                    y_next = float(row + rows)
+                _fill_rows(
+                    flat, plane.shape[1], plane.shape[3], row, rows, min(y_next - y, 1.0), xl0, xl1, left_slope,
+                    xr0, xr1, right_slope, density + gy * (row + 0.5), gx, gy, density_low, density_high, rgb,
+                )  # fmt: skip
         if left_end <= y_next:
             left = _step(left, count - way, count)
         if right_end <= y_next:
             right = _step(right, way, count)
         if y_next >= row + 1.0:
-            row += 1
+            row += rows
         y = y_next
 
 
