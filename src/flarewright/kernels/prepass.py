@@ -163,7 +163,7 @@ def find_box(
 
 @inner
 def _cell_corners(a, b, width, nodes):
-    """Number the four samples at the corners of a cell, row by row in x."""
+    """Fill in the four samples at the corners of a cell, row by row in x."""
     nodes[0], nodes[1] = a * width + b, a * width + b + 1
     nodes[2], nodes[3] = nodes[0] + width, nodes[1] + width
 
