@@ -30,19 +30,19 @@ _CANVAS = "f8[:,::1], f8[::1], f8, f8[::1], f4[:,:,:,::1]"
 _WINGS = "f8[::1], f8[::1], f8[::1], f8[::1]"
 
 # module and kernel of each root, its types as a render calls it (tests/contracts compares them with real calls), and
-# how long it takes to compile beside the others
+# how long it takes to compile by itself
 ROOTS = {
     "mesh": (
         "mesh.build_mesh",
         f"{_GEOMETRY}, f8[:,::1], f8[:,:,::1], f8, f8, f8, i8, f8, f8, f8[::1], i8, i8, i8, f8, f8, f8, f8",
-        5.0,
+        4.7,
     ),
     "prepass": (
         "prepass.find_box",
         f"{_GEOMETRY}, f8[::1], f8[:,::1], f8, f8, f8, i8, f8, f8, f8[::1], i8, i8, f8, f8",
-        2.4,
+        3.9,
     ),
-    "draw": ("bundle.draw_bundle", f"{_BUNDLE}, f8[::1], i8, f8[:,::1], none, f8, {_CANVAS}, i8", 3.5),
+    "draw": ("bundle.draw_bundle", f"{_BUNDLE}, f8[::1], i8, f8[:,::1], none, f8, {_CANVAS}, i8", 4.2),
     "draw masked": ("bundle.draw_bundle", f"{_BUNDLE}, f8[::1], i8, f8[:,::1], f8[:,::1], f8, {_CANVAS}, i8", 4.8),
     "draw ringing": (
         "ringing.draw_ringing",
@@ -54,13 +54,13 @@ ROOTS = {
         "f8[:,::1], i8[:,::1], i8, i8, f8[:,::1], f8[:,::1], f8[:,::1]",
         0.4,
     ),
-    "densities": ("bundle.node_densities", _BUNDLE, 0.3),
-    "measure": ("bundle.measure_bundle", f"{_BUNDLE}, i8, f8[:,::1], f8[:,::1], i8", 0.6),
+    "densities": ("bundle.node_densities", _BUNDLE, 0.4),
+    "measure": ("bundle.measure_bundle", f"{_BUNDLE}, i8, f8[:,::1], f8[:,::1], i8", 1.2),
     "matrices": (
         "matrix.draw_matrix_ghosts",
         "i8[::1], i8[::1], i8[::1], i8[::1], f8[::1], none, f8[::1], f8[:,::1], f8[:,:,::1], f8, f8, f8, f8, f8, "
         "f8[:,::1], f8, none, f8, f8[:,::1], f8[::1], f8, f8[:,:,::1], f8[:,:,::1]",
-        1.9,
+        2.9,
     ),
     "mirrors": (
         "matrix.mirror_squares",
@@ -92,6 +92,13 @@ ROOTS = {
     ),
     "scatter share": ("scatter.scattered_total", "f8[:,::1], f8[::1], f8, f8, f8, i8, i8", 0.5),
     "double": ("collect.add_doubled", "f4[:,:,::1], f4[:,:,::1]", 0.2),
+}
+# roots that take only so long after another one in the same process, whose inner kernels they share
+KIN = {
+    "prepass": ("mesh", 2.5),
+    "measure": ("draw", 0.6),
+    "densities": ("draw", 0.2),
+    "mirrors": ("matrices", 0.3),
 }
 # what a helper loses to its own start
 _START = 0.7
@@ -136,10 +143,16 @@ def divided(names: Sequence[str], processes: int) -> list[list[str]]:
     busy = [0.0, *[_START] * (processes - 1)]
     shares: list[list[str]] = [[] for _ in busy]
     for name in sorted(names, key=lambda name: -ROOTS[name][2]):
-        least = busy.index(min(busy))
-        busy[least] += ROOTS[name][2]
-        shares[least].append(name)
+        done = [begun + _seconds(name, share) for begun, share in zip(busy, shares, strict=True)]
+        first = done.index(min(done))
+        busy[first] = done[first]
+        shares[first].append(name)
     return [share for share in shares if share]
+
+
+def _seconds(name: str, share: Sequence[str]) -> float:
+    kin, seconds = KIN.get(name, ("", 0.0))
+    return seconds if kin in share else ROOTS[name][2]
 
 
 def cores() -> int:
