@@ -69,11 +69,12 @@ def test_a_cold_command_writes_what_a_warm_one_writes(tmp_path):
     [
         (("render", *SMALL, "-o"), {"matrices", "fan wings", "draw ringing", "open cells"}),
         (("render", *SMALL, "--blades", "0", "--quality", "draft", "-o"), {"draw", "densities", "blade wings"}),
+        (("render", "canon-28-80", *SMALL[1:], "--quality", "draft", "-o"), {"draw", "densities", "fan wings"}),
         (("render", *SMALL, "--scatter", "abg", "--quality", "draft", "-o"), {"draw", "densities", "fan wings"}),
         (("ghosts", "heliar-tronnier", "--light", "12,7", "--json"), {"matrices", "blade wings", "fan wings"}),
         (("render", *SMALL, "--fstop", "16", "--ringing", "collins", "-o"), {"matrices", "fan wings"}),
     ],
-    ids=["final", "draft", "scatter", "ghosts", "ringing"],
+    ids=["final", "draft", "crowded draft", "scatter", "ghosts", "ringing"],
 )
 def test_roots_are_called_with_the_types_that_the_table_says(words, unused, tmp_path):
     roots, _ = watched(*words, *([tmp_path / "a.exr"] if words[-1] == "-o" else []))

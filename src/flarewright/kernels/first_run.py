@@ -62,6 +62,12 @@ ROOTS = {
         "f8[:,::1], f8, none, f8, f8[:,::1], f8[::1], f8, f8[:,:,::1], f8[:,:,::1]",
         2.9,
     ),
+    "ghosts' light": (
+        "matrix.weigh_matrix_ghosts",
+        "i8[::1], i8[::1], i8[::1], i8[::1], f8[::1], none, f8[::1], f8[::1], f8[:,::1], f8, f8, f8, f8, f8, "
+        "f8[:,::1], f8, f8[:,::1], f8[::1], f8, f8, f8, f8[:,::1]",
+        2.0,
+    ),
     "mirrors": (
         "matrix.mirror_squares",
         "i8[::1], i8[::1], i8[::1], i8[::1], f8[::1], none, f8[::1], f8[::1], f8, f8, f8, f8, f8, f8, f8[:,::1]",
@@ -98,6 +104,7 @@ KIN = {
     "prepass": ("mesh", 2.5),
     "measure": ("draw", 0.6),
     "densities": ("draw", 0.2),
+    "ghosts' light": ("matrices", 0.6),
     "mirrors": ("matrices", 0.3),
 }
 # what a helper loses to its own start

@@ -250,32 +250,14 @@ def draw_matrix_ghosts(
     for p in range(starts.size - 1):
         path_rows, path_actions = rows[starts[p] : starts[p + 1]], actions[starts[p] : starts[p + 1]]
         for w in range(n_gap.shape[0]):
-            a, b, ax, bx = _meridians(
-                path_rows, path_actions, curvature, curvature_x, z_vertex, n_gap[w], sensor_z, nearness, crossings[p],
-                to_stop, across,
+            count, even = _place_ghost(
+                path_rows, path_actions, crossings[p], curvature, curvature_x, z_vertex, n_gap[w], reflectance[w],
+                sensor_z, entrance, slope, slope_x, nearness, edges, iris_radius, axes, to_pixels, rim, polygon, other,
+                values, squares, to_stop, across,
             )  # fmt: skip
-            count = _project_entrance(polygon, rim, slope, slope_x, a, b, ax, bx, to_stop, across, crossings[p], axes)
-            count = cut_by_blades(polygon, count, crossings[p], edges, other, values)
             if count == 0:
                 continue
-            centre = _centre(to_stop, slope, iris_radius, entrance)
-            beside = 0.0 if curvature_x is None else _centre(across, slope_x, iris_radius, entrance)
-            paraxial_sines(
-                path_rows, path_actions, curvature, curvature_x, z_vertex, n_gap[w],
-                centre, slope + nearness * centre, beside, slope_x + nearness * beside, squares,
-            )  # fmt: skip
-            weight = paraxial_weight(path_rows, path_actions, reflectance[w], squares)
-            flux = gain * weight * abs(polygon_area(polygon, count, PP, PQ))
-            for k in range(count):
-                x, y = polygon[k, PX], polygon[k, PY]
-                polygon[k, PX] = to_pixels[0] - to_pixels[2] * (x * axes[0, 0] + y * axes[1, 0])
-                polygon[k, PY] = to_pixels[1] + to_pixels[3] * (x * axes[0, 1] + y * axes[1, 1])
-            area = abs(polygon_area(polygon, count, PX, PY))
-            if area < 1e-4:
-                # a focus: a small square holds its light
-                count = _square(polygon, polygon[0, PX], polygon[0, PY])
-                area = SPOT * SPOT
-            even = flux / area
+            even *= gain
             if mask is not None:
                 fill_through_mask(
                     polygon, count, crossings[p], mask, mask_half, even, 0.0, 0.0, even, even, rgb[p, w], plane,
@@ -286,6 +268,78 @@ def draw_matrix_ghosts(
                 fill_polygon(polygon, count, even, 0.0, 0.0, even, even, rgb[p, w], plane)
 
 
+@compiled
+def weigh_matrix_ghosts(
+    rows, actions, starts, crossings, curvature, curvature_x, z_vertex, n_gap, reflectance, sensor_z,
+    entrance, slope, slope_x, nearness, edges, iris_radius, axes, to_pixels, gain, width, height, found,
+):  # fmt: skip
+    """Tell how bright the ghosts of `draw_matrix_ghosts` are, and how much of each is in the picture.
+
+    Parameters
+    ----------
+    rows ... z_vertex
+        As there.
+    n_gap : ndarray, shape (K + 1,)
+    reflectance : ndarray, shape (K, M)
+    sensor_z ... gain
+        As there.
+    width, height : float
+        Pixels.
+    found : ndarray, shape (P, 2)
+        Filled with the flux within the picture, and the flux per pixel where the ghost is.
+    """
+    polygon, other = np.zeros((MAX_VERTICES, PSTOP + 6)), np.zeros((MAX_VERTICES, PSTOP + 6))
+    values = np.empty(MAX_VERTICES)
+    squares = np.empty(rows.size)
+    to_stop = np.empty((MOST_CROSSINGS, 2, 2))
+    across = to_stop if curvature_x is None else np.empty((MOST_CROSSINGS, 2, 2))
+    rim = _rim(entrance)
+    for p in range(starts.size - 1):
+        found[p, 0] = found[p, 1] = 0.0
+        count, even = _place_ghost(
+            rows[starts[p] : starts[p + 1]], actions[starts[p] : starts[p + 1]], crossings[p], curvature, curvature_x,
+            z_vertex, n_gap, reflectance, sensor_z, entrance, slope, slope_x, nearness, edges, iris_radius, axes,
+            to_pixels, rim, polygon, other, values, squares, to_stop, across,
+        )  # fmt: skip
+        if count > 0:
+            count = cut_to_rectangle(polygon, count, other, values, width, height)
+        if count >= 3:
+            found[p, 0] = gain * even * abs(polygon_area(polygon, count, PX, PY))
+            found[p, 1] = gain * even
+
+
+@inner
+def _place_ghost(
+    rows, actions, crossings, curvature, curvature_x, z_vertex, n_gap, reflectance, sensor_z, entrance, slope, slope_x,
+    nearness, edges, iris_radius, axes, to_pixels, rim, polygon, other, values, squares, to_stop, across,
+):  # fmt: skip
+    """Fill a polygon with a ghost's outline in pixels; return its vertices, 0 for none, and its flux per pixel."""
+    a, b, ax, bx = _meridians(
+        rows, actions, curvature, curvature_x, z_vertex, n_gap, sensor_z, nearness, crossings, to_stop, across
+    )
+    count = _project_entrance(polygon, rim, slope, slope_x, a, b, ax, bx, to_stop, across, crossings, axes)
+    count = cut_by_blades(polygon, count, crossings, edges, other, values)
+    if count == 0:
+        return count, 0.0
+    centre = _centre(to_stop, slope, iris_radius, entrance)
+    beside = 0.0 if curvature_x is None else _centre(across, slope_x, iris_radius, entrance)
+    paraxial_sines(
+        rows, actions, curvature, curvature_x, z_vertex, n_gap,
+        centre, slope + nearness * centre, beside, slope_x + nearness * beside, squares,
+    )  # fmt: skip
+    flux = paraxial_weight(rows, actions, reflectance, squares) * abs(polygon_area(polygon, count, PP, PQ))
+    for k in range(count):
+        x, y = polygon[k, PX], polygon[k, PY]
+        polygon[k, PX] = to_pixels[0] - to_pixels[2] * (x * axes[0, 0] + y * axes[1, 0])
+        polygon[k, PY] = to_pixels[1] + to_pixels[3] * (x * axes[0, 1] + y * axes[1, 1])
+    area = abs(polygon_area(polygon, count, PX, PY))
+    if area < 1e-4:
+        # a focus: a small square holds its light
+        count = _square(polygon, polygon[0, PX], polygon[0, PY])
+        area = SPOT * SPOT
+    return count, flux / area
+
+
 @inner
 def _square(polygon, x, y):
     """Replace a polygon without area by a small square around a point, its places in the stop kept."""
@@ -294,7 +348,7 @@ def _square(polygon, x, y):
             polygon[k, m] = polygon[0, m]
         polygon[k, PX] = x + SPOT * (0.5 if k in (1, 2) else -0.5)
         polygon[k, PY] = y + SPOT * (0.5 if k in (2, 3) else -0.5)
-    return 4
+    return np.int64(4)
 
 
 @inner

@@ -160,12 +160,16 @@ def ghost_paths(lens: Lens, which: str = "all", *, sensor: bool = False) -> tupl
     tuple of LightPath
         Ordered by (j, i), the sensor's last.
     """
-    stop = lens.stop_row
-    mirrors = [k for k in range(len(lens.rows)) if k != stop]
+    return _paths_between(len(lens.rows), lens.stop_row, which, sensor)
+
+
+@lru_cache(maxsize=64)
+def _paths_between(count: int, stop: int, which: str, sensor: bool) -> tuple[LightPath, ...]:
+    """Return the paths of two reflections through so many rows with the stop among them."""
+    mirrors = [k for k in range(count) if k != stop]
     pairs = [(j, i) for j in mirrors for i in mirrors if i < j]
     if which == "same-side":
         pairs = [(j, i) for j, i in pairs if (j < stop) == (i < stop)]
-    own = tuple(ghost_path(lens, j, i) for j, i in pairs)
-    if not sensor:
-        return own
-    return own + tuple(sensor_path(lens, i) for i in mirrors if which == "all" or i > stop)
+    if sensor:
+        pairs += [(count, i) for i in mirrors if which == "all" or i > stop]
+    return tuple(steps_between(count, stop, pair) for pair in pairs)

@@ -182,7 +182,10 @@ def resolve_art(settled: Settled, fours: tuple[LightPath, ...] | None = None) ->
         return ResolvedArt()
     paths = ghost_paths(settled.lens, project.quality.paths, sensor=settled.sensor is not None)
     facts = _Facts(settled, paths if fours is None else fours)
-    found = {path.name: replace(PLAIN, offset=ghost_offset(path, project.imperfection)) for path in facts.paths}
+    sample = project.imperfection
+    found = dict.fromkeys(facts.names, PLAIN)
+    if sample is not None:
+        found = {path.name: replace(PLAIN, offset=ghost_offset(path, sample)) for path in facts.paths}
     across = project.camera.size_px[0] / project.camera.sensor[0]
     down = project.camera.size_px[1] / project.camera.sensor[1]
     for k, rule in enumerate(art.rules):

@@ -5,6 +5,8 @@ from __future__ import annotations
 from ..kernels.first_run import absent, compile_together, cores
 from ..model import Bare, Project
 from ..optics.pack import resolve_coatings
+from ..optics.paths import ghost_paths
+from .ghosts import CROWD
 from .prepare import settle
 
 # what every command calls that traces rays
@@ -43,6 +45,8 @@ def compile_for_render(project: Project, threads: int | None = None) -> None:
     elif project.quality.mode == "draft" and iris.mask is None:
         # a draft through a mask is rare: its kernel is compiled when it is called
         names += ["matrices", "mirrors"] if coated else ["matrices"]
+        if len(ghost_paths(settled.lens, project.quality.paths)) * len(project.lights) >= CROWD:
+            names += ["ghosts' light"]
     if project.output.starburst:
         names += ["fan wings" if iris.blades == 0 or iris.mask is not None else "blade wings"]
     compile_together(names, min(threads or cores(), cores()))

@@ -38,9 +38,11 @@ Progress = Callable[[float, str], None]
 _CHUNKS = ((1_100_000, 8), (2_500_000, 4))
 _GHOSTS_A_CHUNK = 16
 # of drafts, whose ghosts are drawn in less time than a picture more is added in
-_DRAFT_CHUNKS = 4
+_DRAFT_CHUNKS = 2
 # and of ghosts that are spread together
 _MOST_CHUNKS = 8
+# so many ghosts of a draft are drawn in no more detail than can be seen among the others
+CROWD = 200
 # of so many lights, the faintest ghosts are left out that carry together no more than this part of all ghost light
 MANY_LIGHTS, MANY_CULL = 8, 5e-4
 
@@ -244,31 +246,35 @@ def _draft(
     points, wide = ([s for s in shots if (s.border is None) == point] for point in (True, False))
     order = list(range(len(paths))) if singles == 0 else _rank_draft(shots, paths, art)
     alone = set(order if singles is None else order[:singles])
-    plain = [k for k in range(len(paths)) if paths[k].name not in art]
-    unchanged = set(plain)
-    coarse = draft_details(points, [paths[k] for k in plain]) if len(points) >= MANY_LIGHTS else None
+    changes = [art.get(path.name, PLAIN) for path in paths]
+    # what is only graded is drawn like what is not changed at all
+    plain = [k for k, change in enumerate(changes) if not (change.alone or change.framed or any(change.offset))]
+    rgb = np.array([change.rgb for change in changes])
+    crowded = len(points) * len(plain) >= CROWD
+    coarse = draft_details(points, [paths[k] for k in plain], rgb[plain]) if crowded else None
+    place = {k: number for number, k in enumerate(plain)}
 
     def draw(group: list[int]) -> list[Plane | None]:
         width, height = shots[0].size_px
         sheets: list[NDArray[np.float64] | None] = [None] * DETAILS
         sheets[0] = picture = np.zeros((height, width, 3))
-        mine = sorted(unchanged.intersection(group))
-        by_hand = [(paths[k], art[paths[k].name]) for k in group if paths[k].name in art]
-        # those that are only graded or moved alike are drawn together
-        graded: dict[object, list[LightPath]] = {}
+        mine = sorted(k for k in group if k in place)
+        own, colors = [paths[k] for k in mine], rgb[mine]
+        by_hand = [(paths[k], changes[k]) for k in group if k not in place]
+        # those that are only graded and moved alike are drawn together
+        shifted: dict[object, list[tuple[LightPath, PathArt]]] = {}
         for path, changed in by_hand:
             if not changed.alone and not changed.framed:
-                graded.setdefault((changed.rgb, changed.offset), []).append(path)
+                shifted.setdefault(changed.offset, []).append((path, changed))
         for number, shot in enumerate(points):
             if coarse is None or not alone.isdisjoint(group):
-                draw_draft(shot, [paths[k] for k in mine], picture)
+                draw_draft(shot, own, picture, colors)
             else:
-                details = {k: int(d) for k, d in zip(plain, coarse[number], strict=True) if k in group}
-                draw_draft_coarsely(shot, [(paths[k], details[k]) for k in mine], sheets)
-            for alike_graded in graded.values():
-                changed = art[alike_graded[0].name]
-                placed = changed.place(shot.to_pixels, None)
-                draw_draft(replace(shot, to_pixels=placed), alike_graded, picture, changed.rgb)
+                draw_draft_coarsely(shot, own, coarse[number, [place[k] for k in mine]], sheets, colors)
+            for together in shifted.values():
+                placed = together[0][1].place(shot.to_pixels, None)
+                graded = np.array([changed.rgb for _, changed in together])
+                draw_draft(replace(shot, to_pixels=placed), [path for path, _ in together], picture, graded)
             for path, changed in by_hand:
                 if changed.framed and not changed.alone:
                     draw_draft_by_hand(shot, path, changed, picture)
@@ -281,8 +287,8 @@ def _draft(
             if changed.alone:
                 key = ("ramp", number) if changed.ramps else changed.blur
                 alike.setdefault(key, []).append((shot, path, changed))
-        for together in alike.values():
-            picture += draft_alone([(shot, path) for shot, path, _ in together], [art for *_, art in together])
+        for blurred in alike.values():
+            picture += draft_alone([(shot, path) for shot, path, _ in blurred], [art for *_, art in blurred])
         for spread in _spread_drafts(wide, [paths[k] for k in group], art):
             picture += spread
         for k in group:

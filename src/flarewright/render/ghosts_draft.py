@@ -9,11 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernels.matrix import draw_matrix_ghosts, mirror_squares, path_matrices
+from ..kernels.matrix import draw_matrix_ghosts, mirror_squares, path_matrices, weigh_matrix_ghosts
 from ..kernels.raster import sum_rows
 from ..optics.color import luminance_weights
 from ..optics.paths import LightPath
@@ -27,12 +28,7 @@ from .spread import shape_kernel, spread_within
 Floats = NDArray[np.float64]
 
 
-def draw_draft(
-    shot: Shot,
-    paths: Sequence[LightPath],
-    differences: Floats,
-    rgb: tuple[float, float, float] = (1.0, 1.0, 1.0),
-) -> None:
+def draw_draft(shot: Shot, paths: Sequence[LightPath], differences: Floats, rgb: Floats | None = None) -> None:
     """Mark the paraxial ghosts of some paths.
 
     Parameters
@@ -41,14 +37,26 @@ def draw_draft(
     paths : sequence of LightPath
     differences : ndarray, shape (H, W, 3), float64
         Added to; `kernels.raster.sum_rows` turns it into flux per pixel.
-    rgb : tuple of float
-        Multiplies their colour.
+    rgb : ndarray, shape (P, 3), optional
+        Multiplies their colours.
     """
     if not paths:
         return
     packed, opening = shot.packed, shot.opening
+    steps, view, axes = _steps(shot, paths)
+    weights = _weights(shot, paths, steps, view)
+    if rgb is not None:
+        weights = weights * rgb[:, None]
+    draw_matrix_ghosts(
+        *steps, packed.n_gap, packed.reflectance, packed.sensor_z, *view, opening.edges, opening.radius, opening.mask,
+        opening.half, axes, shot.to_pixels, shot.gain, weights, differences,
+    )  # fmt: skip
+
+
+def _steps(shot: Shot, paths: Sequence[LightPath]) -> tuple[tuple[Any, ...], tuple[float, float, float, float], Floats]:
+    """List what kernels take of paths; of the light's way in: entrance, slope, slope across and nearness; the axes."""
+    packed = shot.packed
     starts = np.cumsum([0, *(len(path.rows) for path in paths)])
-    first = packed.first_surface
     slope, axes = float(np.tan(shot.incidence.tilt)), shot.incidence.axes
     slope_x, nearness = 0.0, packed.nearness / shot.incidence.tilt_cosine
     if packed.curvature_x is not None:
@@ -59,21 +67,19 @@ def draw_draft(
         np.concatenate([path.rows for path in paths]), np.concatenate([path.actions for path in paths]), starts,
         np.array([path.stop_crossings for path in paths]), packed.curvature, packed.curvature_x, packed.z_vertex,
     )  # fmt: skip
-    entrance = float(packed.semi[first])
+    return steps, (float(packed.semi[packed.first_surface]), slope, slope_x, nearness), axes
+
+
+def _weights(
+    shot: Shot, paths: Sequence[LightPath], steps: tuple[Any, ...], view: tuple[float, float, float, float]
+) -> Floats:
+    """Return the RGB weights of the traced wavelengths for each path, shape (P, W, 3)."""
+    packed = shot.packed
     if shot.curves is None:
-        weights = np.repeat(shot.weights(packed.wavelengths_nm)[None], len(paths), axis=0)
-    else:
-        squares = np.empty((len(paths), 2))
-        mirror_squares(
-            *steps, packed.n_gap[len(packed.n_gap) // 2], packed.sensor_z, entrance, slope, slope_x, nearness,
-            opening.radius, squares,
-        )  # fmt: skip
-        weights = draft_weights(shot, paths, squares)
-    draw_matrix_ghosts(
-        *steps, packed.n_gap, packed.reflectance, packed.sensor_z, entrance, slope, slope_x, nearness,
-        opening.edges, opening.radius, opening.mask, opening.half, axes, shot.to_pixels, shot.gain, weights * rgb,
-        differences,
-    )  # fmt: skip
+        return np.repeat(shot.weights(packed.wavelengths_nm)[None], len(paths), axis=0)
+    squares = np.empty((len(paths), 2))
+    mirror_squares(*steps, packed.n_gap[len(packed.n_gap) // 2], packed.sensor_z, *view, shot.opening.radius, squares)
+    return draft_weights(shot, paths, squares)
 
 
 def seen_small(shot: Shot, times: int) -> Shot:
@@ -82,13 +88,44 @@ def seen_small(shot: Shot, times: int) -> Shot:
     return replace(shot, to_pixels=shot.to_pixels / times, size_px=size)
 
 
-def draft_details(shots: Sequence[Shot], paths: Sequence[LightPath]) -> NDArray[np.int64]:
-    """Tell how often the resolution may be halved for each ghost among those of many lights.
+def weigh_drafts(shot: Shot, paths: Sequence[LightPath], rgb: Floats | None = None) -> Floats:
+    """Tell how bright the ghosts of `draw_draft` are, the middle wavelength standing for all.
+
+    Parameters
+    ----------
+    shot : Shot
+    paths : sequence of LightPath
+    rgb : ndarray, shape (len(paths), 3), optional
+        As there.
+
+    Returns
+    -------
+    ndarray, shape (len(paths), 2)
+        Luminance of what falls into the picture, and of a pixel where the ghost is; 0 where it misses the picture.
+    """
+    packed, opening = shot.packed, shot.opening
+    steps, view, axes = _steps(shot, paths)
+    middle = len(packed.n_gap) // 2
+    width, height = shot.size_px
+    seen = np.empty((len(paths), 2))
+    weigh_matrix_ghosts(
+        *steps, packed.n_gap[middle], packed.reflectance[middle], packed.sensor_z, *view, opening.edges, opening.radius,
+        axes, shot.to_pixels, shot.gain, float(width), float(height), seen,
+    )  # fmt: skip
+    colors = _weights(shot, paths, steps, view).sum(axis=1)
+    light: Floats = (colors if rgb is None else colors * rgb) @ luminance_weights(shot.colorspace)
+    return seen * light[:, None]
+
+
+def draft_details(shots: Sequence[Shot], paths: Sequence[LightPath], rgb: Floats | None = None) -> NDArray[np.int64]:
+    """Tell how often the resolution may be halved for each ghost among many.
 
     Parameters
     ----------
     shots : sequence of Shot
     paths : sequence of LightPath
+    rgb : ndarray, shape (len(paths), 3), optional
+        As in `draw_draft`.
 
     Returns
     -------
@@ -96,46 +133,47 @@ def draft_details(shots: Sequence[Shot], paths: Sequence[LightPath]) -> NDArray[
 
     Notes
     -----
-    As in final quality (docs/adr/0003), but each path's irradiance is that of one light of middling field angle, at a
-    sixteenth of the resolution, times each light's intensity.
+    As in final quality (docs/adr/0003), but each path's irradiance is that of one light of middling field angle at the
+    middle wavelength, times each light's intensity.
     """
-    middle = sorted(shots, key=lambda shot: shot.incidence.tilt)[len(shots) // 2]
-    small = seen_small(middle, 16)
-    luminance = luminance_weights(small.colorspace)
-    seen = np.zeros((len(paths), 2))
-    for k, path in enumerate(paths):
-        picture = np.zeros((small.size_px[1], small.size_px[0], 3))
-        draw_draft(small, [path], picture)
-        sum_rows(picture)
-        light = picture @ luminance
-        total = float(light.sum())
-        seen[k] = total, float((light**2).sum()) / total if total > 0.0 else 0.0
+    shot = sorted(shots, key=lambda shot: shot.incidence.tilt)[len(shots) // 2]
+    seen = weigh_drafts(shot, paths, rgb) / shot.light.intensity
+    width, height = shot.size_px
     power = np.array([shot.light.intensity for shot in shots])
-    level = power.sum() * seen[:, 0].sum() / (small.size_px[0] * small.size_px[1])
-    contrast = power[:, None] * seen[:, 1] / level if level > 0.0 else np.full((len(shots), len(paths)), np.inf)
+    level = power.sum() * seen[:, 0].sum() / (width * height)
+    contrast = np.full((len(shots), len(paths)), np.inf)
+    # what is dark at the middle wavelength says nothing
+    known = seen[:, 1] > 0.0
+    if level > 0.0:
+        contrast[:, known] = power[:, None] * seen[known, 1] / level
     details: NDArray[np.int64] = np.sum([contrast < limit for limit in DETAIL_CONTRAST], axis=0)
     return details
 
 
-def draw_draft_coarsely(shot: Shot, ghosts: Sequence[tuple[LightPath, int]], sheets: list[Floats | None]) -> None:
+def draw_draft_coarsely(
+    shot: Shot, paths: Sequence[LightPath], details: NDArray[np.int64], sheets: list[Floats | None], rgb: Floats
+) -> None:
     """Mark paraxial ghosts, each at a resolution of its own.
 
     Parameters
     ----------
     shot : Shot
-    ghosts : sequence of (LightPath, int)
+    paths : sequence of LightPath
+    details : ndarray, shape (len(paths),)
         How often each one's resolution is halved.
     sheets : list of ndarray or None
         One a resolution, as `draw_draft` takes; made where there is none, and added to.
+    rgb : ndarray, shape (len(paths), 3)
+        As in `draw_draft`.
     """
     for detail in range(DETAILS):
-        paths = [path for path, halved in ghosts if halved == detail]
-        if paths:
+        chosen = np.flatnonzero(details == detail)
+        if chosen.size:
             small = seen_small(shot, 2**detail)
             held = sheets[detail]
             if held is None:
                 held = sheets[detail] = np.zeros((small.size_px[1], small.size_px[0], 3))
-            draw_draft(small, paths, held)
+            draw_draft(small, [paths[int(k)] for k in chosen], held, rgb[chosen])
 
 
 def draw_draft_by_hand(shot: Shot, path: LightPath, art: PathArt, differences: Floats) -> None:
@@ -150,7 +188,7 @@ def draw_draft_by_hand(shot: Shot, path: LightPath, art: PathArt, differences: F
         As in `draw_draft`.
     """
     placed = art.place(shot.to_pixels, _frame(shot, path) if art.framed else None)
-    draw_draft(replace(shot, to_pixels=placed), [path], differences, art.rgb)
+    draw_draft(replace(shot, to_pixels=placed), [path], differences, np.array([art.rgb]))
 
 
 def draft_alone(
@@ -186,7 +224,7 @@ def draft_alone(
     frames = [_frame(shot, path) if each.framed else None for (shot, path), each in zip(ghosts, art, strict=True)]
     places = [each.place(shot.to_pixels, frame) / 2.0**detail for each, frame in zip(art, frames, strict=True)]
     for (lit, path), each, placed in zip(ghosts, art, places, strict=True):
-        draw_draft(replace(lit, to_pixels=placed + np.array([mx, my, 0.0, 0.0])), [path], sheet, each.rgb)
+        draw_draft(replace(lit, to_pixels=placed + np.array([mx, my, 0.0, 0.0])), [path], sheet, np.array([each.rgb]))
     sum_rows(sheet)
     if kernel is not None:
         sheet = spread_within(sheet, kernel)

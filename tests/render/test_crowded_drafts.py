@@ -1,0 +1,75 @@
+"""Drafts of many ghosts: those that cannot be told from the others are drawn coarsely, and nothing else changes."""
+
+import numpy as np
+import pytest
+
+from flarewright.kernels.raster import sum_rows
+from flarewright.model import Art, Camera, Light, Output, Project, Quality, Rule
+from flarewright.optics.color import luminance_weights
+from flarewright.optics.paths import ghost_paths
+from flarewright.render import ghosts, ghosts_draft
+from flarewright.render.prepare import settle
+from flarewright.render.render import render
+from flarewright.render.shot import make_opening, make_shots
+
+CANON = Project(
+    lens="canon-28-80",
+    f_number=5.6,
+    lights=(Light(field_deg=(9.0, 5.0)),),
+    camera=Camera(size_px=(480, 270)),
+    quality=Quality(mode="draft", wavelengths=3),
+    output=Output(starburst=False),
+)
+
+
+def sheet(project, monkeypatch, crowd):
+    monkeypatch.setattr(ghosts, "CROWD", crowd)
+    layer = next(layer for layer in render(project).layers if layer.name == "ghosts")
+    x, y, width, height = layer.window
+    whole = np.zeros((270, 480, 3))
+    whole[y : y + height, x : x + width] = layer.pixels
+    return whole
+
+
+@pytest.mark.parametrize("rules", [(), (Rule(select="all", gain=0.5), Rule(select="row:7", tint=(1.0, 0.2, 0.0)))])
+def test_coarse_ghosts_cannot_be_told(rules, monkeypatch):
+    project = CANON.replace(art=Art(rules=rules))
+    fine, coarse = (sheet(project, monkeypatch, crowd) for crowd in (10**9, 1))
+    assert not np.array_equal(fine, coarse)
+    np.testing.assert_allclose(coarse.sum(axis=(0, 1)), fine.sum(axis=(0, 1)), rtol=2e-3)
+    level = fine.mean(axis=(0, 1))
+    # a ghost at half the resolution is fainter than 1.5 % of the mean; some edges may fall together
+    assert np.abs(coarse - fine).max(axis=(0, 1)) == pytest.approx(0.0, abs=0.1 * level.max())
+    assert np.abs(coarse - fine).mean() < 2e-3 * level.mean()
+
+
+def test_ghosts_are_weighed_as_they_are_drawn():
+    settled = settle(CANON)
+    (shot,) = make_shots(settled, make_opening(settled, None))
+    paths = ghost_paths(settled.lens)
+    drawn = np.empty(len(paths))
+    for k, path in enumerate(paths):
+        picture = np.zeros((270, 480, 3))
+        ghosts_draft.draw_draft(shot, [path], picture)
+        sum_rows(picture)
+        drawn[k] = luminance_weights(shot.colorspace) @ picture.sum(axis=(0, 1))
+    seen = ghosts_draft.weigh_drafts(shot, paths)
+    # the middle wavelength stands for all, so what rim or picture cut by colour differs
+    assert seen[:, 0].sum() == pytest.approx(drawn.sum(), rel=0.03)
+    bright = (drawn > 1e-3 * drawn.max()) & (seen[:, 0] > 0.0)
+    assert drawn[bright].sum() > 0.99 * drawn.sum()
+    np.testing.assert_allclose(seen[bright, 0], drawn[bright], rtol=0.25)
+    assert ((seen[:, 1] > 0.0) == (seen[:, 0] > 0.0)).all()
+
+
+def test_brightest_ghosts_keep_all_detail():
+    settled = settle(CANON)
+    (shot,) = make_shots(settled, make_opening(settled, None))
+    paths = ghost_paths(settled.lens)
+    details = ghosts_draft.draft_details((shot,), paths)[0]
+    brightness = ghosts_draft.weigh_drafts(shot, paths)[:, 1]
+    assert set(details) == {0, 1, 2}
+    # a ghost that is dark at the middle wavelength may be bright at another
+    assert not details[brightness == 0.0].any()
+    order = np.argsort(-brightness[brightness > 0.0], kind="stable")
+    assert (np.diff(details[brightness > 0.0][order]) >= 0).all()
