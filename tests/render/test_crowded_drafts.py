@@ -53,7 +53,7 @@ def test_ghosts_are_weighed_as_they_are_drawn():
         ghosts_draft.draw_draft(shot, [path], picture)
         sum_rows(picture)
         drawn[k] = luminance_weights(shot.colorspace) @ picture.sum(axis=(0, 1))
-    seen = ghosts_draft.weigh_drafts(shot, paths)
+    seen = ghosts_draft.weigh_drafts(shot, paths, ghosts_draft.draft_colors(shot, paths))
     # the middle wavelength stands for all, so what rim or picture cut by colour differs
     assert seen[:, 0].sum() == pytest.approx(drawn.sum(), rel=0.03)
     bright = (drawn > 1e-3 * drawn.max()) & (seen[:, 0] > 0.0)
@@ -66,8 +66,8 @@ def test_brightest_ghosts_keep_all_detail():
     settled = settle(CANON)
     (shot,) = make_shots(settled, make_opening(settled, None))
     paths = ghost_paths(settled.lens)
-    details = ghosts_draft.draft_details((shot,), paths)[0]
-    brightness = ghosts_draft.weigh_drafts(shot, paths)[:, 1]
+    details = ghosts_draft.draft_details((shot,), paths, [ghosts_draft.draft_colors(shot, paths)])[0]
+    brightness = ghosts_draft.weigh_drafts(shot, paths, ghosts_draft.draft_colors(shot, paths))[:, 1]
     assert set(details) == {0, 1, 2}
     # a ghost that is dark at the middle wavelength may be bright at another
     assert not details[brightness == 0.0].any()

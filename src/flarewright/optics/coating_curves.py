@@ -14,7 +14,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernels.trace import REFLECT, REFRACT, trace_hits
+from ..kernels.trace import REFLECT, trace_hits
 from ..model import Coating, Lens, Stop
 from .coatings import film_stack, stack_reflectance
 from .pack import PackedLens, SensorMirror
@@ -125,16 +125,20 @@ def passed(curves: CoatingCurves, paths: Sequence[LightPath], squares: Floats) -
     Mirrors reflect at the rays' angles; the many surfaces that are passed, whose part in the colour is small, transmit
     as at normal incidence.
     """
-    rows = len(curves.log_transmittance)
-    counts = np.array([np.bincount(path.rows[path.actions == REFRACT], minlength=rows) for path in paths])
-    mirrors = np.array([path.rows[path.actions == REFLECT] for path in paths]).reshape(len(paths), -1)
+    mirrors = np.array([path.mirrors for path in paths], dtype=np.intp).reshape(len(paths), -1)
+    # the sum over all rows before each; a leg between two rows is a difference
+    before = np.concatenate([np.zeros((1, len(CURVE_NM))), np.cumsum(curves.log_transmittance, axis=0)])
+    log = before[[path.rows[-1] + 1 for path in paths]]
+    for k, row in enumerate(mirrors.T):
+        # light goes forth as far as every other mirror and comes back as far as the one between; neither is passed
+        log += 2.0 * before[row] if k % 2 == 0 else -2.0 * before[row + 1]
     place = np.clip(squares, 0.0, 1.0) * (SQUARES - 1)
     cell = np.minimum(place.astype(np.intp), SQUARES - 2)
     part = (place - cell)[..., None]
     row = mirrors[:, None, :]
     low, high = curves.reflectance[row, cell], curves.reflectance[row, cell + 1]
     reflected: Floats = (low + part * (high - low)).prod(axis=2).mean(axis=1)
-    through: Floats = reflected * np.exp(counts @ curves.log_transmittance)
+    through: Floats = reflected * np.exp(log)
     return through
 
 
@@ -154,19 +158,20 @@ def bends(through: Floats, traced_nm: Floats) -> Floats:
         What the straight lines must be multiplied by, at `CURVE_NM`; 1 at the traced wavelengths, up to the step of
         the table.
     """
-    line = through @ _straight(tuple(traced_nm))
+    at_traced, joined = _straight(tuple(traced_nm))
+    # not `@`: its library's threads wait busily beside ours
+    line = np.einsum("pw,wl->pl", np.einsum("pl,lw->pw", through, at_traced), joined)
     dark = line <= 1e-9 * through.max(axis=1, keepdims=True)
     bend: Floats = np.where(dark, 1.0, np.minimum(through / np.where(dark, 1.0, line), MOST_BEND))
     return bend
 
 
 @lru_cache(maxsize=64)
-def _straight(traced_nm: tuple[float, ...]) -> Floats:
-    """Return the matrix that reads a curve at the traced wavelengths and joins these by lines, shape (L, L)."""
+def _straight(traced_nm: tuple[float, ...]) -> tuple[Floats, Floats]:
+    """Return what reads curves at the traced wavelengths, shape (L, W), and what joins these by lines, (W, L)."""
     at_traced = np.stack([np.interp(traced_nm, CURVE_NM, row) for row in np.eye(len(CURVE_NM))])
     joined = np.stack([np.interp(CURVE_NM, traced_nm, row) for row in np.eye(len(traced_nm))])
-    matrix: Floats = at_traced @ joined
-    return matrix
+    return at_traced, joined
 
 
 def mirror_squares_traced(packed: PackedLens, path: LightPath, tilt: float, points: Floats) -> Floats:

@@ -21,6 +21,7 @@ from .art import PLAIN, PathArt
 from .canvas import DETAILS, Plane, blank, merge, to_layer
 from .ghosts_draft import (
     draft_alone,
+    draft_colors,
     draft_details,
     draw_draft,
     draw_draft_by_hand,
@@ -251,7 +252,9 @@ def _draft(
     plain = [k for k, change in enumerate(changes) if not (change.alone or change.framed or any(change.offset))]
     rgb = np.array([change.rgb for change in changes])
     crowded = len(points) * len(plain) >= CROWD
-    coarse = draft_details(points, [paths[k] for k in plain], rgb[plain]) if crowded else None
+    own = [paths[k] for k in plain]
+    colors = [draft_colors(shot, own) * rgb[plain, None] for shot in points]
+    coarse = draft_details(points, own, colors) if crowded else None
     place = {k: number for number, k in enumerate(plain)}
 
     def draw(group: list[int]) -> list[Plane | None]:
@@ -259,7 +262,7 @@ def _draft(
         sheets: list[NDArray[np.float64] | None] = [None] * DETAILS
         sheets[0] = picture = np.zeros((height, width, 3))
         mine = sorted(k for k in group if k in place)
-        own, colors = [paths[k] for k in mine], rgb[mine]
+        ghosts, places = [paths[k] for k in mine], [place[k] for k in mine]
         by_hand = [(paths[k], changes[k]) for k in group if k not in place]
         # those that are only graded and moved alike are drawn together
         shifted: dict[object, list[tuple[LightPath, PathArt]]] = {}
@@ -268,13 +271,14 @@ def _draft(
                 shifted.setdefault(changed.offset, []).append((path, changed))
         for number, shot in enumerate(points):
             if coarse is None or not alone.isdisjoint(group):
-                draw_draft(shot, own, picture, colors)
+                draw_draft(shot, ghosts, picture, colors[number][places])
             else:
-                draw_draft_coarsely(shot, own, coarse[number, [place[k] for k in mine]], sheets, colors)
+                draw_draft_coarsely(shot, ghosts, coarse[number, places], sheets, colors[number][places])
             for together in shifted.values():
                 placed = together[0][1].place(shot.to_pixels, None)
-                graded = np.array([changed.rgb for _, changed in together])
-                draw_draft(replace(shot, to_pixels=placed), [path for path, _ in together], picture, graded)
+                alike_placed = [path for path, _ in together]
+                graded = draft_colors(shot, alike_placed) * np.array([changed.rgb for _, changed in together])[:, None]
+                draw_draft(replace(shot, to_pixels=placed), alike_placed, picture, graded)
             for path, changed in by_hand:
                 if changed.framed and not changed.alone:
                     draw_draft_by_hand(shot, path, changed, picture)

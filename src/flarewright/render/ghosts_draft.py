@@ -28,7 +28,7 @@ from .spread import shape_kernel, spread_within
 Floats = NDArray[np.float64]
 
 
-def draw_draft(shot: Shot, paths: Sequence[LightPath], differences: Floats, rgb: Floats | None = None) -> None:
+def draw_draft(shot: Shot, paths: Sequence[LightPath], differences: Floats, colors: Floats | None = None) -> None:
     """Mark the paraxial ghosts of some paths.
 
     Parameters
@@ -37,20 +37,40 @@ def draw_draft(shot: Shot, paths: Sequence[LightPath], differences: Floats, rgb:
     paths : sequence of LightPath
     differences : ndarray, shape (H, W, 3), float64
         Added to; `kernels.raster.sum_rows` turns it into flux per pixel.
-    rgb : ndarray, shape (P, 3), optional
-        Multiplies their colours.
+    colors : ndarray, shape (P, W, 3), optional
+        From `draft_colors`, or changed by hand; None: looked up.
     """
     if not paths:
         return
     packed, opening = shot.packed, shot.opening
     steps, view, axes = _steps(shot, paths)
-    weights = _weights(shot, paths, steps, view)
-    if rgb is not None:
-        weights = weights * rgb[:, None]
     draw_matrix_ghosts(
         *steps, packed.n_gap, packed.reflectance, packed.sensor_z, *view, opening.edges, opening.radius, opening.mask,
-        opening.half, axes, shot.to_pixels, shot.gain, weights, differences,
+        opening.half, axes, shot.to_pixels, shot.gain, draft_colors(shot, paths) if colors is None else colors,
+        differences,
     )  # fmt: skip
+
+
+def draft_colors(shot: Shot, paths: Sequence[LightPath]) -> Floats:
+    """Return what each traced wavelength of each path adds to each channel.
+
+    Parameters
+    ----------
+    shot : Shot
+    paths : sequence of LightPath
+        Of two reflections each.
+
+    Returns
+    -------
+    ndarray, shape (P, W, 3)
+    """
+    packed = shot.packed
+    if shot.curves is None or not paths:
+        return np.repeat(shot.weights(packed.wavelengths_nm)[None], len(paths), axis=0)
+    steps, view, _ = _steps(shot, paths)
+    squares = np.empty((len(paths), 2))
+    mirror_squares(*steps, packed.n_gap[len(packed.n_gap) // 2], packed.sensor_z, *view, shot.opening.radius, squares)
+    return draft_weights(shot, paths, squares)
 
 
 def _steps(shot: Shot, paths: Sequence[LightPath]) -> tuple[tuple[Any, ...], tuple[float, float, float, float], Floats]:
@@ -70,32 +90,20 @@ def _steps(shot: Shot, paths: Sequence[LightPath]) -> tuple[tuple[Any, ...], tup
     return steps, (float(packed.semi[packed.first_surface]), slope, slope_x, nearness), axes
 
 
-def _weights(
-    shot: Shot, paths: Sequence[LightPath], steps: tuple[Any, ...], view: tuple[float, float, float, float]
-) -> Floats:
-    """Return the RGB weights of the traced wavelengths for each path, shape (P, W, 3)."""
-    packed = shot.packed
-    if shot.curves is None:
-        return np.repeat(shot.weights(packed.wavelengths_nm)[None], len(paths), axis=0)
-    squares = np.empty((len(paths), 2))
-    mirror_squares(*steps, packed.n_gap[len(packed.n_gap) // 2], packed.sensor_z, *view, shot.opening.radius, squares)
-    return draft_weights(shot, paths, squares)
-
-
 def seen_small(shot: Shot, times: int) -> Shot:
     """Return a shot at a resolution so many times smaller."""
     size = (-(-shot.size_px[0] // times), -(-shot.size_px[1] // times))
     return replace(shot, to_pixels=shot.to_pixels / times, size_px=size)
 
 
-def weigh_drafts(shot: Shot, paths: Sequence[LightPath], rgb: Floats | None = None) -> Floats:
+def weigh_drafts(shot: Shot, paths: Sequence[LightPath], colors: Floats) -> Floats:
     """Tell how bright the ghosts of `draw_draft` are, the middle wavelength standing for all.
 
     Parameters
     ----------
     shot : Shot
     paths : sequence of LightPath
-    rgb : ndarray, shape (len(paths), 3), optional
+    colors : ndarray, shape (len(paths), W, 3)
         As there.
 
     Returns
@@ -112,20 +120,19 @@ def weigh_drafts(shot: Shot, paths: Sequence[LightPath], rgb: Floats | None = No
         *steps, packed.n_gap[middle], packed.reflectance[middle], packed.sensor_z, *view, opening.edges, opening.radius,
         axes, shot.to_pixels, shot.gain, float(width), float(height), seen,
     )  # fmt: skip
-    colors = _weights(shot, paths, steps, view).sum(axis=1)
-    light: Floats = (colors if rgb is None else colors * rgb) @ luminance_weights(shot.colorspace)
+    light: Floats = colors.sum(axis=1) @ luminance_weights(shot.colorspace)
     return seen * light[:, None]
 
 
-def draft_details(shots: Sequence[Shot], paths: Sequence[LightPath], rgb: Floats | None = None) -> NDArray[np.int64]:
+def draft_details(shots: Sequence[Shot], paths: Sequence[LightPath], colors: Sequence[Floats]) -> NDArray[np.int64]:
     """Tell how often the resolution may be halved for each ghost among many.
 
     Parameters
     ----------
     shots : sequence of Shot
     paths : sequence of LightPath
-    rgb : ndarray, shape (len(paths), 3), optional
-        As in `draw_draft`.
+    colors : sequence of ndarray, shape (len(paths), W, 3)
+        For each shot, as `draw_draft` takes them.
 
     Returns
     -------
@@ -136,8 +143,9 @@ def draft_details(shots: Sequence[Shot], paths: Sequence[LightPath], rgb: Floats
     As in final quality (docs/adr/0003), but each path's irradiance is that of one light of middling field angle at the
     middle wavelength, times each light's intensity.
     """
-    shot = sorted(shots, key=lambda shot: shot.incidence.tilt)[len(shots) // 2]
-    seen = weigh_drafts(shot, paths, rgb) / shot.light.intensity
+    middle = sorted(range(len(shots)), key=lambda k: shots[k].incidence.tilt)[len(shots) // 2]
+    shot = shots[middle]
+    seen = weigh_drafts(shot, paths, colors[middle]) / shot.light.intensity
     width, height = shot.size_px
     power = np.array([shot.light.intensity for shot in shots])
     level = power.sum() * seen[:, 0].sum() / (width * height)
@@ -151,7 +159,7 @@ def draft_details(shots: Sequence[Shot], paths: Sequence[LightPath], rgb: Floats
 
 
 def draw_draft_coarsely(
-    shot: Shot, paths: Sequence[LightPath], details: NDArray[np.int64], sheets: list[Floats | None], rgb: Floats
+    shot: Shot, paths: Sequence[LightPath], details: NDArray[np.int64], sheets: list[Floats | None], colors: Floats
 ) -> None:
     """Mark paraxial ghosts, each at a resolution of its own.
 
@@ -163,7 +171,7 @@ def draw_draft_coarsely(
         How often each one's resolution is halved.
     sheets : list of ndarray or None
         One a resolution, as `draw_draft` takes; made where there is none, and added to.
-    rgb : ndarray, shape (len(paths), 3)
+    colors : ndarray, shape (len(paths), W, 3)
         As in `draw_draft`.
     """
     for detail in range(DETAILS):
@@ -173,7 +181,7 @@ def draw_draft_coarsely(
             held = sheets[detail]
             if held is None:
                 held = sheets[detail] = np.zeros((small.size_px[1], small.size_px[0], 3))
-            draw_draft(small, [paths[int(k)] for k in chosen], held, rgb[chosen])
+            draw_draft(small, [paths[int(k)] for k in chosen], held, colors[chosen])
 
 
 def draw_draft_by_hand(shot: Shot, path: LightPath, art: PathArt, differences: Floats) -> None:
@@ -188,7 +196,7 @@ def draw_draft_by_hand(shot: Shot, path: LightPath, art: PathArt, differences: F
         As in `draw_draft`.
     """
     placed = art.place(shot.to_pixels, _frame(shot, path) if art.framed else None)
-    draw_draft(replace(shot, to_pixels=placed), [path], differences, np.array([art.rgb]))
+    draw_draft(replace(shot, to_pixels=placed), [path], differences, draft_colors(shot, [path]) * art.rgb)
 
 
 def draft_alone(
@@ -224,7 +232,8 @@ def draft_alone(
     frames = [_frame(shot, path) if each.framed else None for (shot, path), each in zip(ghosts, art, strict=True)]
     places = [each.place(shot.to_pixels, frame) / 2.0**detail for each, frame in zip(art, frames, strict=True)]
     for (lit, path), each, placed in zip(ghosts, art, places, strict=True):
-        draw_draft(replace(lit, to_pixels=placed + np.array([mx, my, 0.0, 0.0])), [path], sheet, np.array([each.rgb]))
+        moved = replace(lit, to_pixels=placed + np.array([mx, my, 0.0, 0.0]))
+        draw_draft(moved, [path], sheet, draft_colors(lit, [path]) * each.rgb)
     sum_rows(sheet)
     if kernel is not None:
         sheet = spread_within(sheet, kernel)

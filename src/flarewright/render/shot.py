@@ -131,7 +131,8 @@ class Shot:
         look = self.light.spectrum, tuple(wavelengths_nm), self.colorspace
         if bend is None:
             return _weights(*look)
-        weights: Floats = np.tensordot(bend, _parts(*look), axes=1)
+        # not `tensordot`: its library's threads wait busily beside ours
+        weights: Floats = np.einsum("...l,lwc->...wc", bend, _parts(*look))
         return weights
 
 
