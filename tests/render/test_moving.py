@@ -3,7 +3,20 @@
 import numpy as np
 import pytest
 
-from flarewright.model import Art, Camera, Holdout, Iris, Light, Output, Preset, Project, Quality, Rule, Starburst
+from flarewright.model import (
+    Art,
+    BlackBody,
+    Camera,
+    Holdout,
+    Iris,
+    Light,
+    Output,
+    Preset,
+    Project,
+    Quality,
+    Rule,
+    Starburst,
+)
 from flarewright.render.display import view, view_sum
 from flarewright.render.moving import moving_picture
 from flarewright.render.render import render
@@ -35,16 +48,16 @@ def at(project, *field_deg, **more):
 
 
 def test_the_first_picture_is_a_draft_of_the_project(project):
-    found, wanted = moving_picture(project, None), layers(project)
+    found, wanted = moving_picture(project, ()), layers(project)
     np.testing.assert_array_equal(found.ghosts, wanted["ghosts"])
     np.testing.assert_allclose(found.rest, wanted["starburst"], rtol=2e-4, atol=1e-7 * wanted["starburst"].max())
 
 
 def test_later_ones_move_the_starburst_along(project):
-    sheet = moving_picture(project, None).sheet
+    (sheet,) = moving_picture(project, ()).sheets
     later = at(project, -4.0, -1.7, intensity=3.0)
-    found, wanted = moving_picture(later, sheet), layers(later)
-    assert found.sheet is sheet
+    found, wanted = moving_picture(later, [sheet]), layers(later)
+    assert found.sheets == (sheet,)
     np.testing.assert_array_equal(found.ghosts, wanted["ghosts"])
     star = wanted["starburst"]
     # all of its light, in the pixel where the light is
@@ -54,20 +67,40 @@ def test_later_ones_move_the_starburst_along(project):
     )
 
 
+def test_lights_of_one_spectrum_share_a_sheet(project):
+    near, far = Light(field_deg=(5.0, 2.0)), Light(field_deg=(-7.0, 1.0), intensity=0.3)
+    warm = Light(field_deg=(1.0, -4.0), spectrum=BlackBody(temperature_k=2700.0))
+    three = project.replace(lights=(near, far, warm))
+    first = moving_picture(three, ())
+    one, other, third = first.sheets
+    assert one is other
+    assert third is not one
+    moved = three.replace(lights=(near, Light(field_deg=(-6.0, 1.5), intensity=0.3), warm))
+    found, wanted = moving_picture(moved, first.sheets), layers(moved)
+    assert found.sheets == first.sheets
+    np.testing.assert_array_equal(found.ghosts, wanted["ghosts"])
+    star = wanted["starburst"]
+    np.testing.assert_allclose(found.rest.sum(axis=(0, 1)), star.sum(axis=(0, 1)), rtol=2e-3)
+    # what half a pixel may do to a peak, in blocks of 8 x 8
+    blocks = [part.reshape(17, 8, 30, 8, 3).sum(axis=(1, 3)) for part in (found.rest, star)]
+    assert np.abs(blocks[0] - blocks[1]).sum() < 0.1 * blocks[1].sum()
+
+
 def test_what_shapes_the_starburst_makes_a_new_sheet(project):
-    sheet = moving_picture(project, None).sheet
-    assert moving_picture(project.replace(art=Art()), sheet).sheet is sheet
-    assert moving_picture(project.replace(iris=Iris(blades=7)), sheet).sheet is not sheet
-    assert moving_picture(project.replace(f_number=11.0), sheet).sheet is not sheet
+    (sheet,) = moving_picture(project, ()).sheets
+    assert moving_picture(project.replace(art=Art()), [sheet]).sheets[0] is sheet
+    assert moving_picture(project.replace(iris=Iris(blades=7)), [sheet]).sheets[0] is not sheet
+    assert moving_picture(project.replace(f_number=11.0), [sheet]).sheets[0] is not sheet
 
 
 def test_what_changes_on_the_way_is_left_to_the_renderer(project):
-    assert moving_picture(at(project, 40.0, 3.0), None) is None
-    assert moving_picture(at(project, 6.0, 3.0, diameter_deg=2.0), None) is None
-    assert moving_picture(at(project, 6.0, 3.0, distance=2000.0), None) is None
-    assert moving_picture(project.replace(lights=project.lights * 2), None) is None
-    assert moving_picture(project.replace(starburst=Starburst(cats_eye=True)), None) is None
-    assert moving_picture(project.replace(holdout=Holdout(image="matte.png")), None) is None
+    assert moving_picture(at(project, 40.0, 3.0), ()) is None
+    assert moving_picture(at(project, 6.0, 3.0, diameter_deg=2.0), ()) is None
+    assert moving_picture(at(project, 6.0, 3.0, distance=2000.0), ()) is None
+    assert moving_picture(project.replace(lights=project.lights * 5), ()) is None
+    assert moving_picture(project.replace(lights=(*project.lights, Light(field_deg=(40.0, 3.0)))), ()) is None
+    assert moving_picture(project.replace(starburst=Starburst(cats_eye=True)), ()) is None
+    assert moving_picture(project.replace(holdout=Holdout(image="matte.png")), ()) is None
 
 
 def test_the_quick_view_is_the_view():

@@ -59,7 +59,7 @@ class Hand:
         self._one = threading.Lock()
         self._scale = 0
         self._leaning = 0
-        self._sheet: Sheet | None = None
+        self._sheets: tuple[Sheet, ...] = ()
 
     def picture(self, moved: Callable[[Project], Project], revision: int) -> Moved | None:
         """Draw the project as the hand has it.
@@ -103,9 +103,9 @@ class Hand:
     def _drawn(self, project: Project, view: View) -> Picture | Still:
         scale, levels = SCALES[self._scale], self.screen.match.levels
         if not view.grey and not view.unclipped:
-            still = moving_picture(studio.moving_stage(project, scale, levels), self._sheet)
+            still = moving_picture(studio.moving_stage(project, scale, levels), self._sheets)
             if still is not None:
-                self._sheet = still.sheet
+                self._sheets = still.sheets
                 return still
         return studio.take(project, "moving", view, scale=scale, levels=levels)
 
@@ -115,11 +115,13 @@ class Hand:
         if isinstance(drawn, Picture):
             return pixels_of_picture(screen, drawn)
         if view.look == "srgb" and view.plate is None:
-            gain = screen.match.gain
+            gain, exposure = screen.match.gain, screen.exposure_stops
+            if len(drawn.stars) > 1:
+                return view_sum(drawn.ghosts, drawn.rest, exposure, ghost_gain=gain)
+            (star,) = drawn.stars
             return view_sum(
-                drawn.ghosts, drawn.sheet.pixels, screen.exposure_stops, ghost_gain=gain, rest_gain=drawn.gain,
-                corner=drawn.corner,
-            )  # fmt: skip
+                drawn.ghosts, star.sheet.pixels, exposure, ghost_gain=gain, rest_gain=star.gain, corner=star.corner
+            )
         return pixels_of_picture(screen, Picture(screen.session.project, "moving", drawn.ghosts, drawn.rest, 0.0))
 
     def _lean(self, seconds: float) -> None:

@@ -1,4 +1,4 @@
-"""Pictures of a hand that moves the light: the draft's own ghosts, and a starburst that is drawn once and moved along.
+"""Pictures of a hand that moves a light: the draft's own ghosts, and starbursts that are drawn once and moved along.
 
 Everywhere in the picture the starburst of a distant light is one pattern (docs/diffraction.md); only its place and its
 strength change. So it is drawn on a sheet with room for every place, and each picture takes its part of that: half a
@@ -7,6 +7,7 @@ pixel off at most, in a fraction of the time.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from math import floor
@@ -30,8 +31,10 @@ Floats = NDArray[np.float32]
 
 # texels a side of an iris that is an image, in ghosts
 MASK_PX = 64
+# a picture of more lights takes long by its ghosts alone, and their sheets much memory
+MOST_LIGHTS = 4
 
-__all__ = ["Sheet", "Still", "moving_picture"]
+__all__ = ["Sheet", "Star", "Still", "moving_picture"]
 
 
 @dataclass(frozen=True)
@@ -54,47 +57,67 @@ class Sheet:
 
 
 @dataclass(frozen=True)
-class Still:
-    """A picture in two parts that are added by whoever shows it.
+class Star:
+    """A light's starburst in a picture.
 
     Attributes
     ----------
-    ghosts : ndarray, shape (H, W, 3)
     sheet : Sheet
-        The starburst; kept for the next picture.
     corner : tuple of int
         Row and column of the sheet that lie on the first pixel.
     gain : tuple of float
         Of the sheet, R, G, B.
     """
 
-    ghosts: Floats
     sheet: Sheet
     corner: tuple[int, int]
     gain: tuple[float, float, float]
 
+
+@dataclass(frozen=True)
+class Still:
+    """A picture in parts that are added by whoever shows it.
+
+    Attributes
+    ----------
+    ghosts : ndarray, shape (H, W, 3)
+    stars : tuple of Star
+        One a light; their sheets are kept for the next picture.
+    """
+
+    ghosts: Floats
+    stars: tuple[Star, ...]
+
+    @property
+    def sheets(self) -> tuple[Sheet, ...]:
+        """The sheets of all lights."""
+        return tuple(star.sheet for star in self.stars)
+
     @property
     def rest(self) -> Floats:
-        """The starburst as it lies in the picture."""
-        (top, left), (height, width) = self.corner, self.ghosts.shape[:2]
-        part = self.sheet.pixels[top : top + height, left : left + width]
-        return np.asarray(part * np.array(self.gain, dtype=np.float32))
+        """The starbursts as they lie in the picture."""
+        height, width = self.ghosts.shape[:2]
+        total = np.zeros((height, width, 3), dtype=np.float32)
+        for star in self.stars:
+            top, left = star.corner
+            total += star.sheet.pixels[top : top + height, left : left + width] * np.array(star.gain, dtype=np.float32)
+        return total
 
 
-def moving_picture(project: Project, kept: Sheet | None) -> Still | None:
+def moving_picture(project: Project, kept: Sequence[Sheet]) -> Still | None:
     """Draw a project for a moving hand.
 
     Parameters
     ----------
     project : Project
         Of draft quality.
-    kept : Sheet or None
+    kept : sequence of Sheet
         Of the picture before.
 
     Returns
     -------
     Still or None
-        None where the starburst changes with the light's place, or lies elsewhere: then `render` draws it.
+        None where a starburst changes with its light's place, or lies elsewhere: then `render` draws it.
 
     Raises
     ------
@@ -113,7 +136,32 @@ def moving_picture(project: Project, kept: Sheet | None) -> Still | None:
         return None
     art = resolve_art(settled)
     mask = _mask(settled.iris)
-    (shot,) = make_shots(settled, make_opening(settled, mask))
+    shots = make_shots(settled, make_opening(settled, mask))
+    stars: list[Star] = []
+    for shot in shots:
+        star = _star(settled, shot, mask, (*(star.sheet for star in stars), *kept), art.gain.get("starburst", 1.0))
+        if star is None:
+            return None
+        stars.append(star)
+    paths = ghost_paths(settled.lens, project.quality.paths, sensor=settled.sensor is not None)
+    if mask is not None:
+        shots = tuple(replace(shot, opening=make_opening(settled, _coarse(mask))) for shot in shots)
+    layer = render_ghosts(shots, paths, project.quality, art=art.paths).total
+    by_hand = art.gain.get("ghosts", 1.0)
+    ghosts = layer.pixels if by_hand == 1.0 else layer.pixels * np.float32(by_hand)
+    width, height = shots[0].size_px
+    if ghosts.shape[:2] != (height, width):
+        x, y, w, h = layer.window
+        whole = np.zeros((height, width, 3), dtype=np.float32)
+        whole[y : y + h, x : x + w] = ghosts
+        ghosts = whole
+    return Still(ghosts, tuple(stars))
+
+
+def _star(
+    settled: Settled, shot: Shot, mask: NDArray[np.float64] | None, kept: Sequence[Sheet], by_hand: float
+) -> Star | None:
+    """Place the starburst of a light: a sheet that is kept, or a new one; None where it cannot be moved along."""
     if defocus_mm(settled.lens, shot) >= OUT_OF_FOCUS_PX / float(shot.to_pixels[2:].max()):
         return None
     image = direct_image(settled.lens, shot)
@@ -123,37 +171,28 @@ def moving_picture(project: Project, kept: Sheet | None) -> Still | None:
     if not (-1 <= column <= width and -1 <= row <= height):
         return None
     strength = _strength(shot, image)
-    scene = _scene(project)
-    if kept is None or kept.scene != scene:
+    scene = _scene(settled.project, shot.light)
+    sheet = next((sheet for sheet in kept if sheet.scene == scene), None)
+    if sheet is None:
         if not (strength > 0.0).all():
             return None
-        kept = Sheet(scene, _drawn(settled, shot, image, mask, (column, row)), strength)
-    paths = ghost_paths(settled.lens, project.quality.paths, sensor=settled.sensor is not None)
-    seen = shot if mask is None else replace(shot, opening=make_opening(settled, _coarse(mask)))
-    layer = render_ghosts((seen,), paths, project.quality, art=art.paths).total
-    by_hand = art.gain.get("ghosts", 1.0)
-    ghosts = layer.pixels if by_hand == 1.0 else layer.pixels * np.float32(by_hand)
-    if ghosts.shape[:2] != (height, width):
-        x, y, w, h = layer.window
-        whole = np.zeros((height, width, 3), dtype=np.float32)
-        whole[y : y + h, x : x + w] = ghosts
-        ghosts = whole
-    gain = art.gain.get("starburst", 1.0) * strength / kept.strength
-    return Still(ghosts, kept, (height - row, width - column), (float(gain[0]), float(gain[1]), float(gain[2])))
+        sheet = Sheet(scene, _drawn(settled, shot, image, mask, (column, row)), strength)
+    red, green, blue = (float(gain) for gain in by_hand * strength / sheet.strength)
+    return Star(sheet, (height - row, width - column), (red, green, blue))
 
 
 def _alike_everywhere(project: Project) -> bool:
-    """Tell whether the starburst is one pattern wherever the light is, as far as the project itself says."""
-    (light, *others) = project.lights
-    plain = light.distance is None and not light.extended and light.holdout is None and project.holdout is None
+    """Tell whether each starburst is one pattern wherever its light is, as far as the project itself says."""
+    plain = project.holdout is None and all(
+        light.distance is None and not light.extended and light.holdout is None for light in project.lights
+    )
     return (
-        not others and plain and not project.starburst.cats_eye and project.output.starburst
+        plain and len(project.lights) <= MOST_LIGHTS and not project.starburst.cats_eye and project.output.starburst
         and not (project.dirt.in_ghosts and not project.dirt.clean)
     )  # fmt: skip
 
 
-def _scene(project: Project) -> Project:
-    (light,) = project.lights
+def _scene(project: Project, light: Light) -> Project:
     placed = Light(field_deg=(0.0, 0.0), spectrum=light.spectrum)
     scene: Project = project.replace(lights=(placed,), art=Art(physical=project.art.physical), design=None)
     return scene
