@@ -13,7 +13,7 @@ from flarewright.optics.diffraction import BladeWings, FanWings, pupil_pattern, 
 from flarewright.optics.iris import blade_edges, outline
 from flarewright.optics.spectrum import band_weights
 from flarewright.render.render import render
-from flarewright.render.starburst import starburst_layer
+from flarewright.render.starburst import BAND, starburst_layer
 
 WHITE_NM = np.arange(380.0, 781.0, 5.0)
 WHITE = band_weights(D65(), WHITE_NM, "rec709")
@@ -334,3 +334,12 @@ def test_no_flux_is_lost_where_the_core_is_smaller_than_a_pixel(mode, lights):
         (layer,) = (layer for layer in render(project).layers if layer.name == "starburst")
         found.append(layer.pixels.sum(dtype=np.float64) / size[0] ** 2)
     assert found[0] == pytest.approx(found[1], rel=1e-4)
+
+
+@pytest.mark.parametrize("iris", [Iris(blades=6), Iris(blades=5, rounding=0.4), Iris(blades=0)])
+def test_threads_change_nothing(iris):
+    size, centre = (90, 2 * BAND + 7), (40.3, 70.8)
+    alone, together = (
+        starburst_layer(iris, 8.0, (0.02, 0.02), size, centre, WHITE_NM, GREY, threads=n) for n in (1, 3)
+    )
+    assert alone.tobytes() == together.tobytes()

@@ -8,7 +8,9 @@ waves of the blades' edges continue it in closed form, over the whole picture.
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -24,6 +26,9 @@ NEAR_PIXELS = 8
 """So close to the centre the blend and the wings change inside a pixel, which is then split NEAR_SPLIT times a side."""
 
 NEAR_SPLIT = 8
+
+BAND = 64
+"""Rows of pixels that one core blends at a time."""
 
 LEAST_CORE = 1.0
 """Radius of the core, before the blend begins, in parts of a pixel: with less the blend loses flux."""
@@ -43,6 +48,7 @@ def starburst_layer(
     mask: NDArray[np.floating] | None = None,
     pattern: Pattern | None = None,
     split: int = NEAR_SPLIT,
+    threads: int | None = 1,
 ) -> NDArray[np.float32]:
     """Irradiance of the diffracted direct image of a light.
 
@@ -71,6 +77,8 @@ def starburst_layer(
         Least number of parts a side into which pixels near the centre are divided where the wings begin there; more
         where the whole core is smaller than that. 1 is for drafts: it costs half the time, keeps the flux to 3e-5, and
         errs by 4e-6 of the peak, which is up to 0.4 of the value of some pixels within eight of the centre.
+    threads : int or None
+        None: all cores; the pixels do not depend on it.
 
     Returns
     -------
@@ -100,7 +108,7 @@ def starburst_layer(
         return picture
     pattern = pupil_pattern(iris, mask) if pattern is None else pattern
     painter = painter_of(pattern, f_number, pixel_mm, wave, weights)
-    painter.paint(x_edges, y_edges, pixel_mm, picture)
+    painter.paint(x_edges, y_edges, pixel_mm, picture, threads)
 
     # Where the blend begins inside the near zone, pixels there are too coarse for it.
     k = max(split, math.ceil(LEAST_CORE * max(pixel_mm) / painter.inner))
@@ -158,6 +166,7 @@ class Painter:
         y_edges: Floats,
         pixel_mm: tuple[float, float],
         out: NDArray[np.float32] | Floats,
+        threads: int | None = 1,
     ) -> None:
         """Write the irradiance of every pixel between the edges into `out`, which holds zeros."""
         self._core(x_edges, y_edges, pixel_mm, out)
@@ -166,14 +175,18 @@ class Painter:
         if isinstance(wings, FanWings):
             colour = 2.0 * self.f_number * (self.wave * 1e-6) @ self.weights
             cumulative = np.concatenate([[0.0], np.cumsum(wings.angular) / len(wings.angular)])
-            blend_fan_wings(x, y, np.array(pixel_mm), cumulative, colour, self.inner, self.outer, out)
+
+            def blend_fans(y: Floats, out: NDArray[np.float32] | Floats) -> None:
+                blend_fan_wings(x, y, np.array(pixel_mm), cumulative, colour, self.inner, self.outer, out)
+
+            _in_bands(blend_fans, y, out, threads)
         elif self.pattern.rough_half_fan > 0.0:
             spread = out.copy()
-            self._blades(wings, wings.half_fan, x, y, pixel_mm, out)
-            self._blades(wings, self.pattern.rough_half_fan, x, y, pixel_mm, spread)
+            self._blades(wings, wings.half_fan, x, y, pixel_mm, out, threads)
+            self._blades(wings, self.pattern.rough_half_fan, x, y, pixel_mm, spread, threads)
             out += (1.0 - self._coherence(np.hypot(x, y[:, None]))) * (spread - out)
         else:
-            self._blades(wings, wings.half_fan, x, y, pixel_mm, out)
+            self._blades(wings, wings.half_fan, x, y, pixel_mm, out, threads)
         for term in self.pattern.veil:
             self._add_veil(term, x, y, out)
 
@@ -185,24 +198,17 @@ class Painter:
         y: Floats,
         pixel_mm: tuple[float, float],
         out: NDArray[np.float32] | Floats,
+        threads: int | None,
     ) -> None:
         profile = spike_profile(wings, self.wave, self.weights, self.f_number, pixel_mm)
-        blend_blade_wings(
-            x,
-            y,
-            np.array(pixel_mm),
-            wings.angle,
-            half_fan,
-            profile.cumulative,
-            profile.density,
-            profile.half_total,
-            profile.tail,
-            profile.step,
-            0.5 / self.f_number,
-            self.inner,
-            self.outer,
-            out,
-        )
+
+        def blend(y: Floats, out: NDArray[np.float32] | Floats) -> None:
+            blend_blade_wings(
+                x, y, np.array(pixel_mm), wings.angle, half_fan, profile.cumulative, profile.density,
+                profile.half_total, profile.tail, profile.step, 0.5 / self.f_number, self.inner, self.outer, out,
+            )  # fmt: skip
+
+        _in_bands(blend, y, out, threads)
 
     def _radial(self, r: Floats, value: Callable[[Floats], Floats], least: float) -> Floats:
         """Sum over wavelengths of a function of s = r / (2 N lambda), by a table in ln r; shape of r and 3 channels."""
@@ -264,6 +270,22 @@ class Painter:
         knots_per_mm = self.pattern.knots_per_s / (2.0 * self.f_number * self.wave * 1e-6)
         deposit_core(self.pattern.table, knots_per_mm, self.weights, x_edges[j0 : j1 + 1], y_edges[i0 : i1 + 1], flux)
         out[i0:i1, j0:j1] = flux / (pixel_mm[0] * pixel_mm[1])
+
+
+def _in_bands(
+    blend: Callable[[Floats, NDArray[np.float32] | Floats], None],
+    y: Floats,
+    out: NDArray[np.float32] | Floats,
+    threads: int | None,
+) -> None:
+    """Blend rows of pixels, which know nothing of each other, band by band on several cores."""
+    if threads == 1 or len(y) <= BAND:
+        blend(y, out)
+        return
+    with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
+        starts = range(0, len(y), BAND)
+        for _ in pool.map(lambda start: blend(y[start : start + BAND], out[start : start + BAND]), starts):
+            pass
 
 
 def _near(centre: float, size: int) -> tuple[int, int]:

@@ -117,7 +117,7 @@ def starburst_of(
     for group in groups:
         total += _many_lights(scene, group, threads)
     for parts in others:
-        picture = _one_light(scene, parts)
+        picture = _one_light(scene, parts, threads)
         if picture is not None:
             total += picture
     return Layer("starburst", total, (0, 0, width, height))
@@ -166,7 +166,7 @@ def _many_lights(scene: _Scene, group: list[tuple[Shot, DirectImage]], threads: 
     fine_nm = _diffracted_wavelengths(shot)
     (pattern,) = _patterns(scene, shot, np.zeros(1))
     if pattern is None or not fits(pattern):
-        drawn = [picture for pair in group if (picture := _one_light(scene, [pair])) is not None]
+        drawn = [picture for pair in group if (picture := _one_light(scene, [pair], threads)) is not None]
         together: NDArray[np.floating] = np.sum(drawn, axis=0)
         return together
     pixels = shot.to_pixels
@@ -191,7 +191,9 @@ def _out_of_focus(settled: Settled, shot: Shot) -> bool:
     return defocus_mm(settled.lens, shot) >= OUT_OF_FOCUS_PX / float(shot.to_pixels[2:].max())
 
 
-def _one_light(scene: _Scene, parts: list[tuple[Shot, DirectImage]]) -> NDArray[np.floating] | None:
+def _one_light(
+    scene: _Scene, parts: list[tuple[Shot, DirectImage]], threads: int | None
+) -> NDArray[np.floating] | None:
     """Draw one light, the parts of an area light together; None when it is dark."""
     # the brightest part stands for the others: its place, and its pupil
     shot, image = max(parts, key=lambda pair: _flux(*pair))
@@ -233,6 +235,7 @@ def _one_light(scene: _Scene, parts: list[tuple[Shot, DirectImage]]) -> NDArray[
             shot.weights(fine_nm) * (flux * pattern.transmittance / len(turns))[:, None],
             pattern=pattern,
             split=NEAR_SPLIT if scene.settled.project.quality.mode != "draft" else 1,
+            threads=threads,
         )
         picture = drawn if picture is None else picture + drawn
     if picture is None or kernel is None:
