@@ -58,3 +58,29 @@ def test_a_replay_is_laid_on_its_frame_at_both_sides_and_any_roll(tmp_path, caps
     rows = re.findall(r"<td>([12])</td><td>([\d.]+) to ([\d.]+)</td>", drawn)
     assert {name for name, _, _ in rows} == {"1", "2"}
     assert float(next(low for name, low, _ in rows if name == "2")) == pytest.approx(5.0, abs=1.0)
+
+
+def test_frames_of_both_sides_are_laid_on_a_model_of_both_sides(tmp_path, capsys):
+    one = planted()
+    left = one.ghosts[0].replace(visible_deg=(-25.0, -5.0))
+    model = one.replace(constellation_deg=(-25.0, 25.0), ghosts=(left, *one.ghosts[1:]))
+    width, height = model.size_px
+    infos = []
+    for k, angle in enumerate((-12.0, 0.5, 12.0)):
+        drawn = replay(model, angle, roll_deg=15.0)[0].pixels
+        light = model.axis_px[0] + model.focal_px * tan(radians(angle)) * cos(radians(15.0)), model.axis_px[1]
+        info = FrameInfo(file=f"{k}.exr", constellation_deg=angle, nominal_deg=angle, light_px=light, roll_deg=15.0,
+                         axis_px=model.axis_px, exposures_s=(1.0,))  # fmt: skip
+        infos.append(info)
+        write_frame(tmp_path, MergedFrame(info, drawn, np.full((height, width, 3), 1e-6, np.float32)))
+    write_run(
+        tmp_path, MergedRun(size_px=(width, height), frames=tuple(infos), axis_px=model.axis_px, px_per_rad=170.0)
+    )
+    write_ghost_model(tmp_path / "model.json", model)
+    assert run(["measure", "report", str(tmp_path)]) == 0
+    capsys.readouterr()
+    text = (tmp_path / "report.html").read_text()
+    decibels = [float(found) for found in re.findall(r"replayed, (-?[\d.]+) dB<", text)]
+    assert len(decibels) == 3
+    # nothing is left but rounding in the files
+    assert min(decibels) > 60.0

@@ -100,7 +100,7 @@ def model_flare(
     from ..measure.replay import BEYOND_DEG, replay
     from ..predict.flare import Flare, Frame
 
-    remarks = ["star and halo of the measured flare are not counted: the light's own image is in them"]
+    remarks = ["star, halo and residual of the measured flare are not counted: the light's own image is in them"]
     reference = model.reference
     light_lx = 1.0
     if reference.luminance_cd_m2 is not None and reference.solid_angle_sr is not None:

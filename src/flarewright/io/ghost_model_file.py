@@ -17,17 +17,19 @@ from ..model.ghost_tracks import Tracks
 from ..model.replay_camera import ReplayCamera
 from .atomic import write_atomically
 from .sentences import summary, validation_sentences
-from .text_file import check_version, lower_first, read_text
+from .text_file import LARGEST, check_version, lower_first, read_text
 
 Record = TypeVar("Record", bound=Frozen)
 
 _NEWEST = 1
+# bytes; the pictures of a model's sprites are most of it
+_LARGEST_MODEL = 64_000_000
 _NUMBERS = re.compile(r"\[([-+.eE\d,\s]+)\]")
 
 
-def _read(path: str | Path, what: str, record: type[Record]) -> Record:
+def _read(path: str | Path, what: str, record: type[Record], largest: int = LARGEST) -> Record:
     try:
-        data: Any = json.loads(read_text(path, what))
+        data: Any = json.loads(read_text(path, what, largest))
     except json.JSONDecodeError as error:
         raise FlarewrightError(f"{path} is not valid JSON: {lower_first(str(error))}; is it {what}?") from None
     except (ValueError, RecursionError) as error:
@@ -61,7 +63,7 @@ def read_ghost_model(path: str | Path) -> GhostModel:
     FlarewrightError
         The file cannot be read, is not JSON, or is no ghost model; the message is one sentence.
     """
-    return _read(path, "a ghost model", GhostModel)
+    return _read(path, "a ghost model", GhostModel, _LARGEST_MODEL)
 
 
 def read_replay_camera(path: str | Path) -> ReplayCamera:

@@ -10,7 +10,7 @@ LARGEST = 4_000_000
 """Bytes; a text file beyond it is something else under a wrong name."""
 
 
-def read_bytes(path: str | Path, what: str) -> bytes:
+def read_bytes(path: str | Path, what: str, largest: int = LARGEST) -> bytes:
     """Read a small file.
 
     Parameters
@@ -18,6 +18,8 @@ def read_bytes(path: str | Path, what: str) -> bytes:
     path : str or Path
     what : str
         What the file should be, "a lens file", for the message.
+    largest : int
+        Bytes.
 
     Returns
     -------
@@ -37,7 +39,7 @@ def read_bytes(path: str | Path, what: str) -> bytes:
         if not file.is_file():
             raise ValueError(f"{file} is not a regular file: give the path of {what}")
         size = file.stat().st_size
-        if size > LARGEST:
+        if size > largest:
             raise ValueError(f"{file} has {size / 1e6:.1f} MB, too large for {what}: is it the right file?")
         data = file.read_bytes()
     except OSError as error:
@@ -49,13 +51,13 @@ def read_bytes(path: str | Path, what: str) -> bytes:
     return data
 
 
-def read_text(path: str | Path, what: str) -> str:
+def read_text(path: str | Path, what: str, largest: int = LARGEST) -> str:
     """Read a small UTF-8 text file.
 
     Parameters
     ----------
     path : str or Path
-    what : str
+    what, largest
         As in `read_bytes`.
 
     Returns
@@ -68,7 +70,7 @@ def read_text(path: str | Path, what: str) -> str:
     ValueError
         The file cannot be read (as in `read_bytes`) or is not UTF-8; the message is one sentence.
     """
-    data = read_bytes(path, what)
+    data = read_bytes(path, what, largest)
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:

@@ -19,6 +19,7 @@ from ..render.compose import beauty
 from .curves import pose_at, posed
 from .glow import halo_at, offsets, star_at
 from .numbers import NUMBERS, bezier_numbers, channel_numbers, field, frame, visible
+from .sprites import draw_sprites
 
 Floats = NDArray[np.float64]
 
@@ -29,7 +30,9 @@ _NOTHING = np.empty((0, 0, 3, 19))
 
 def light_px(model: GhostModel, constellation_deg: float, roll_deg: float = 0.0) -> tuple[float, float]:
     """Return where the light's image lies in the captures' picture, (x, y)."""
-    reach = model.focal_px * float(np.tan(np.radians(constellation_deg)))
+    t = float(np.tan(np.radians(constellation_deg)))
+    a, b = model.distortion
+    reach = model.focal_px * t * (1.0 + a * t**2 + b * t**4)
     turn = np.radians(roll_deg)
     return (
         model.axis_px[0] + reach * float(np.cos(turn)),
@@ -68,8 +71,8 @@ def replay(
     Returns
     -------
     tuple of Layer
-        "beauty", "ghosts", with a star or halo also "starburst" and "halo", then the single ghosts. Radiance in the
-        captures' unit.
+        "beauty", "ghosts", with a star, halo or sprites also "starburst", "halo" and "residual", then the single
+        ghosts. Radiance in the captures' unit; the residual may be below 0.
 
     Raises
     ------
@@ -99,6 +102,14 @@ def replay(
     if model.halo is not None:
         light = gain * halo_at(model.halo, constellation_deg, x, y)
         layers.append(Layer("halo", light.astype(np.float32), (0, 0, *size)))
+    if model.sprites:
+        axis = model.axis_px[0] * scale, model.axis_px[1] * scale + top
+        side = np.sign(constellation_deg) or 1.0
+        turn = np.radians(roll_deg)
+        toward = float(side * np.cos(turn)), float(side * np.sin(turn))
+        place = at[0] * scale, at[1] * scale + top
+        rest = gain * draw_sprites(model.sprites, constellation_deg, place, axis, toward, size, scale)
+        layers.append(Layer("residual", np.asarray(rest, dtype=np.float32), (0, 0, *size)))
     whole = beauty(layers, size)
     singles = _single(model, constellation_deg, roll_deg, size, gain) if single else []
     drawn = (whole, *layers, *singles)

@@ -171,8 +171,7 @@ def _picture_of(frame: MergedFrame) -> str:
 
 
 def _replays(folder: Path, chosen: Sequence[FrameInfo], model: GhostModel) -> str:
-    low, high = model.constellation_deg
-    inside = [info for info in chosen if low <= abs(info.constellation_deg) <= high]
+    inside = [info for info in chosen if _place(info, model) is not None]
     compared = [_compare(read_frame(folder, info), model) for info in inside]
     rows = []
     for one in compared:
@@ -192,10 +191,21 @@ def _replays(folder: Path, chosen: Sequence[FrameInfo], model: GhostModel) -> st
     return section("Replay", paragraph(words), *(f"<div>{row}</div>" for row in rows))
 
 
+def _place(info: FrameInfo, model: GhostModel) -> tuple[float, float] | None:
+    """Return constellation and roll of a frame as a model knows them; None: it does not.
+
+    Of a model of one side a frame of the other is its own side turned by half a turn.
+    """
+    low, high = model.constellation_deg
+    if low <= info.constellation_deg <= high:
+        return info.constellation_deg, info.roll_deg
+    return (-info.constellation_deg, info.roll_deg + 180.0) if low <= -info.constellation_deg <= high else None
+
+
 def _compare(frame: MergedFrame, model: GhostModel) -> _Compared:
-    roll = frame.roll_deg if frame.constellation_deg >= 0.0 else frame.roll_deg + 180.0
+    constellation, roll = _place(frame.info, model) or (frame.constellation_deg, frame.roll_deg)
     height, width = frame.radiance.shape[:2]
-    layers = replay(model, abs(frame.constellation_deg), roll_deg=roll, size_px=(width, height))
+    layers = replay(model, constellation, roll_deg=roll, size_px=(width, height))
     drawn = layers[0].pixels.astype(np.float64) + np.array(model.background)
     x, y = np.arange(width) + 0.5 - frame.light_px[0], (np.arange(height) + 0.5 - frame.light_px[1])[:, None]
     counted = frame.valid & (np.hypot(x, y) > _AROUND_LIGHT_PX)[..., None]

@@ -27,7 +27,9 @@ from .joint import lit
 from .journal import Journal
 from .numbers import channel_numbers
 from .pursuit import pursue
+from .replay import draw
 from .settle import Settling, settle, to_model
+from .sprite_fit import axis_sprite, drawn, light_sprites
 from .views import Pixels, View, halved, views_of
 
 Tell = Callable[[str], None]
@@ -37,6 +39,8 @@ Progress = Callable[[float, str], None]
 AROUND_LIGHT = 40.0 / 720.0
 # part of the glow that may stay behind where it was taken off
 LEFT_BEHIND = 0.1
+# tangent of the constellation from which the light's distance from the axis tells the focal length
+_OFF_AXIS = 0.02
 # ghosts are looked for in pictures halved until they are no wider
 SEARCH_WIDTH = 400
 
@@ -242,7 +246,29 @@ def fit_ghosts(
             settled = settle(
                 settled, dim.views, how=settling, pool=pool, tell=tell, progress=next(parts), journal=journal
             )
-    return _model(run, to_model(settled, views), _dimmed_anew(dim, views, settled), views)
+    return with_rest(_model(run, to_model(settled, views), _dimmed_anew(dim, views, settled), views), views)
+
+
+def with_rest(model: GhostModel, views: Sequence[View]) -> GhostModel:
+    """Return a model with what views show beside its ghosts, star and halo as sprites, in the place of old ones.
+
+    Parameters
+    ----------
+    model : GhostModel
+    views : sequence of View
+        As photographed.
+    """
+    left = []
+    for view in views:
+        turn = float(np.degrees(np.arctan2(view.frame[3], view.frame[2])))
+        roll = turn - (180.0 if view.constellation_deg < 0.0 else 0.0)
+        ghosts = draw(model, view.constellation_deg, roll, view.size_px)
+        known = np.where(np.isfinite(view.variance), view.pixels, np.nan)
+        left.append((known - ghosts - _light(model.halo, model.star, view)).astype(np.float32))
+    going = light_sprites(views, left)
+    left = [each - drawn(going, view) for each, view in zip(left, views, strict=True)]
+    out: GhostModel = model.replace(sprites=(*going, axis_sprite(views, left)))
+    return out
 
 
 def _dimmed_anew(dim: Dimmed, views: Sequence[View], ghosts: Sequence[Found]) -> Dimmed:
@@ -261,15 +287,21 @@ def beside(views: Sequence[View], halo: Halo | None, star: Star | None) -> list[
     """Return what views show beside halo and star, less certain where those are bright; nothing around the light."""
     out = []
     for view, mask in zip(views, masks_of(views), strict=True):
-        x, y = offsets(view.light_px, view.size_px, 1.0)
-        light = np.zeros(view.pixels.shape, np.float32)
-        if halo is not None:
-            light += halo_at(halo, view.constellation_deg, x, y).astype(np.float32)
-        if star is not None:
-            light += star_at(star, view.constellation_deg, x, y).astype(np.float32)
+        light = _light(halo, star, view)
         variance = np.where(mask[..., None], view.variance + (LEFT_BEHIND * light) ** 2, np.inf).astype(np.float32)
         out.append(replace(view, pixels=view.pixels - light, variance=variance))
     return out
+
+
+def _light(halo: Halo | None, star: Star | None, view: View) -> Pixels:
+    """Draw halo and star as a view shows them, shape (H, W, 3)."""
+    x, y = offsets(view.light_px, view.size_px, 1.0)
+    light = np.zeros(view.pixels.shape, np.float32)
+    if halo is not None:
+        light += halo_at(halo, view.constellation_deg, x, y).astype(np.float32)
+    if star is not None:
+        light += star_at(star, view.constellation_deg, x, y).astype(np.float32)
+    return light
 
 
 def _more(
@@ -318,11 +350,31 @@ def _found(ghost: AberrationGhost, views: Sequence[View]) -> Found:
     return Found((shapes[0], shapes[1], shapes[2]), first, last)
 
 
+def light_law(views: Sequence[View], px_per_rad: float) -> tuple[float, tuple[float, float]]:
+    """Return focal length (pixels) and distortion that tell where the views' lights are; see `GhostModel`.
+
+    Parameters
+    ----------
+    views : sequence of View
+    px_per_rad : float
+        Taken where fewer than four views have the light well off the axis.
+    """
+    t = np.array([np.tan(np.radians(abs(view.constellation_deg))) for view in views])
+    away = np.array([np.hypot(*np.subtract(view.light_px, view.frame[:2])) for view in views])
+    off = t > _OFF_AXIS
+    if np.unique(np.round(t[off], 4)).size < 4:
+        return px_per_rad, (0.0, 0.0)
+    bent = np.stack([t, t**3, t**5], axis=1)[off]
+    focal, a, b = np.linalg.lstsq(bent, away[off], rcond=None)[0]
+    return float(focal), (float(a / focal), float(b / focal))
+
+
 def _model(run: MergedRun, ghosts: tuple[AberrationGhost, ...], dim: Dimmed, views: Sequence[View]) -> GhostModel:
     angles = [each.constellation_deg for each in run.frames]
+    focal, distortion = light_law(views, run.px_per_rad)
     used = [view.constellation_deg for view in views]
     return GhostModel(
-        size_px=run.size_px, axis_px=run.axis_px, focal_px=run.px_per_rad,
+        size_px=run.size_px, axis_px=run.axis_px, focal_px=focal, distortion=distortion,
         largest_deg=max(abs(angle) for angle in angles), constellation_deg=(min(used), max(used)), ghosts=ghosts,
         halo=dim.halo, star=dim.star,
         reference=Reference(iso=run.reference_iso, f_number=run.reference_f_number, exposure_s=1.0),

@@ -12,7 +12,7 @@ from ..model.ghost_tracks import Tracks
 from .compact import compact
 from .fit import Shape
 from .numbers import channel_numbers
-from .stages import beside, coarse, enlarged, read_views
+from .stages import beside, coarse, enlarged, read_views, with_rest
 from .together import Shapes, halvings
 from .track import follow
 from .views import View
@@ -75,7 +75,8 @@ def compress_ghosts(
     names = {ghost.name for ghost in model.ghosts}
     if names != {track.name for track in tracks.ghosts}:
         raise FlarewrightError("the tracks are of other ghosts than the model's; run flarewright measure track again")
-    return compact(model, tracks, _views(folder, run, model, every), threads=threads, tell=tell)
+    small = compact(model, tracks, _views(folder, run, model, every), threads=threads, tell=tell)
+    return with_rest(small, read_views(folder, run, every)) if model.sprites else small
 
 
 def _views(folder: Path, run: MergedRun, model: GhostModel, every: int) -> list[View]:

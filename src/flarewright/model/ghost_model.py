@@ -12,6 +12,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from .base import Frozen
+from .sprite import Sprite
 
 Ten = tuple[float, float, float, float, float, float, float, float, float, float]
 Rgb3 = tuple[float, float, float]
@@ -238,7 +239,9 @@ class GhostModel(Frozen):
     axis_px : tuple of float
         Where the optical axis meets the picture; pixel k spans k to k + 1, row 0 is at the top.
     focal_px : float
-        Pixels per unit of tangent: the light's image lies at axis + focal_px tan(constellation).
+        Pixels per unit of tangent, near the axis.
+    distortion : tuple of float
+        (a, b): with t = tan(constellation) the light's image lies focal_px t (1 + a t^2 + b t^4) from the axis.
     largest_deg : float
         Constellation at which the field has length 1.
     constellation_deg : tuple of float
@@ -246,6 +249,8 @@ class GhostModel(Frozen):
     ghosts : tuple of AberrationGhost or BezierGhost
     halo : Halo or None
     star : Star or None
+    sprites : tuple of Sprite
+        What is left beside all of these; their light adds up.
     reference : Reference
     background : Rgb
         Radiance everywhere, part of no layer.
@@ -258,11 +263,13 @@ class GhostModel(Frozen):
     size_px: tuple[int, int]
     axis_px: tuple[float, float]
     focal_px: float = Field(gt=0.0)
+    distortion: tuple[float, float] = (0.0, 0.0)
     largest_deg: float = Field(gt=0.0, lt=90.0)
     constellation_deg: tuple[float, float]
     ghosts: tuple[Ghost, ...] = ()
     halo: Halo | None = None
     star: Star | None = None
+    sprites: tuple[Sprite, ...] = ()
     reference: Reference = Reference()
     background: Rgb3 = (0.0, 0.0, 0.0)
     to_rec709: tuple[Rgb3, Rgb3, Rgb3] | None = None

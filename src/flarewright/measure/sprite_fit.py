@@ -1,0 +1,316 @@
+"""Learn sprites: what views show beside ghosts, star and halo, as small pictures over the constellation.
+
+The star's shape follows the pupil, which the rims shade as the constellation grows; laws of radius and direction do
+not tell that. Laid over each other by the light it changes slowly, while ghosts that nobody knows go across and count
+less and less. What is still left, large faint ghosts mostly, is kept coarsely about the axis, constellation by
+constellation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..model.sprite import Sprite, packed
+from .numbers import Floats
+from .sprites import draw_sprites, samples
+from .views import Pixels, View
+
+# cells across the picture of the coarsest pictures, and cells of the finer ones around the light to each side
+ACROSS, AROUND = 90, 64
+# views for each picture that goes with the light, and how many pictures there are at most: there, and about the axis
+_VIEWS, _MOST_LIGHT, _MOST_AXIS = 5, 12, 60
+# how stiff cells are over the constellation against one view: second differences and first
+_BEND, _SLOPE = 0.02, 0.002
+# rounds in which values far from the others count less
+_ROUNDS, _FAR = 4, 3.0
+# light over noise, both as powers, below which a cell is noise
+_NOISE = 1.5
+# part of a cell that must have been measured, and views (of those for a picture) that make it known
+_MEASURED, _ENOUGH = 0.3, 0.6
+# a cell is told to this part of the noise of the darkest pixels, averaged over the cell
+_DIGIT = 0.3
+_CHUNK = 20000
+
+
+def light_sprites(views: Sequence[View], pixels: Sequence[Pixels]) -> tuple[Sprite, ...]:
+    """Learn what goes with the light.
+
+    Parameters
+    ----------
+    views : sequence of View
+        By rising constellation.
+    pixels : sequence of ndarray, shape (H, W, 3)
+        What they show beside everything known; not a number where nothing was measured.
+
+    Returns
+    -------
+    tuple of Sprite
+        Coarse ones that cover the picture first; their pictures add up.
+    """
+    width = views[0].size_px[0]
+    finest = max(0, int(np.floor(np.log2(max(width / ACROSS, 1.0)))))
+    left = list(pixels)
+    found: list[Sprite] = []
+    angles = _knots(views, min(_MOST_LIGHT, len(views) // _VIEWS))
+    for level in range(finest, -1, -1):
+        grain = 2.0**level
+        box = (
+            _whole_box(views) if level == finest else (-AROUND * grain, -AROUND * grain, AROUND * grain, AROUND * grain)
+        )
+        sprite = _fitted(views, left, grain, box, angles, level < finest)
+        found.append(sprite)
+        left = [each - drawn((sprite,), view) for each, view in zip(left, views, strict=True)]
+    return tuple(found)
+
+
+def axis_sprite(views: Sequence[View], pixels: Sequence[Pixels]) -> Sprite:
+    """Keep what is still left, coarsely, about the axis.
+
+    Parameters
+    ----------
+    views, pixels
+        As for `light_sprites`.
+
+    Returns
+    -------
+    Sprite
+    """
+    width, height = views[0].size_px
+    grain = width / ACROSS
+    corners = np.array([[x, y] for x in (0.0, width) for y in (0.0, height)])
+    places = np.concatenate([_turned(corners - view.frame[:2], view) for view in views])
+    low, high = np.floor(places.min(axis=0) / grain), np.ceil(places.max(axis=0) / grain)
+    columns, rows = (high - low).astype(int)
+    along, down = _middles(low[0] * grain, low[1] * grain, grain, int(rows), int(columns))
+    groups = np.array_split(np.arange(len(views)), min(len(views), _MOST_AXIS))
+    pictures, noises = [], []
+    for group in groups:
+        light, noise, total = np.zeros((3, rows, columns, 3))
+        for k in group:
+            ax, ay, cosine, sine, _ = views[k].frame
+            x, y = ax + cosine * along + sine * down, ay - sine * along + cosine * down
+            mean, variance, weight = _cells(pixels[k], views[k], x, y, grain)
+            light, noise, total = light + weight * mean, noise + weight**2 * variance, total + weight
+        known = total > 0.0
+        pictures.append(np.where(known, light / np.maximum(total, 1e-9), np.nan))
+        noises.append(np.where(known, noise / np.maximum(total, 1e-9) ** 2, 0.0))
+    unit, cells = packed(_beside(_filled(_sure(np.stack(pictures), np.stack(noises)))), _DIGIT * _noise(views) / grain)
+    return Sprite(
+        follows="axis", grain_px=grain, corner_px=(float(low[0] * grain), float(low[1] * grain)),
+        constellation_deg=tuple(float(np.mean([views[k].constellation_deg for k in group])) for group in groups),
+        rows=int(rows), columns=int(columns), unit=unit, cells=cells,
+    )  # fmt: skip
+
+
+def drawn(sprites: Sequence[Sprite], view: View) -> Pixels:
+    """Draw sprites as a view shows them, shape (H, W, 3)."""
+    ax, ay, cosine, sine, _ = view.frame
+    axis = float(ax), float(ay)
+    return draw_sprites(sprites, view.constellation_deg, view.light_px, axis, (cosine, sine), view.size_px)
+
+
+def _noise(views: Sequence[View]) -> float:
+    """Return the standard deviation of the darkest pixels."""
+    known = [view.variance[np.isfinite(view.variance)] for view in views]
+    return float(np.sqrt(min((np.percentile(each, 5) for each in known if each.size), default=0.0)))
+
+
+def _knots(views: Sequence[View], count: int) -> tuple[float, ...]:
+    angles = [view.constellation_deg for view in views]
+    if count < 2:
+        return (float(np.mean(angles)),)
+    return tuple(map(float, np.linspace(angles[0], angles[-1], count)))
+
+
+def _whole_box(views: Sequence[View]) -> tuple[float, float, float, float]:
+    """Return left, top, right and bottom of all pixels from the light in its place, views all together."""
+    width, height = views[0].size_px
+    x, y = np.array([view.light_px for view in views]).T
+    return -float(x.max()), -float(y.max()), width - float(x.min()), height - float(y.min())
+
+
+def _turned(offsets: Floats, view: View) -> Floats:
+    """Turn offsets (right, down) to (towards the light, at right angles)."""
+    cosine, sine = view.frame[2], view.frame[3]
+    return np.stack([cosine * offsets[:, 0] - sine * offsets[:, 1], sine * offsets[:, 0] + cosine * offsets[:, 1]], 1)
+
+
+def _middles(left: float, top: float, grain: float, rows: int, columns: int) -> tuple[Floats, Floats]:
+    x, y = np.meshgrid(left + grain * (np.arange(columns) + 0.5), top + grain * (np.arange(rows) + 0.5))
+    return x, y
+
+
+def _fitted(
+    views: Sequence[View], pixels: Sequence[Pixels], grain: float, box: tuple[float, float, float, float],
+    angles: tuple[float, ...], fade: bool,
+) -> Sprite:  # fmt: skip
+    """Fit the pictures of one grain, cell by cell."""
+    left, top = grain * np.floor(box[0] / grain), grain * np.floor(box[1] / grain)
+    columns, rows = int(np.ceil((box[2] - left) / grain)), int(np.ceil((box[3] - top) / grain))
+    right, down = _middles(left, top, grain, rows, columns)
+    values = np.zeros((len(views), rows, columns, 3), np.float32)
+    weights, noise = np.zeros_like(values), np.zeros_like(values[0])
+    for k, (view, picture) in enumerate(zip(views, pixels, strict=True)):
+        x, y = view.light_px[0] + right, view.light_px[1] + down
+        values[k], variance, weights[k] = _cells(picture, view, x, y, grain)
+        noise += weights[k] ** 2 * variance
+    told = np.array([view.constellation_deg for view in views])
+    shape = (len(views), -1)
+    found = _over_angles(values.reshape(shape), weights.reshape(shape), told, np.array(angles))
+    # what too few views tell is as its neighbours are
+    total = weights.sum(axis=0)
+    known = total >= _ENOUGH * len(views) / max(len(angles), _VIEWS)
+    noise = np.where(known, noise * len(angles) / np.maximum(total, 1e-9) ** 2, 0.0)
+    pictures = np.where(known, found.reshape(len(angles), rows, columns, 3), np.nan)
+    pictures = _beside(_sure(pictures, np.broadcast_to(noise, pictures.shape)))
+    if fade:
+        # beyond its border a fine picture is 0, and the coarse ones go on
+        pictures *= np.outer(_window(rows), _window(columns))[..., None]
+    unit, cells = packed(pictures, _DIGIT * _noise(views) / grain)
+    return Sprite(
+        follows="light", grain_px=grain, corner_px=(float(left), float(top)), constellation_deg=angles, rows=rows,
+        columns=columns, unit=unit, cells=cells,
+    )  # fmt: skip
+
+
+def _window(count: int) -> Pixels:
+    """Return 1 inside and a smooth way down to 0 over the outer eighths."""
+    away = np.minimum(np.arange(count), count - 1 - np.arange(count)) / max(count / 8.0, 1.0)
+    return np.asarray(np.sin(0.5 * np.pi * np.minimum(away, 1.0)) ** 2, dtype=np.float32)
+
+
+def _over_angles(values: Pixels, weights: Pixels, told: Floats, knots: Floats) -> Pixels:
+    """Fit every cell over the constellation, linear between knots, what stands out counting less; shape (K, cells)."""
+    basis = _hats(told, knots)
+    count = knots.size
+    bend, slope = np.diff(np.eye(count), 2, axis=0), np.diff(np.eye(count), axis=0)
+    stiff = _BEND * bend.T @ bend + _SLOPE * slope.T @ slope + 1e-6 * np.eye(count)
+    products = (basis[:, :, None] * basis[:, None, :]).reshape(told.size, -1)
+    out = np.zeros((count, values.shape[1]), np.float32)
+    seen = np.flatnonzero(weights.any(axis=0))
+    for part in np.array_split(seen, max(1, seen.size // _CHUNK)):
+        value, own = values[:, part].astype(float), weights[:, part].astype(float)
+        weight = own
+        for turn in range(_ROUNDS):
+            matrix = (products.T @ weight).T.reshape(-1, count, count) + stiff
+            solved = np.linalg.solve(matrix, (basis.T @ (weight * value)).T[..., None])[..., 0]
+            if turn == _ROUNDS - 1:
+                break
+            off = value - basis @ solved.T
+            known = np.where(own > 0.0, np.abs(off), np.nan)
+            off = off / (_FAR * 1.4826 * np.maximum(np.nanmedian(known, axis=0), 1e-12))
+            # ghosts that nobody knows are bright
+            weight = own / (1.0 + np.where(off > 0.0, off, 0.5 * off) ** 2)
+        out[:, part] = solved.T
+    return out
+
+
+def _hats(told: Floats, knots: Floats) -> Floats:
+    """Return what each knot counts at some constellations, linear between knots, shape (V, K)."""
+    if knots.size == 1:
+        return np.ones((told.size, 1))
+    k = np.clip(np.searchsorted(knots, told) - 1, 0, knots.size - 2)
+    part = np.clip((told - knots[k]) / (knots[k + 1] - knots[k]), 0.0, 1.0)
+    basis = np.zeros((told.size, knots.size))
+    basis[np.arange(told.size), k], basis[np.arange(told.size), k + 1] = 1.0 - part, part
+    return basis
+
+
+def _boxes(picture: Pixels, x: Floats, y: Floats, side: float) -> tuple[Floats, Floats]:
+    """Return the mean of upright squares around places, and which part was measured, shape (..., 3) each."""
+    known = np.isfinite(picture)
+    height, width = picture.shape[:2]
+    xs = [np.clip(x + off * side, 0.0, width) for off in (-0.5, 0.5)]
+    ys = [np.clip(y + off * side, 0.0, height) for off in (-0.5, 0.5)]
+    sums = []
+    for each in (np.where(known, picture, 0.0), known):
+        # sums over all pixels above and left, linear within a pixel, give the light in any square
+        whole = np.pad(each.astype(float), ((1, 0), (1, 0), (0, 0))).cumsum(axis=0).cumsum(axis=1)
+        sums.append(sum(sign * _linear(whole, a, b) for sign, a, b in (
+            (1.0, xs[1], ys[1]), (-1.0, xs[1], ys[0]), (-1.0, xs[0], ys[1]), (1.0, xs[0], ys[0])
+        )))  # fmt: skip
+    part = np.asarray(sums[1] / side**2)
+    return np.where(part > 1e-6, sums[0] / np.maximum(sums[1], 1e-9), 0.0), part
+
+
+def _cells(picture: Pixels, view: View, x: Floats, y: Floats, side: float) -> tuple[Floats, Floats, Floats]:
+    """Return light, its variance and its weight (0: not measured) around places, shape (..., 3) each."""
+    if side > 1.0:
+        mean, part = _boxes(picture, x, y, side)
+    else:
+        mean, part = _points(picture, x, y)
+    row = np.clip(y.astype(np.int64), 0, picture.shape[0] - 1)
+    column = np.clip(x.astype(np.int64), 0, picture.shape[1] - 1)
+    weight = np.where((part > _MEASURED) & np.isfinite(view.variance[row, column]), part, 0.0)
+    variance = np.where(weight > 0.0, view.variance[row, column] / np.maximum(part * side**2, 1e-9), 0.0)
+    return np.where(weight > 0.0, mean, 0.0), variance, weight
+
+
+def _sure(pictures: Floats, variance: Floats) -> Floats:
+    """Return pictures with as much of each cell as stands out of noise; what is not known stays so.
+
+    Of light of power s in noise of power n, least squares keep 1 - n / (s + n) (Wiener); s + n is the mean over colours
+    and the cells beside.
+    """
+    ratio = np.where(np.isnan(pictures), 0.0, pictures**2 / np.maximum(variance, 1e-30)).mean(axis=3)
+    padded = np.pad(ratio, ((0, 0), (1, 1), (1, 1)), mode="edge")
+    rows, columns = ratio.shape[1:]
+    power = sum(padded[:, a : a + rows, b : b + columns] for a in range(3) for b in range(3)) / 9.0
+    kept = np.where(power > _NOISE, 1.0 - 1.0 / np.maximum(power, 1.0), 0.0)
+    return np.asarray(pictures * kept[..., None])
+
+
+def _linear(whole: Floats, x: Floats, y: Floats) -> Floats:
+    """Read an array of shape (H, W, 3) between its whole places."""
+    left = np.minimum(x.astype(np.int64), whole.shape[1] - 2)
+    top = np.minimum(y.astype(np.int64), whole.shape[0] - 2)
+    a, b = (x - left)[..., None], (y - top)[..., None]
+    upper = (1.0 - a) * whole[top, left] + a * whole[top, left + 1]
+    return np.asarray((1.0 - b) * upper + b * ((1.0 - a) * whole[top + 1, left] + a * whole[top + 1, left + 1]))
+
+
+def _points(picture: Pixels, x: Floats, y: Floats) -> tuple[Floats, Floats]:
+    """Return values between pixels, and 1 where all around was measured, shape (..., 3) each."""
+    height, width = picture.shape[:2]
+    # up to the very border, half a pixel beyond the outermost middles
+    inside = (x >= 0.0) & (x <= width) & (y >= 0.0) & (y <= height)
+    column, row = np.clip(x - 0.5, 0.0, width - 1.0).ravel(), np.clip(y - 0.5, 0.0, height - 1.0).ravel()
+    unknown = ~np.isfinite(picture)
+    values = samples(np.where(unknown, 0.0, picture).astype(np.float32), column, row).reshape(*x.shape, 3)
+    gaps = np.pad(unknown, ((1, 2), (1, 2), (0, 0)), mode="edge")
+    near = np.zeros_like(unknown)
+    for a in range(4):
+        for b in range(4):
+            near |= gaps[a : a + height, b : b + width]
+    clear = ~near[row.astype(np.int64), column.astype(np.int64)].reshape(*x.shape, 3)
+    return values.astype(float), (clear & inside[..., None]).astype(float)
+
+
+def _beside(pictures: Floats | Pixels) -> Pixels:
+    """Fill cells that are not known from known ones beside them, farther and farther; with 0 where there are none."""
+    out = np.asarray(pictures, dtype=np.float32)
+    while True:
+        gaps = np.isnan(out)
+        if not gaps.any() or gaps.all(axis=(1, 2)).any():
+            return np.nan_to_num(out)
+        padded = np.pad(out, ((0, 0), (1, 1), (1, 1), (0, 0)), constant_values=np.nan)
+        around = np.stack([padded[:, :-2, 1:-1], padded[:, 2:, 1:-1], padded[:, 1:-1, :-2], padded[:, 1:-1, 2:]])
+        count = np.isfinite(around).sum(axis=0)
+        mean = np.nansum(around, axis=0) / np.maximum(count, 1)
+        out = np.where(gaps & (count > 0), mean, out)
+
+
+def _filled(pictures: Floats) -> NDArray[np.float32]:
+    """Fill what one constellation did not measure from the nearest ones that did."""
+    count = len(pictures)
+    out = pictures.copy()
+    for k in range(count):
+        for other in sorted(range(count), key=lambda n: abs(n - k)):
+            gaps = np.isnan(out[k])
+            if not gaps.any():
+                break
+            out[k][gaps] = pictures[other][gaps]
+    return np.asarray(out, dtype=np.float32)

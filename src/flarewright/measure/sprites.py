@@ -1,0 +1,90 @@
+"""Draw the sprites of a measured flare: small pictures that go with the light or stay about the axis."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..kernels.measure_sprite import cubic_samples
+from ..model.sprite import Sprite
+
+Pixels = NDArray[np.float32]
+
+
+def sprite_at(sprite: Sprite, constellation_deg: float) -> Pixels:
+    """Return a sprite's picture at a constellation, shape (rows, columns, 3)."""
+    angles = np.array(sprite.constellation_deg)
+    pictures: Pixels = sprite.pictures
+    if angles.size == 1:
+        return np.asarray(pictures[0], dtype=np.float32)
+    k = int(np.clip(np.searchsorted(angles, constellation_deg) - 1, 0, angles.size - 2))
+    part = np.float32(np.clip((constellation_deg - angles[k]) / (angles[k + 1] - angles[k]), 0.0, 1.0))
+    return np.asarray((1.0 - part) * pictures[k] + part * pictures[k + 1], dtype=np.float32)
+
+
+def draw_sprites(
+    sprites: Sequence[Sprite],
+    constellation_deg: float,
+    light_px: tuple[float, float],
+    axis_px: tuple[float, float],
+    direction: tuple[float, float],
+    size_px: tuple[int, int],
+    scale: float = 1.0,
+) -> Pixels:
+    """Draw sprites into one picture.
+
+    Parameters
+    ----------
+    sprites : sequence of Sprite
+    constellation_deg : float
+    light_px, axis_px : tuple of float
+        Pixels of the picture.
+    direction : tuple of float
+        Cosine and sine of the light's direction, counterclockwise from the right in the upright picture.
+    size_px : tuple of int
+        Width and height.
+    scale : float
+        Pixels of the picture per pixel of the sprites.
+
+    Returns
+    -------
+    ndarray, shape (H, W, 3), float32
+        Radiance; nothing beyond the cells.
+    """
+    width, height = size_px
+    out = np.zeros((height, width, 3), np.float32)
+    for sprite in sprites:
+        cells = sprite_at(sprite, constellation_deg)
+        cosine, sine = direction if sprite.follows == "axis" else (1.0, 0.0)
+        x0, y0 = axis_px if sprite.follows == "axis" else light_px
+        step = 1.0 / (scale * sprite.grain_px)
+        # along = cos dx - sin dy and down = sin dx + cos dy, dx and dy counted right and down
+        matrix = step * np.array([[cosine, sine], [-sine, cosine]])
+        begin = matrix @ np.array([0.5 - y0, 0.5 - x0]) - np.array(sprite.corner_px[::-1]) / sprite.grain_px - 0.5
+        top, left, rows, columns = _window(matrix, begin, cells.shape[:2], (height, width))
+        if not (rows and columns):
+            continue
+        r, c = np.mgrid[top : top + rows, left : left + columns]
+        at = matrix @ np.stack([r.ravel(), c.ravel()]) + begin[:, None]
+        out[top : top + rows, left : left + columns] += samples(cells, at[1], at[0]).reshape(rows, columns, 3)
+    return out
+
+
+def samples(cells: Pixels, column: NDArray[np.float64], row: NDArray[np.float64]) -> Pixels:
+    """Return a picture's light between its cells' middles, shape (N, 3); see `cubic_samples`."""
+    out = np.empty((column.size, 3))
+    cubic_samples(np.ascontiguousarray(cells, dtype=np.float32), column, row, out)
+    return out.astype(np.float32)
+
+
+def _window(
+    matrix: NDArray[np.float64], begin: NDArray[np.float64], cells: tuple[int, ...], size: tuple[int, int]
+) -> tuple[int, int, int, int]:
+    """Return top, left, rows and columns of the pixels that a sprite's cells cover."""
+    corners = np.array([[r, c] for r in (-0.5, cells[0] - 0.5) for c in (-0.5, cells[1] - 0.5)])
+    at = np.linalg.solve(matrix, (corners - begin).T)
+    low = np.clip(np.ceil(at.min(axis=1)), 0, size).astype(int)
+    high = np.clip(np.floor(at.max(axis=1)) + 1, 0, size).astype(int)
+    return int(low[0]), int(low[1]), int(max(high[0] - low[0], 0)), int(max(high[1] - low[1], 0))

@@ -1,0 +1,96 @@
+"""Small pictures over the constellation: what a measured flare holds beside its ghosts, star and halo."""
+
+from __future__ import annotations
+
+import base64
+import zlib
+from functools import cached_property
+from math import prod
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, model_validator
+
+from .base import Frozen
+
+# bits of a number's fraction that are kept, of the ten of a 16-bit float
+_FRACTION = 4
+
+
+class Sprite(Frozen):
+    """Light that no ghost, star or halo explains, as pictures that change slowly over the constellation.
+
+    Attributes
+    ----------
+    follows : {"light", "axis"}
+        "light": it goes where the light's image goes and stays upright, as the star does. "axis": it stays about the
+        optical axis and turns with the direction of the light, as ghosts do.
+    grain_px : float
+        Side of a cell, pixels.
+    corner_px : tuple of float
+        Where the first cell begins, from the light or the axis: "light": right and down; "axis": towards the light and
+        at right angles to it, down when the light is right.
+    constellation_deg : tuple of float
+        Of each picture, rising; linear between them, and beyond as at the ends.
+    rows, columns : int
+        Cells of each picture.
+    unit : float
+        Radiance of 1 in `cells`.
+    cells : str
+        Base64 of zlib of 16-bit floats (IEEE 754) in the order picture, row, column, red-green-blue: first the upper
+        byte of each, then the lower byte of each. They may be below 0.
+    """
+
+    follows: Literal["light", "axis"]
+    grain_px: float = Field(gt=0.0)
+    corner_px: tuple[float, float]
+    constellation_deg: tuple[float, ...] = Field(min_length=1)
+    rows: int = Field(ge=1)
+    columns: int = Field(ge=1)
+    unit: float = Field(gt=0.0)
+    cells: str
+
+    @model_validator(mode="after")
+    def _fits(self) -> Sprite:
+        if any(b <= a for a, b in zip(self.constellation_deg, self.constellation_deg[1:], strict=False)):
+            raise ValueError("the constellations of a sprite must rise")
+        try:
+            whole = zlib.decompress(base64.b64decode(self.cells, validate=True))
+        except (ValueError, zlib.error):
+            raise ValueError("the cells of a sprite are not base64 of zlib") from None
+        if len(whole) != 2 * prod(self._shape):
+            raise ValueError(f"the cells of a sprite hold {len(whole)} bytes instead of {2 * prod(self._shape)}")
+        return self
+
+    @property
+    def _shape(self) -> tuple[int, int, int, int]:
+        return len(self.constellation_deg), self.rows, self.columns, 3
+
+    @cached_property
+    def pictures(self) -> NDArray[np.float32]:
+        """Radiance, shape (constellations, rows, columns, 3)."""
+        planes = np.frombuffer(zlib.decompress(base64.b64decode(self.cells)), np.uint8).reshape(2, -1)
+        bits = (planes[0].astype(np.uint16) << 8) | planes[1]
+        values: NDArray[np.float32] = bits.view(np.float16).astype(np.float32).reshape(self._shape)
+        return values * np.float32(self.unit)
+
+
+def packed(pictures: NDArray[np.float32], step: float) -> tuple[float, str]:
+    """Return `unit` and `cells` of a sprite.
+
+    Parameters
+    ----------
+    pictures : ndarray, shape (constellations, rows, columns, 3)
+        Radiance.
+    step : float
+        Radiance to which cells are told, above 0; bright ones to 1 part in 32 if that is more.
+    """
+    unit = max(step, float(np.abs(pictures).max(initial=0.0)) / 32768.0)
+    # bright cells make the unit larger than the step; the fractions of 16-bit floats go down to 1e-7 of it
+    bits = (np.rint(pictures / step) * (step / unit)).astype(np.float16).view(np.uint16).ravel()
+    # rounded to the fraction that is kept: half of its last place is added, and what is below cut off
+    gone = 10 - _FRACTION
+    bits = ((bits + (1 << (gone - 1))) >> gone) << gone
+    planes = np.concatenate([(bits >> 8).astype(np.uint8), (bits & 0xFF).astype(np.uint8)])
+    return unit, base64.b64encode(zlib.compress(planes.tobytes(), 9)).decode("ascii")

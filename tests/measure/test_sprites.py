@@ -1,0 +1,172 @@
+"""Sprites: what is drawn is where it should be, what is learned foretells left-out constellations, ghosts stay out."""
+
+import json
+
+import numpy as np
+import pytest
+from planted_run import LARGEST, SIZE, views
+from test_replay import planted
+
+from flarewright.errors import FlarewrightError
+from flarewright.io.ghost_model_file import read_ghost_model, write_ghost_model
+from flarewright.measure.glow import offsets
+from flarewright.measure.numbers import frame
+from flarewright.measure.replay import light_px, replay
+from flarewright.measure.sprite_fit import axis_sprite, drawn, light_sprites
+from flarewright.measure.sprites import draw_sprites, sprite_at
+from flarewright.measure.stages import light_law, with_rest
+from flarewright.measure.views import View
+from flarewright.model.ghost_model import GhostModel
+from flarewright.model.sprite import Sprite, packed
+
+ANGLES = np.linspace(1.0, LARGEST, 15)
+
+
+def sprite(pictures, **changes):
+    unit, cells = packed(np.asarray(pictures, np.float32), 1e-4)
+    count, rows, columns, _ = np.shape(pictures)
+    said = {"follows": "axis", "grain_px": 4.0, "corner_px": (-60.0, -40.0), "constellation_deg": tuple(range(count))}
+    return Sprite(**{**said, "rows": rows, "columns": columns, "unit": unit, "cells": cells, **changes})
+
+
+def slope(rows=20, columns=30):
+    """Return a picture whose light is a straight function of the place in cells."""
+    y, x = np.mgrid[:rows, :columns] + 0.5
+    return straight(x, y)
+
+
+def straight(x, y):
+    return np.stack([0.2 * (x - 15.0), 0.1 * (x - 15.0) + 0.3 * (y - 10.0), 0.2 * (10.0 - y)], axis=-1)
+
+
+def test_cells_come_back_to_their_step():
+    values = np.random.default_rng(0).normal(size=(3, 5, 4, 3)) * np.geomspace(0.01, 100.0, 3)[:, None, None, None]
+    back = sprite(values, constellation_deg=(0.0, 1.0, 2.0)).pictures
+    off = np.abs(back - values)
+    assert (off <= np.maximum(np.maximum(0.5e-4, 0.5 * np.abs(values).max() / 32768.0), np.abs(values) / 31.0)).all()
+
+
+@pytest.mark.parametrize(("turn", "scale"), [(0.0, 1.0), (37.0, 1.0), (180.0, 2.5)])
+def test_a_sprite_lies_where_its_corner_and_the_lights_direction_say(turn, scale):
+    axis, size = (51.3 * scale, 47.8 * scale), (round(104 * scale), round(98 * scale))
+    toward = np.cos(np.radians(turn)), np.sin(np.radians(turn))
+    got = draw_sprites([sprite([slope()])], 3.0, (0.0, 0.0), axis, toward, size, scale)
+    x, y = offsets(axis, size, scale)
+    # along the light's direction, and down when it is right; y counts upwards
+    along, down = toward[0] * x + toward[1] * y, toward[1] * x - toward[0] * y
+    u, v = (along + 60.0) / 4.0, (down + 40.0) / 4.0
+    expected = straight(u, v)
+    # splines bend near the border, where nothing tells them how to go on
+    inner = (u > 5.0) & (u < 25.0) & (v > 5.0) & (v < 15.0)
+    assert inner.sum() > 1000
+    # cells are told to 1 part in 32, which is nought on average
+    assert np.abs(got - expected)[inner].max() < 0.15
+    assert np.abs((got - expected)[inner].mean(axis=0)).max() < 0.005
+    if turn % 180.0 == 0.0:
+        assert np.abs(got[(u < -0.5) | (u > 30.5) | (v < -0.5) | (v > 20.5)]).max(initial=0.0) == 0.0
+
+
+def test_one_that_goes_with_the_light_stays_upright_and_changes_over_the_constellation():
+    one = sprite([slope(), 3.0 * slope()], follows="light", constellation_deg=(4.0, 8.0))
+    here, there = (draw_sprites([one], 5.0, place, (0.0, 0.0), (0.0, 1.0), (120, 80)) for place in ((60, 40), (63, 38)))
+    assert np.allclose(here[2:, :-3], there[:-2, 3:], atol=1e-5)
+    assert np.allclose(sprite_at(one, 5.0), 1.5 * slope(), rtol=0.05)
+    assert np.array_equal(sprite_at(one, 99.0), one.pictures[1])
+
+
+def lights(fade, angles=ANGLES):
+    """Return views of a star whose shape the pupil's shade changes, and where it is."""
+    out = []
+    for view in views((), noise=0.002, angles=angles, seed=int(angles[0] * 100)):
+        place = (30.0 + 7.3 * view.constellation_deg, 79.2)
+        x, y = offsets(place, SIZE, 1.0)
+        wide = 1.0 + fade * view.constellation_deg
+        light = 3.0 / (1.0 + (x**2 + (wide * y) ** 2) / 40.0)
+        pixels = view.pixels + light[..., None]
+        out.append(
+            View(view.constellation_deg, view.sigma, view.frame, place, pixels.astype(np.float32), view.variance)
+        )
+    return out
+
+
+def test_what_goes_with_the_light_is_foretold_between_constellations():
+    seen, between = lights(0.05), lights(0.05, 0.5 * (ANGLES[:-1] + ANGLES[1:]))
+    found = light_sprites(seen, [view.pixels for view in seen])
+    mine = interpolated = 0.0
+    for k, view in enumerate(between):
+        far = np.hypot(*offsets(view.light_px, SIZE, 1.0)) > 8.0
+        mine += float(((drawn(found, view) - view.pixels)[far] ** 2).sum())
+        halfway = 0.5 * (seen[k].pixels + seen[k + 1].pixels)
+        interpolated += float(((halfway - view.pixels)[far] ** 2).sum())
+    assert mine < 0.12 * interpolated
+
+
+def test_what_is_left_stays_about_the_axis_at_both_sides_and_where_nothing_was_measured():
+    angles = np.concatenate([-ANGLES[:6][::-1], ANGLES[:6]])
+    seen = []
+    for view in views((), angles=angles, roll_deg=20.0, noise=0.001):
+        placed = frame((122.3, 78.4), 20.0, view.constellation_deg, 1.0)
+        x, y = offsets((122.3, 78.4), SIZE, 1.0)
+        along = placed[2] * x + placed[3] * y
+        soft = np.exp(-0.5 * ((along - 30.0) ** 2 + (x**2 + y**2 - along**2)) / 18.0**2)
+        pixels = view.pixels + 0.4 * soft[..., None].astype(np.float32)
+        pixels[60:70, 100:120] = np.nan if view.constellation_deg == angles[3] else 0.0
+        seen.append(View(view.constellation_deg, view.sigma, placed, view.light_px, pixels, view.variance))
+    one = axis_sprite(seen, [view.pixels for view in seen])
+    assert one.constellation_deg == pytest.approx(angles)
+    for view in seen:
+        known = np.isfinite(view.pixels)
+        known[52:78, 92:128] = False
+        assert np.abs(drawn((one,), view) - view.pixels)[known].max() < 0.02
+        assert np.isfinite(drawn((one,), view)).all()
+
+
+def test_the_lights_place_follows_the_lens_distortion():
+    model = GhostModel(
+        size_px=SIZE, axis_px=(120.0, 80.0), focal_px=300.0, distortion=(-0.08, 0.01), largest_deg=LARGEST,
+        constellation_deg=(1.0, LARGEST),
+    )  # fmt: skip
+    seen = []
+    for view in views((), angles=ANGLES, roll_deg=10.0):
+        placed = frame(model.axis_px, 10.0, view.constellation_deg, 1.0)
+        at = light_px(model, view.constellation_deg, 10.0)
+        seen.append(View(view.constellation_deg, view.sigma, placed, at, view.pixels, view.variance))
+    focal, bent = light_law(seen, 290.0)
+    assert focal == pytest.approx(300.0, rel=1e-6)
+    assert bent == pytest.approx((-0.08, 0.01), abs=1e-4)
+    assert light_law(seen[:3], 290.0) == (290.0, (0.0, 0.0))
+
+
+def test_a_replay_with_its_rest_is_the_capture():
+    model = planted().replace(star=None)
+    seen = []
+    for k, angle in enumerate((2.0, 8.0, 14.0, 20.0)):
+        placed = frame(model.axis_px, 0.0, angle, 1.0)
+        rest = 0.2 * np.outer(np.hanning(90), np.hanning(160))[..., None] * (1.0 + k)
+        pixels = (replay(model, angle)[0].pixels + rest).astype(np.float32)
+        seen.append(View(angle, 0.5, placed, light_px(model, angle), pixels, np.full(pixels.shape, 1e-6, np.float32)))
+    whole = with_rest(model, seen)
+    for view in seen:
+        layers = {layer.name: layer.pixels for layer in replay(whole, view.constellation_deg)}
+        assert np.abs(layers["beauty"] - view.pixels).max() < 0.05
+        assert np.allclose(layers["beauty"], layers["ghosts"] + layers["halo"] + layers["residual"], atol=1e-6)
+        # half the size shows the same light
+        small = replay(whole, view.constellation_deg, size_px=(80, 45))[-1].pixels
+        assert np.abs(small - layers["residual"].reshape(45, 2, 80, 2, 3).mean(axis=(1, 3))).max() < 0.02
+    # anew, not on top
+    assert len(with_rest(whole, seen).sprites) == len(whole.sprites)
+
+
+def test_a_broken_sprite_is_told_in_a_sentence(tmp_path):
+    path = tmp_path / "model.json"
+    write_ghost_model(path, planted().replace(sprites=(sprite([slope()]),)))
+    assert np.array_equal(read_ghost_model(path).sprites[0].pictures, sprite([slope()]).pictures)
+    said = json.loads(path.read_text())
+    for cells, words in (
+        ("AAAA", "not base64 of zlib"),
+        (sprite([slope(3, 3)]).cells, "hold 54 bytes instead of 3600"),
+    ):
+        said["sprites"][0]["cells"] = cells
+        path.write_text(json.dumps(said))
+        with pytest.raises(FlarewrightError, match=words):
+            read_ghost_model(path)
