@@ -13,7 +13,9 @@ from flarewright.optics import edge_ringing
 from flarewright.optics.blade_form import blade_form
 from flarewright.optics.edge_ringing import (
     CORNER_SAMPLES,
+    EDGE_SAMPLES,
     PROFILE_SAMPLES,
+    REACH,
     Corner,
     averaged,
     corner_of,
@@ -22,6 +24,7 @@ from flarewright.optics.edge_ringing import (
 )
 from flarewright.optics.iris import blade_edges, coverage, softened
 from flarewright.optics.ringing import fresnel_grid, fresnel_intensity
+from flarewright.render.edge_rings import SHORTEST, edge_crossing
 
 RADIUS = 2.0
 IRISES = [Iris(), Iris(blades=8, rotation_deg=7), Iris(blades=3), Iris(blades=5, rounding=0.5, rotation_deg=11)]
@@ -90,6 +93,38 @@ def test_shared_tables_are_the_openings_own_pattern(iris):
     light = looked_up(tables, form, scale, x, y).sum() * grid.step**2
     assert light * gain(form, scale, tables) == pytest.approx(math.pi * RADIUS**2, rel=2e-4)
     assert abs(gain(form, scale, tables) - 1.0) < 2e-3
+
+
+@pytest.mark.parametrize("iris", IRISES)
+def test_tables_serve_blades_that_are_just_long_enough(iris):
+    """Where half a blade is `SHORTEST` scales long, fringes of a whole opening are still those of its corners."""
+    form = blade_form(blade_edges(iris, RADIUS))
+    at = np.linspace(-0.9, 0.9, 13)
+    shortest = SHORTEST if iris.blades else REACH
+    widest = (min(form.half_length, form.offset) / shortest) ** 2 / 0.6
+    areas, shares = widest / 1.09 * (1.0 + 0.09 * at), (1.0 - np.abs(at)) / (1.0 - np.abs(at)).sum()
+    known = np.array([500.0, 600.0]), np.array([widest, widest])
+    assert edge_crossing(form, *known, 0.0) is not None
+    assert edge_crossing(form, *known, 0.01 * form.offset) is None
+    grid, expected = own(iris, areas, shares)
+    scale = math.sqrt(0.5 * float(shares @ areas))
+    logs = 0.5 * np.log(areas)
+    tables = averaged(form, scale, math.sqrt(float(shares @ logs**2 - (shares @ logs) ** 2)))
+    x, y = np.meshgrid(*grid.at)
+    error = looked_up(tables, form, scale, x, y) - expected
+    seen = np.hypot(x, y) < form.distance + 4.0 * scale
+    assert np.abs(error[seen]).max() < 0.09
+    assert math.sqrt(np.mean(error[seen] ** 2)) < 3.5e-3
+    light = looked_up(tables, form, scale, x, y).sum() * grid.step**2
+    assert light * gain(form, scale, tables) == pytest.approx(form.area, rel=1e-3)
+
+
+def test_the_kernels_profile_is_the_tables():
+    tables = averaged(blade_form(blade_edges(Iris(blades=6), RADIUS)), 0.05, 0.02)
+    fine = tables.values[tables.corner.size :][: tables.edge_count]
+    at = np.linspace(0.0, len(tables.profile) - 1.0, 9973)
+    nearest = fine[np.rint(at * (EDGE_SAMPLES // PROFILE_SAMPLES)).astype(int)]
+    assert np.abs(nearest - np.interp(at, np.arange(len(tables.profile)), tables.profile)).max() < 3e-3
 
 
 def test_one_table_serves_all_fresnel_numbers_of_straight_blades():

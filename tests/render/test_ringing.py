@@ -130,11 +130,11 @@ def test_an_edge_that_is_not_lit_does_not_ring():
     unlit = []
     real = Ringing.of
 
-    def watched(self, packed, path, light, traced, *rest):
-        rings = real(self, packed, path, light, traced, *rest)
+    def watched(self, packed, path, light, bundle, *rest):
+        rings = real(self, packed, path, light, bundle, *rest)
         inner = self.opening.inner
         nearest = 0.0
-        for data in traced:
+        for data in bundle.traced.values():
             radius = np.hypot(data[:, 5::2], data[:, 6::2])
             passing = (data[:, 4] > 0) & (data[:, 3] <= 1) & (radius <= inner).all(axis=1)
             nearest = max(nearest, float(radius[passing].max(initial=0.0)))

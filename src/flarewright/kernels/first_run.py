@@ -34,7 +34,7 @@ _WINGS = "f8[::1], f8[::1], f8[::1], f8[::1]"
 ROOTS = {
     "mesh": (
         "mesh.build_mesh",
-        f"{_GEOMETRY}, f8[:,::1], f8[:,:,::1], f8, f8, f8, i8, f8, f8, f8[::1], i8, i8, i8, f8, f8, f8, f8",
+        f"{_GEOMETRY}, f8[:,::1], f8[:,:,::1], f8, f8, f8, i8, f8, f8, f8[::1], i8, i8, i8, f8, f8, f8, f8, f8, f8",
         4.7,
     ),
     "prepass": (
@@ -46,13 +46,8 @@ ROOTS = {
     "draw masked": ("bundle.draw_bundle", f"{_BUNDLE}, f8[::1], i8, f8[:,::1], f8[:,::1], f8, {_CANVAS}, i8", 4.8),
     "draw ringing": (
         "ringing.draw_ringing",
-        f"{_BUNDLE}, f8[::1], i8, f4[::1], f8[:,::1], f8[:,::1], {_CANVAS}, f4[:,::1], i8",
+        f"{_BUNDLE}, f8[::1], i8, f4[::1], f8[:,::1], f8[:,::1], {_CANVAS}, i8",
         2.5,
-    ),
-    "open cells": (
-        "pattern.find_open",
-        "f8[:,::1], i8[:,::1], i8, i8, f8[:,::1], f8[:,::1], f8[:,::1]",
-        0.4,
     ),
     "densities": ("bundle.node_densities", _BUNDLE, 0.4),
     "measure": ("bundle.measure_bundle", f"{_BUNDLE}, i8, f8[:,::1], f8[:,::1], i8", 1.2),

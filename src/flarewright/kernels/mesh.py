@@ -12,13 +12,16 @@ UNKNOWN, LEAF, SPLIT, EMPTY, FLAT = 0, 1, 2, 3, 4
 INNER_BEND = 0.02
 # cells that the rim crosses are halved at least this often
 RIM_LEVEL = 2
+# cells in fringes are no larger than this many pixels: of a small one most often one edge tells the pattern
+FRINGE_CELL = 128.0
 # cells whose rays all end, but not at one surface, are halved so often
 SLIVER_LEVEL = 3
 
 
 @inner
 def _judge(
-    data, nodes, crossings, iris_radius, iris_inner, level, max_level, h, tolerance, flux_tolerance, scale, view_radius,
+    data, nodes, crossings, iris_radius, iris_inner, level, max_level, h, tolerance, flux_tolerance, fringe_tolerance,
+    faint_radius, scale, view_radius,
 ):  # fmt: skip
     """Decide whether a cell of 3 x 3 nodes is EMPTY, to be SPLIT, a LEAF, or a FLAT one.
 
@@ -42,22 +45,31 @@ def _judge(
         return FLAT
     extent = max(x_high - x_low, y_high - y_low) * scale
     error = 0.0
-    at_rim = False
+    at_rim, at_fringes = False, False
     # the rim of the bundle decides its flux, so it is resolved however small the ghost is
-    for limit in range(1 + crossings):
+    for limit in range(crossings, -1, -1):
         low, high, bend = _limit_range(data, nodes, limit, iris_radius)
         # between the circles in and around the iris run its blades
+        if limit > 0 and low * iris_radius > faint_radius:
+            return FLAT
         if low < 1.0 and high > (1.0 if limit == 0 else iris_inner / iris_radius):
+            if limit > 0 and fringe_tolerance > 0.0:
+                at_fringes = True
+                continue
             # a rim met by several surfaces has corners that a coarse cell cannot tell
             if level < RIM_LEVEL:
                 return SPLIT
             at_rim = True
             part = bend / max(high - low, 1e-12)
             error = max(error, part * h / flux_tolerance, part * extent / tolerance)
+    if at_fringes and extent > FRINGE_CELL:
+        return SPLIT
     if extent >= 1.0:
         bend_x, bend_y = _bend(data, nodes, np.int64(X)), _bend(data, nodes, np.int64(Y))
         # away from the rim nothing marks a place: an error that is small beside a wide cell is not seen
-        allowed = tolerance if at_rim else max(tolerance, INNER_BEND * extent)
+        allowed = tolerance
+        if not at_rim:
+            allowed = max(tolerance, min(INNER_BEND * extent, fringe_tolerance if at_fringes else np.inf))
         error = max(error, np.sqrt(bend_x * bend_x + bend_y * bend_y) * scale / allowed)
     if extent > 2.0:
         area_low, area_high = _fan_areas(data, nodes)
@@ -136,7 +148,8 @@ def _fan_areas(data, nodes):
 @compiled
 def build_mesh(
     rows, actions, curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, tilt, nearness,
-    crossings, iris_radius, iris_inner, box, nx, ny, max_level, tolerance, flux_tolerance, scale, view_radius,
+    crossings, iris_radius, iris_inner, box, nx, ny, max_level, tolerance, flux_tolerance, fringe_tolerance,
+    faint_radius, scale, view_radius,
 ):  # fmt: skip
     """Trace a path on a grid that is refined where the map bends, folds or is cut, and triangulate it without cracks.
 
@@ -155,6 +168,11 @@ def build_mesh(
         Largest error of interpolated positions, pixels.
     flux_tolerance : float
         Largest part of the bundle's flux that the rim's interpolation may get wrong.
+    fringe_tolerance : float
+        Above 0 the iris does not cut: light fades between its circles in fringes, whose places may err by so many
+        pixels.
+    faint_radius : float
+        What crosses the stop farther out, mm, has so little light that nothing is refined for it.
     scale : float
         Pixels per mm on the sensor.
     view_radius : float
@@ -207,7 +225,7 @@ def build_mesh(
             for v in range(n_gap.shape[0]):
                 found = _judge(
                     data[v], nodes, crossings, iris_radius, iris_inner, level, max_level, h,
-                    tolerance, flux_tolerance, scale, view_radius,
+                    tolerance, flux_tolerance, fringe_tolerance, faint_radius, scale, view_radius,
                 )  # fmt: skip
                 if found == SPLIT:
                     verdict = SPLIT

@@ -4,8 +4,8 @@ from math import sqrt
 
 import numpy as np
 
-from ._jit import compiled, inlined, inner
-from .trace import STOP_X
+from ._jit import inlined, inner
+from .vectors import LANES, multiply_between, multiply_taken
 
 # columns of a table of patterns, one row a crossing of the stop; lengths in mm, places as seen from the middle
 # a picture, or a corner's table: its place, rows and columns; samples per mm, and the sample at 0
@@ -22,10 +22,22 @@ DISTANCE, COSINE, SINE, OFFSET, RADIUS = 12, 13, 14, 15, 16
 MARGIN = 17
 # half the inverse of cosine and sine between a corner's direction and the tangents there
 TO_ALONG, TO_ACROSS = 18, 19
-TABLE_COLUMNS = 20
+# within this radius the pattern is 1
+DEEP = 20
+# an error of places in the stop that is not seen, mm
+FINE = 21
+TABLE_COLUMNS = 22
 
-# how a triangle's places in the stop are told, besides as seen from a corner (`place_in_pattern`)
-ANYWHERE, ON_EDGE, OPEN, ROUND, PICTURE = -1, -2, -3, -4, -5
+# how a polygon's places in the stop are told (`place_in_pattern`)
+OPEN, ON_EDGE, ALONG_BLADE, ROUND, PICTURE, ANYWHERE = 0, 1, 2, 3, 4, 5
+
+# columns of a polygon's places, one row a pattern: two linear functions of the picture's pixels (value at the origin,
+# gradient), the bounds of each over the polygon, and what `place_in_pattern` returned
+U, V, U_LOW, U_HIGH, V_LOW, V_HIGH, WAY = 0, 3, 6, 7, 8, 9, 10
+PLACE_COLUMNS = 11
+
+# pixels that the compiler has looked up together, and more than are asked for
+TOGETHER = 32
 
 
 @inlined
@@ -50,26 +62,27 @@ def beyond_blade(table, k, along, across):
 
 
 @inlined
-def bilinear(values, first, columns, column, row):
+def _between(values, at, columns, right, down):
+    """Interpolate a table between four of its values, the first of which lies at `at`."""
+    # an unsigned place needs no check for counting from the end
+    here, below = np.uint64(at), np.uint64(at + columns)
+    one = np.uint64(1)
+    upper = values[here] + (values[here + one] - values[here]) * right
+    lower = values[below] + (values[below + one] - values[below]) * right
+    return upper + (lower - upper) * down
+
+
+@inlined
+def _bilinear(values, first, columns, column, row):
     """Interpolate a table that begins at `first` between four of its values; column and row are not below 0."""
     c, r = np.int64(column), np.int64(row)
-    fx, fy = column - c, row - r
-    # an unsigned place needs no check for counting from the end
-    at = np.uint64(first + r * columns + c)
-    below = at + np.uint64(columns)
-    one = np.uint64(1)
-    upper = values[at] + (values[at + one] - values[at]) * fx
-    lower = values[below] + (values[below + one] - values[below]) * fx
-    return upper + (lower - upper) * fy
+    return _between(values, first + r * columns + c, columns, np.float32(column - c), np.float32(row - r))
 
 
 @inlined
 def _edge_value(patterns, first, last, at):
-    """Interpolate a table of an edge at `at`, between 0 and last."""
-    at = min(max(at, 0.0), last)
-    c = np.int64(at)
-    place = np.uint64(first + c)
-    return patterns[place] + (patterns[place + np.uint64(1)] - patterns[place]) * (at - c)
+    """Look up a table of an edge, so fine that the nearest of its values will do, at `at`, between 0 and last."""
+    return patterns[np.uint64(first + np.int64(np.int32(min(max(at, np.float32(0.0)), last) + np.float32(0.5))))]
 
 
 @inner
@@ -78,7 +91,8 @@ def pattern_value(patterns, table, corners, k, x, y):
     if table[k, CORNERS] < 0.0:
         column = min(max(x * table[k, PER_MM_X] + table[k, AT_X], 0.0), table[k, COLUMNS] - 1.001)
         row = min(max(y * table[k, PER_MM_Y] + table[k, AT_Y], 0.0), table[k, ROWS] - 1.001)
-        return bilinear(patterns, np.int64(table[k, FIRST]), np.int64(table[k, COLUMNS]), column, row)
+        start, columns = np.int64(table[k, FIRST]), np.int64(table[k, COLUMNS])
+        return _bilinear(patterns, start, columns, column, row)
     if table[k, CORNERS] == 0.0:
         beyond = sqrt(x * x + y * y) - table[k, RADIUS]
     else:
@@ -88,59 +102,66 @@ def pattern_value(patterns, table, corners, k, x, y):
         column = (beyond + other) * table[k, TO_ALONG] * table[k, PER_MM_X] + table[k, AT_X]
         row = (beyond - other) * table[k, TO_ACROSS] * table[k, PER_MM_Y]
         if column >= 0.0 and column < table[k, COLUMNS] - 1.001 and row < table[k, ROWS] - 1.001:
-            return bilinear(patterns, np.int64(table[k, FIRST]), np.int64(table[k, COLUMNS]), column, row)
+            start, columns = np.int64(table[k, FIRST]), np.int64(table[k, COLUMNS])
+            return _bilinear(patterns, start, columns, column, row)
     at = beyond * table[k, EDGE_PER_MM] + 0.5 * (table[k, EDGE_COUNT] - 1.0)
-    return _edge_value(patterns, np.int64(table[k, EDGE]), table[k, EDGE_COUNT] - 1.001, at)
+    return _edge_value(patterns, np.int64(table[k, EDGE]), np.float32(table[k, EDGE_COUNT] - 1.0), np.float32(at))
 
 
 @inner
-def place_in_pattern(table, corners, k, stops):
-    """Change a triangle's corners in the stop, shape (3, 2), mm, into what its pattern is looked up by.
+def place_in_pattern(table, corners, k, stops, count):
+    """Change a polygon's places in the stop, shape (>= count, 2), mm, into what its pattern is looked up by.
 
     Returns
     -------
     int
-        `OPEN`: the pattern is 1. `ON_EDGE`: how far along the table of a straight edge, once. A corner of the iris, 0
-        or more: as seen from it, along its direction and across. `ANYWHERE`, `ROUND`, `PICTURE`: mm, as they were.
+        `OPEN`: the pattern is 1. `ON_EDGE`: how far along the table of a straight edge, once. `ALONG_BLADE`: as seen
+        from a blade whose two corners are the nearest, along its normal and beside it. `ROUND`, `PICTURE`, `ANYWHERE`:
+        mm, as they were.
     """
     if table[k, CORNERS] < 0.0:
         return PICTURE
+    outside = -np.inf
+    for m in range(count):
+        outside = max(outside, stops[m, 0] * stops[m, 0] + stops[m, 1] * stops[m, 1])
+    if outside < table[k, DEEP] * table[k, DEEP]:
+        return OPEN
     if table[k, CORNERS] == 0.0:
-        outside = -np.inf
-        for m in range(3):
-            outside = max(outside, stops[m, 0] * stops[m, 0] + stops[m, 1] * stops[m, 1])
-        within = max(table[k, RADIUS] - table[k, MARGIN], 0.0)
-        return OPEN if outside < within * within else ROUND
-    # of each of its corners: the nearest one of the iris, the nearer blade beside that, how far beyond it, how far away
-    corner, blade, alike, aside = np.int64(-1), np.int64(-1), True, True
+        return ROUND
+    # of each vertex: the nearest corner of the iris, the nearer blade beside that, how far beyond it
+    corner, blade, aside = np.int64(-1), np.int64(-1), True
+    left, right = True, True
+    many = np.int64(table[k, CORNERS])
     far = -np.inf
-    for m in range(3):
+    for m in range(count):
         x, y = stops[m, 0], stops[m, 1]
         j = nearest_corner(table, corners, k, x, y)
         across = corners[j, 0] * y - corners[j, 1] * x
         other = j + 1 if across >= 0.0 else j
-        if other == table[k, CORNERS]:
-            other = 0
+        if other == many:
+            other = np.int64(0)
         corner, blade = (j, other) if m == 0 else (corner, blade)
-        alike, aside = alike and j == corner, aside and other == blade
+        aside = aside and other == blade
+        # a blade lies between the corner before it and the one of its number
+        left = left and (j == corner or j + 1 == corner or (corner == 0 and j + 1 == many))
+        right = right and (j == corner or j == corner + 1 or (j == 0 and corner + 1 == many))
         along = corners[j, 0] * x + corners[j, 1] * y
         far = max(far, beyond_blade(table, k, along, abs(across)))
     if far < -table[k, MARGIN]:
         return OPEN
-    if aside and table[k, RADIUS] == 0.0 and not _near_corner(table, corners, k, blade, stops):
-        nx, ny = _normal(table, corners, k, blade)
-        for m in range(3):
-            beyond = nx * stops[m, 0] + ny * stops[m, 1] - table[k, OFFSET]
-            stops[m, 0] = beyond * table[k, EDGE_PER_MM] + 0.5 * (table[k, EDGE_COUNT] - 1.0)
-            stops[m, 1] = 0.0
-        return ON_EDGE
-    if not alike:
+    if not (aside or left or right):
         return ANYWHERE
-    for m in range(3):
+    if not aside:
+        blade = corner if left else np.int64((corner + 1) % many)
+    nx, ny = _normal(table, corners, k, blade)
+    on_edge = aside and table[k, RADIUS] == 0.0 and not _near_corner(table, corners, k, blade, stops, count)
+    for m in range(count):
         x, y = stops[m, 0], stops[m, 1]
-        stops[m, 0] = corners[corner, 0] * x + corners[corner, 1] * y
-        stops[m, 1] = corners[corner, 0] * y - corners[corner, 1] * x
-    return corner
+        along, beside = nx * x + ny * y, nx * y - ny * x
+        if on_edge:
+            along = (along - table[k, OFFSET]) * table[k, EDGE_PER_MM] + 0.5 * (table[k, EDGE_COUNT] - 1.0)
+        stops[m, 0], stops[m, 1] = along, beside
+    return ON_EDGE if on_edge else ALONG_BLADE
 
 
 @inlined
@@ -152,12 +173,12 @@ def _normal(table, corners, k, blade):
 
 
 @inner
-def _near_corner(table, corners, k, blade, stops):
-    """Tell whether a triangle comes into the table of a corner of a blade."""
+def _near_corner(table, corners, k, blade, stops, count):
+    """Tell whether a polygon comes into the table of a corner of a blade."""
     for side in range(2):
         j = blade - side if blade - side >= 0 else np.int64(table[k, CORNERS]) - 1
         left, right, low, high = np.inf, -np.inf, np.inf, -np.inf
-        for m in range(3):
+        for m in range(count):
             along = corners[j, 0] * stops[m, 0] + corners[j, 1] * stops[m, 1]
             across = corners[j, 0] * stops[m, 1] - corners[j, 1] * stops[m, 0]
             left, right = min(left, along), max(right, along)
@@ -172,76 +193,115 @@ def _near_corner(table, corners, k, blade, stops):
 
 
 @inlined
-def weave(patterns, table, corners, k, places, row, first, last, light):
-    """Multiply the light of a row's pixels from `first` to `last` by a pattern.
+def weave(patterns, table, corners, places, light, where, beside, below, row, first, last):
+    """Multiply the patterns at the centres of a row's pixels from `first` to `last`.
 
     Parameters
     ----------
-    patterns, table, corners, k
+    patterns, table, corners
         As in `pattern_value`.
-    places : ndarray, shape (C, 11)
-        For each pattern two linear functions of the picture's pixels (value at the origin, gradient), the bounds of
-        each over the polygon, and what `place_in_pattern` returned.
-    row, first, last : int
+    places : ndarray, shape (C, PLACE_COLUMNS)
+        Of the polygon that is drawn.
     light : ndarray, float32
-        By column.
+        By column; filled, and up to TOGETHER further.
+    where, beside, below : ndarray
+        Room for places in `patterns`, int32, and for parts of a sample from there to the next column and to the next
+        row, float32.
+    row, first, last : int
 
     Notes
     -----
-    A loop for each way of looking up, without calls: handing over arrays would cost more than most look-ups.
+    A loop for each way of looking up, without calls: handing over arrays would cost more than most look-ups. Where to
+    look is found for several pixels at once, what stands there one by one.
     """
-    way, y = np.int64(places[k, 10]), row + 0.5
-    # a pixel's centre may lie beside the polygon
-    u0, du = places[k, 0] + 0.5 * places[k, 1] + places[k, 2] * y, places[k, 1]
-    v0, dv = places[k, 3] + 0.5 * places[k, 4] + places[k, 5] * y, places[k, 4]
-    u_low, u_high, v_low, v_high = places[k, 6], places[k, 7], places[k, 8], places[k, 9]
-    edge, longest, edge_per_mm = np.int64(table[k, EDGE]), table[k, EDGE_COUNT] - 1.001, table[k, EDGE_PER_MM]
-    middle = 0.5 * (table[k, EDGE_COUNT] - 1.0)
-    start, columns = np.int64(table[k, FIRST]), np.int64(table[k, COLUMNS])
-    last_column, last_row = table[k, COLUMNS] - 1.001, table[k, ROWS] - 1.001
-    if way == ON_EDGE:
-        for c in range(first, last + 1):
-            at = min(max(u0 + du * c, u_low), u_high)
-            light[np.uint64(c)] *= np.float32(_edge_value(patterns, edge, longest, at))
-    elif way >= 0:
-        to_along, to_across, zero = table[k, TO_ALONG] * table[k, PER_MM_X], table[k, TO_ACROSS], table[k, AT_X]
-        to_across *= table[k, PER_MM_Y]
-        cosine, sine, radius = table[k, COSINE], table[k, SINE], table[k, RADIUS]
-        back = table[k, OFFSET] - radius
-        for c in range(first, last + 1):
-            u, v = min(max(u0 + du * c, u_low), u_high), abs(min(max(v0 + dv * c, v_low), v_high))
-            beyond, other = u * cosine + v * sine - table[k, OFFSET], u * cosine - v * sine - table[k, OFFSET]
-            if radius > 0.0:
-                x, z, w = u - back * cosine, v - back * sine, v + back * sine
-                beyond, other = sqrt(x * x + z * z) - radius, sqrt(x * x + w * w) - radius
-            column, line = (beyond + other) * to_along + zero, (beyond - other) * to_across
-            if column >= 0.0 and column < last_column and line < last_row:
-                value = bilinear(patterns, start, columns, column, line)
-            else:
-                value = _edge_value(patterns, edge, longest, beyond * edge_per_mm + middle)
-            light[np.uint64(c)] *= np.float32(value)
-    elif way == ROUND:
-        for c in range(first, last + 1):
-            u, v = min(max(u0 + du * c, u_low), u_high), min(max(v0 + dv * c, v_low), v_high)
-            beyond = sqrt(u * u + v * v) - table[k, RADIUS]
-            light[np.uint64(c)] *= np.float32(_edge_value(patterns, edge, longest, beyond * edge_per_mm + middle))
-    elif way == PICTURE:
-        for c in range(first, last + 1):
-            u, v = min(max(u0 + du * c, u_low), u_high), min(max(v0 + dv * c, v_low), v_high)
-            column = min(max(u * table[k, PER_MM_X] + table[k, AT_X], 0.0), last_column)
-            line = min(max(v * table[k, PER_MM_Y] + table[k, AT_Y], 0.0), last_row)
-            light[np.uint64(c)] *= np.float32(bilinear(patterns, start, columns, column, line))
-    elif way == ANYWHERE:
-        for c in range(first, last + 1):
-            u, v = min(max(u0 + du * c, u_low), u_high), min(max(v0 + dv * c, v_low), v_high)
-            light[np.uint64(c)] *= np.float32(pattern_value(patterns, table, corners, k, u, v))
+    y, begin = row + 0.5, np.uint64(first)
+    count = last + 1 - first
+    # whole vectors: pixels one by one would take longer than some too many
+    padded = -(-count // TOGETHER) * TOGETHER
+    zero, half, one = np.float32(0.0), np.float32(0.5), np.float32(1.0)
+    for m in range(padded):
+        light[begin + np.uint64(m)] = one
+    for k in range(places.shape[0]):
+        way = np.int64(places[k, WAY])
+        if way == OPEN:
+            continue
+        # a pixel's centre may lie beside the polygon
+        u_low, u_high = np.float32(places[k, U_LOW]), np.float32(places[k, U_HIGH])
+        v_low, v_high = np.float32(places[k, V_LOW]), np.float32(places[k, V_HIGH])
+        u0 = np.float32(places[k, U] + places[k, U + 1] * (first + 0.5) + places[k, U + 2] * y)
+        v0 = np.float32(places[k, V] + places[k, V + 1] * (first + 0.5) + places[k, V + 2] * y)
+        du, dv = np.float32(places[k, U + 1]), np.float32(places[k, V + 1])
+        edge, longest = np.int32(table[k, EDGE]), np.float32(table[k, EDGE_COUNT] - 1.0)
+        edge_per_mm, middle = np.float32(table[k, EDGE_PER_MM]), np.float32(0.5 * (table[k, EDGE_COUNT] - 1.0))
+        start, columns = np.int32(table[k, FIRST]), np.int32(table[k, COLUMNS])
+        last_column, last_row = np.float32(table[k, COLUMNS] - 1.001), np.float32(table[k, ROWS] - 1.001)
+        if way == ON_EDGE:
+            u0, u_low, u_high = u0 + half, max(u_low, zero) + half, min(u_high, longest) + half
+            for m in range(padded):
+                where[np.uint64(m)] = edge + np.int32(min(max(u0 + du * np.float32(m), u_low), u_high))
+        elif way == ROUND:
+            radius, middle = np.float32(table[k, RADIUS]), np.float32(middle + half)
+            for m in range(padded):
+                u = min(max(u0 + du * np.float32(m), u_low), u_high)
+                v = min(max(v0 + dv * np.float32(m), v_low), v_high)
+                at = (sqrt(u * u + v * v) - radius) * edge_per_mm + middle
+                where[np.uint64(m)] = edge + np.int32(min(max(at, half), longest + half))
+        elif way == PICTURE:
+            per_x, per_y = np.float32(table[k, PER_MM_X]), np.float32(table[k, PER_MM_Y])
+            at_x, at_y = np.float32(table[k, AT_X]), np.float32(table[k, AT_Y])
+            for m in range(padded):
+                u = min(max(u0 + du * np.float32(m), u_low), u_high)
+                v = min(max(v0 + dv * np.float32(m), v_low), v_high)
+                column = min(max(u * per_x + at_x, zero), last_column)
+                line = min(max(v * per_y + at_y, zero), last_row)
+                c, r = np.int32(column), np.int32(line)
+                where[np.uint64(m)] = start + r * columns + c
+                beside[np.uint64(m)], below[np.uint64(m)] = column - np.float32(c), line - np.float32(r)
+        elif way == ALONG_BLADE:
+            to_along = np.float32(table[k, TO_ALONG] * table[k, PER_MM_X])
+            to_across = np.float32(table[k, TO_ACROSS] * table[k, PER_MM_Y])
+            at_corner, offset = np.float32(table[k, AT_X]), np.float32(table[k, OFFSET])
+            cosine, sine = np.float32(table[k, COSINE]), np.float32(table[k, SINE])
+            radius, middle = np.float32(table[k, RADIUS]), middle + half
+            back_x, back_y = (offset - radius) * cosine, (offset - radius) * sine
+            curved = radius > zero
+            for m in range(padded):
+                p = min(max(u0 + du * np.float32(m), u_low), u_high)
+                q = abs(min(max(v0 + dv * np.float32(m), v_low), v_high))
+                # the corner on that side of the blade, and beyond it the next blade, run alike
+                u, v = p * cosine + q * sine, abs(q * cosine - p * sine)
+                beyond, other = u * cosine + v * sine - offset, u * cosine - v * sine - offset
+                if curved:
+                    x, z, w = u - back_x, v - back_y, v + back_y
+                    beyond, other = sqrt(x * x + z * z) - radius, sqrt(x * x + w * w) - radius
+                column, line = (beyond + other) * to_along + at_corner, (beyond - other) * to_across
+                nearest = np.int32(min(max(beyond * edge_per_mm + middle, half), longest + half))
+                near = (column >= zero) & (column < last_column) & (line < last_row)
+                column, line = min(max(column, zero), last_column), min(max(line, zero), last_row)
+                c, r = np.int32(column), np.int32(line)
+                where[np.uint64(m)] = start + r * columns + c if near else edge + nearest
+                beside[np.uint64(m)] = column - np.float32(c) if near else zero
+                below[np.uint64(m)] = line - np.float32(r) if near else zero
+        else:
+            for m in range(count):
+                u = min(max(u0 + du * np.float32(m), u_low), u_high)
+                v = min(max(v0 + dv * np.float32(m), v_low), v_high)
+                light[begin + np.uint64(m)] *= pattern_value(patterns, table, corners, k, u, v)
+        if way in (ON_EDGE, ROUND):
+            for m in range(0, count, LANES):
+                multiply_taken(light, begin + np.uint64(m), patterns, where, m)
+        elif way != ANYWHERE:
+            for m in range(0, count, LANES):
+                multiply_between(light, begin + np.uint64(m), patterns, columns, where, beside, below, m)
 
 
 @inner
-def is_dark(table, corners, k, places):
-    """Tell whether a pattern is dark over a triangle, shape (3, 2), mm."""
-    left, right = min(places[0, 0], places[1, 0], places[2, 0]), max(places[0, 0], places[1, 0], places[2, 0])
-    low, high = min(places[0, 1], places[1, 1], places[2, 1]), max(places[0, 1], places[1, 1], places[2, 1])
+def is_dark(table, corners, k, stops, count):
+    """Tell whether a pattern is dark over a polygon, shape (>= count, 2), mm."""
+    left, right, low, high = np.inf, -np.inf, np.inf, -np.inf
+    for m in range(count):
+        left, right = min(left, stops[m, 0]), max(right, stops[m, 0])
+        low, high = min(low, stops[m, 1]), max(high, stops[m, 1])
     outside = table[k, OUTSIDE]
     if right <= -outside or left >= outside or high <= -outside or low >= outside:
         return True
@@ -249,62 +309,16 @@ def is_dark(table, corners, k, places):
         return False
     # beyond one and the same blade's tangent, all of it
     far = table[k, OFFSET] + table[k, MARGIN]
+    x, y = stops[0, 0], stops[0, 1]
+    if x * x + y * y < far * far:
+        return False
+    j = nearest_corner(table, corners, k, x, y)
     for side in (-1.0, 1.0):
-        j = nearest_corner(table, corners, k, places[0, 0], places[0, 1])
         nx = corners[j, 0] * table[k, COSINE] - side * corners[j, 1] * table[k, SINE]
         ny = corners[j, 1] * table[k, COSINE] + side * corners[j, 0] * table[k, SINE]
-        if (
-            min(
-                nx * places[0, 0] + ny * places[0, 1],
-                nx * places[1, 0] + ny * places[1, 1],
-                nx * places[2, 0] + ny * places[2, 1],
-            )
-            >= far
-        ):
+        nearest = np.inf
+        for m in range(count):
+            nearest = min(nearest, nx * stops[m, 0] + ny * stops[m, 1])
+        if nearest >= far:
             return True
     return False
-
-
-@compiled
-def find_open(data, triangles, halves, crossings, axes, table, corners):
-    """Tell which cells lie so far within the iris that nothing is known of its border there.
-
-    Parameters
-    ----------
-    data, triangles, halves, crossings, axes
-        As in `kernels.bundle.draw_bundle`.
-    table, corners : ndarray
-        As in `kernels.ringing.draw_ringing`.
-
-    Returns
-    -------
-    ndarray, shape (T,), bool
-        For each triangle whether all of its cell does, at all crossings.
-    """
-    deep = np.ones(data.shape[0], dtype=np.bool_)
-    for node in range(data.shape[0]):
-        for half in range(halves):
-            for k in range(crossings):
-                u, v = (1.0 - 2.0 * half) * data[node, STOP_X + 2 * k], data[node, STOP_X + 2 * k + 1]
-                x, y = u * axes[0, 0] + v * axes[1, 0], u * axes[0, 1] + v * axes[1, 1]
-                if table[k, CORNERS] < 0.0:
-                    deep[node] = False
-                    continue
-                if table[k, CORNERS] == 0.0:
-                    beyond = sqrt(x * x + y * y) - table[k, RADIUS]
-                else:
-                    j = nearest_corner(table, corners, k, x, y)
-                    across = abs(corners[j, 0] * y - corners[j, 1] * x)
-                    beyond = beyond_blade(table, k, corners[j, 0] * x + corners[j, 1] * y, across)
-                deep[node] &= beyond < -table[k, MARGIN]
-    found = np.empty(triangles.shape[0], dtype=np.bool_)
-    start = np.int64(0)
-    while start < triangles.shape[0]:
-        end, whole = start, True
-        while end < triangles.shape[0] and triangles[end, 0] == triangles[start, 0]:
-            whole = whole and deep[triangles[end, 0]] and deep[triangles[end, 1]] and deep[triangles[end, 2]]
-            end += 1
-        for t in range(start, end):
-            found[t] = whole
-        start = end
-    return found

@@ -11,10 +11,11 @@ import numpy as np
 
 from ._jit import compiled, inlined, inner
 from .clip import PX, PY
-from .pattern import weave
+from .pattern import OPEN, WAY, weave
+from .vectors import LANES, add_colored
 
 # a row of the picture is kept in blocks of this many pixels, each channel by itself: one vector to the compiler
-BLOCK = 8
+BLOCK = LANES
 # floats of a block: three channels
 _FLOATS = 3 * BLOCK
 
@@ -123,30 +124,25 @@ def _fill_rows(
         row += 1
 
 
-@inlined
-def _weave_strip(
-    flat, width, row, depth, xl0, xl1, xr0, xr1, start, gx, density_low, density_high, patterns, table, corners, places,
-    light,
-):  # fmt: skip
-    """Add a strip of a polygon to a picture without colours, its light multiplied at pixels' centres by patterns."""
+@inner
+def _fill_woven(flat, blocks, row, depth, xl0, xl1, xr0, xr1, start, gx, density_low, density_high, rgb, light):
+    """Add a strip of a polygon as `_fill_rows` does, multiplied by `light`, which is used up."""
     la, lb = min(xl0, xl1), max(xl0, xl1)
     ra, rb = min(xr0, xr1), max(xr0, xr1)
-    first, last = int(la), min(int(rb), width - 1)
     l_inverse, r_inverse = np.float32(1.0 / max(lb - la, 1e-6)), np.float32(1.0 / max(rb - ra, 1e-6))
     slope, low, high = np.float32(gx), np.float32(density_low), np.float32(density_high)
-    base = np.float32(start + gx * (first + 0.5))
-    l0, l1, r0, r1 = np.float32(la - first), np.float32(lb - first), np.float32(ra - first), np.float32(rb - first)
-    for m in range(last - first + 1):
-        c = np.float32(m)
-        light[np.uint64(first + m)] = (
-            min(max(base + slope * c, low), high)
-            * np.float32(depth)
-            * (_covered(c, l0, l1, l_inverse) - _covered(c, r0, r1, r_inverse))
-        )
-    for k in range(places.shape[0]):
-        weave(patterns, table, corners, k, places, row, first, last, light)
-    for column in range(first, last + 1):
-        flat[np.uint64(row * width + column)] += light[np.uint64(column)]
+    red, green, blue = np.float32(rgb[0] * depth), np.float32(rgb[1] * depth), np.float32(rgb[2] * depth)
+    for block in range(int(la) // BLOCK, min(int(rb) // BLOCK, blocks - 1) + 1):
+        x0 = float(BLOCK * block)
+        base = np.float32(start + gx * (x0 + 0.5))
+        l0, l1, r0, r1 = np.float32(la - x0), np.float32(lb - x0), np.float32(ra - x0), np.float32(rb - x0)
+        begin = np.uint64(BLOCK * block)
+        for m in range(BLOCK):
+            c = np.float32(m)
+            light[begin + np.uint64(m)] *= min(max(base + slope * c, low), high) * (
+                _covered(c, l0, l1, l_inverse) - _covered(c, r0, r1, r_inverse)
+            )
+        add_colored(flat, np.uint64((row * blocks + block) * _FLOATS), light, begin, red, green, blue)
 
 
 @inner
@@ -212,19 +208,22 @@ def fill_polygon(polygon, count, density, gx, gy, density_low, density_high, rgb
     density_low, density_high : float
         Bounds kept at pixels whose centre lies outside the polygon.
     rgb : ndarray, shape (3,)
-    plane : ndarray, shape (H, B, 3, BLOCK), float32, or (H, W, 3), float64, or (H, W), float32
+    plane : ndarray, shape (H, B, 3, BLOCK), float32, or (H, W, 3), float64
         Added to. In the second form the density is even, and only the differences along the rows are marked, which
-        costs no more for large polygons than for small ones; `sum_rows` turns them into the picture. The third has no
-        colours, and its light is multiplied by patterns.
+        costs no more for large polygons than for small ones; `sum_rows` turns them into the picture.
     texture : tuple of ndarray, or None
-        Those patterns (`kernels.pattern.weave`), and a row to work in.
+        Patterns that the light is multiplied by, only in the first form: what `kernels.pattern.weave` takes first.
 
     Notes
     -----
     A pixel receives exact coverage times the density at its centre; the sum over pixels is the polygon's flux.
     """
-    if plane.ndim == 2:
-        patterns, table, corners, places, light = texture
+    woven = False
+    if texture is not None:
+        # here and not for every strip: holding an array costs as much as a few pixels
+        patterns, table, corners, places, light, where, beside, below = texture
+        for k in range(places.shape[0]):
+            woven = woven or places[k, WAY] != OPEN
     top = bottom = count - count  # zeros of the type of `count`, not literals
     twice_area = 0.0
     for k in range(count):
@@ -269,20 +268,26 @@ def fill_polygon(polygon, count, density, gx, gy, density_low, density_high, rgb
             xr0, xr1 = xr + (y - yr) * right_slope, xr + (y_next - yr) * right_slope
             if plane.ndim == 3:
                 _mark_strip(flat, plane.shape[1], row, y_next - y, xl0, xl1, xr0, xr1, density, rgb)
-            elif plane.ndim == 2:
-                _weave_strip(
-                    flat, plane.shape[1], row, y_next - y, xl0, xl1, xr0, xr1, density + gy * (row + 0.5), gx,
-                    density_low, density_high, patterns, table, corners, places, light,
-                )  # fmt: skip
             else:
-                if y == row and level >= row + 2.0:
-                    # whole rows without a vertex
-                    rows = min(int(level), last_row + 1) - row
-                    y_next = float(row + rows)
-                _fill_rows(
-                    flat, plane.shape[1], plane.shape[3], row, rows, min(y_next - y, 1.0), xl0, xl1, left_slope,
-                    xr0, xr1, right_slope, density + gy * (row + 0.5), gx, gy, density_low, density_high, rgb,
-                )  # fmt: skip
+                if texture is not None and woven:
+                    first, last = int(min(xl0, xl1)) // BLOCK, min(int(max(xr0, xr1)) // BLOCK, plane.shape[1] - 1)
+                    weave(
+                        patterns, table, corners, places, light, where, beside, below, row, BLOCK * first,
+                        BLOCK * last + BLOCK - 1,
+                    )  # fmt: skip
+                    _fill_woven(
+                        flat, plane.shape[1], row, y_next - y, xl0, xl1, xr0, xr1, density + gy * (row + 0.5), gx,
+                        density_low, density_high, rgb, light,
+                    )  # fmt: skip
+                else:
+                    if y == row and level >= row + 2.0:
+                        # whole rows without a vertex
+                        rows = min(int(level), last_row + 1) - row
+                        y_next = float(row + rows)
+                    _fill_rows(
+                        flat, plane.shape[1], plane.shape[3], row, rows, min(y_next - y, 1.0), xl0, xl1, left_slope,
+                        xr0, xr1, right_slope, density + gy * (row + 0.5), gx, gy, density_low, density_high, rgb,
+                    )  # fmt: skip
         if left_end <= y_next:
             left = _step(left, count - way, count)
         if right_end <= y_next:

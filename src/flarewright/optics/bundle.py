@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import atan, atan2, ceil, cos, hypot, radians, sin, sqrt, tan
 from typing import Any
 
@@ -339,6 +339,30 @@ def measure_region(
     return Region(box, float(sums[0]), seen, float(sums[2] / sums[0]), float(np.clip(sums[5] / area, 1e-3, 1.0)))
 
 
+def grown(packed: PackedLens, region: Region, tilt: float, part: float) -> Region:
+    """Widen a region on each side by a part of its size, within the front.
+
+    Parameters
+    ----------
+    packed : PackedLens
+    region : Region
+    tilt : float
+        From `incidence`.
+    part : float
+
+    Returns
+    -------
+    Region
+        Of the same light.
+    """
+    box, front = region.box, front_box(packed, tilt)
+    more = part * (box[1::2] - box[0::2])
+    low, high = np.maximum(box[0::2] - more, front[0::2]), np.minimum(box[1::2] + more, front[1::2])
+    wide = np.array([low[0], high[0], low[1], high[1]])
+    share = region.share * float(np.prod(box[1::2] - box[0::2]) / np.prod(high - low))
+    return replace(region, box=wide, share=share)
+
+
 def join_boxes(a: Floats, b: Floats) -> Floats:
     """Return the box around two boxes of the pupil, each shape (4,): x0, x1, y0, y1."""
     low, high = np.minimum(a[0::2], b[0::2]), np.maximum(a[1::2], b[1::2])
@@ -385,6 +409,8 @@ def trace_grid(
     scale: float,
     view_radius: float = float("inf"),
     flux_tolerance: float = 3e-4,
+    fringe_px: float = 0.0,
+    faint_radius: float = float("inf"),
     one_color: bool = False,
 ) -> Bundle:
     """Build the adaptive grid of a path.
@@ -405,6 +431,11 @@ def trace_grid(
         What lies farther from the axis on the sensor, mm, is not refined.
     flux_tolerance : float
         Largest relative error of the bundle's flux from its rim.
+    fringe_px : float
+        Largest error between the circles around and within the iris, pixels, where light fades there in fringes; 0
+        where blades cut it.
+    faint_radius : float
+        What crosses the stop farther out, mm, is not refined where there are fringes.
     one_color : bool
         Fit the middle wavelength alone.
 
@@ -417,7 +448,8 @@ def trace_grid(
     rim_tolerance = flux_tolerance * sqrt(region.share)
     pupil, data, triangles = build_mesh(
         *_arguments(packed, fitted, path, tilt), path.stop_crossings, *iris,
-        region.box, *_cells(packed, GRID), MAX_LEVEL, tolerance, rim_tolerance, scale, view_radius,
+        region.box, *_cells(packed, GRID), MAX_LEVEL, tolerance, rim_tolerance, fringe_px,
+        faint_radius, scale, view_radius,
     )  # fmt: skip
     return Bundle(path, pupil, triangles, dict(zip(fitted, data, strict=True)), packed.halves)
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -33,6 +33,9 @@ CORNER_SAMPLES = 16
 PROFILE_SAMPLES = 32
 """Samples per s of the table across an edge."""
 
+EDGE_SAMPLES = 256
+"""Samples per s of that table as the kernel reads it: the nearest of them errs by 3e-3 at worst, 5e-4 rms."""
+
 COLOR_STEP = 0.01
 """Steps of ln s in which a band of colours is averaged."""
 
@@ -49,6 +52,7 @@ _FAR = 64.0
 
 __all__ = [
     "CORNER_SAMPLES",
+    "EDGE_SAMPLES",
     "PROFILE_SAMPLES",
     "REACH",
     "EdgeTables",
@@ -80,6 +84,22 @@ class EdgeTables:
     corner: Singles
     first: int
     excess: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    @cached_property
+    def values(self) -> Singles:
+        """The corner's table row by row, after it the profile, `EDGE_SAMPLES` per s, and zeros: shape (P,).
+
+        An edge is looked up as a corner is, between neighbours that count for nothing but have to be there.
+        """
+        count = len(self.profile)
+        fine = np.linspace(0.0, count - 1.0, self.edge_count)
+        profile = np.interp(fine, np.arange(count), self.profile).astype(np.float32)
+        return np.concatenate([self.corner.ravel(), profile, np.zeros(self.corner.shape[1] + 2, dtype=np.float32)])
+
+    @property
+    def edge_count(self) -> int:
+        """Samples of the profile in `values`."""
+        return (len(self.profile) - 1) * (EDGE_SAMPLES // PROFILE_SAMPLES) + 1
 
 
 @dataclass(frozen=True)
@@ -241,6 +261,7 @@ def _refined(spectrum: NDArray[np.complex128], finer: int, axis: int) -> NDArray
     return np.asarray(finer * np.fft.ifft(wide, axis=axis))
 
 
+@lru_cache(maxsize=1)
 def sharp_tables() -> EdgeTables:
     """Return the opening itself, its border a sample of a corner's table wide; its s may be of any length."""
     across = np.arange(-PROFILE_SAMPLES, PROFILE_SAMPLES + 1) / PROFILE_SAMPLES

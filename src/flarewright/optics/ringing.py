@@ -100,23 +100,19 @@ def stop_to_sensor(packed: PackedLens, path: LightPath, nearness: float = 0.0) -
     a = Ma00 + k Ma01 in the stop and s = S00 + k S01 on the sensor. B, reduced by the index in the stop so that
     lambda is that of vacuum, is S01 Ma00 - S00 Ma01, whatever the indices: M = s / a, L = B a / s.
     """
-    sides = (packed.curvature if packed.curvature_x is None else packed.curvature_x, packed.curvature)
+    sides = [packed.curvature] if packed.curvature_x is None else [packed.curvature_x, packed.curvature]
     count, crossings = len(packed.wavelengths_nm), path.stop_crossings
     found = np.empty((2, crossings, count, 2))
-    to_stop = np.empty((crossings, 2, 2))
-    for w in range(count):
-        for side, curvature in enumerate(sides):
-            if side == 1 and packed.curvature_x is None:
-                found[:, :, w, 1] = found[:, :, w, 0]
-                continue
-            S00, S01, _, _ = _path_matrices(
-                path.rows, path.actions, curvature, packed.z_vertex, packed.n_gap[w], packed.sensor_z, to_stop
-            )
-            a, s = to_stop[:, 0, 0] + nearness * to_stop[:, 0, 1], S00 + nearness * S01
-            B = S01 * to_stop[:, 0, 0] - S00 * to_stop[:, 0, 1]
-            with np.errstate(divide="ignore", invalid="ignore"):
-                length = B * a / s
-                found[:, :, w, side] = length, s / a
+    to_stop = np.empty((crossings, 2, 2, count))
+    for side, curvature in enumerate(sides):
+        # indices as (K + 1, W): every step is done for all colours at once
+        S00, S01, _, _ = _path_matrices(
+            path.rows, path.actions, curvature, packed.z_vertex, packed.n_gap.T, packed.sensor_z, to_stop
+        )
+        a, s = to_stop[:, 0, 0] + nearness * to_stop[:, 0, 1], S00 + nearness * S01
+        B = S01 * to_stop[:, 0, 0] - S00 * to_stop[:, 0, 1]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            found[..., side:] = np.stack([B * a / s, s / a])[..., None]
     return tuple(StopToSensor(*found[:, c]) for c in range(crossings))
 
 

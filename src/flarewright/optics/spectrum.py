@@ -254,11 +254,17 @@ def band_contents(spectrum: Spectrum, wavelengths_nm: ArrayLike) -> tuple[tuple[
     """
     nodes = np.atleast_1d(np.asarray(wavelengths_nm, dtype=np.float64))
     wave, xyz = _stimulus(spectrum)
+    power = xyz.sum(axis=1)
     found = []
-    for node, row in zip(nodes, np.eye(nodes.size), strict=True):
-        share = np.interp(wave, nodes, row) * xyz.sum(axis=1)
-        lit = share > 1e-4 * share.max()
-        held = (wave[lit], share[lit] / share[lit].sum()) if share.max() > 0.0 else (np.array([node]), np.ones(1))
+    for k, node in enumerate(nodes):
+        # nothing beyond the neighbours, whose hats begin at the node
+        first = 0 if k == 0 else int(np.searchsorted(wave, nodes[k - 1], "right"))
+        last = len(wave) if k == len(nodes) - 1 else int(np.searchsorted(wave, nodes[k + 1]))
+        near = nodes[max(k - 1, 0) : k + 2]
+        share = np.interp(wave[first:last], near, near == node) * power[first:last]
+        most = float(share.max(initial=0.0))
+        lit = share > 1e-4 * most
+        held = (wave[first:last][lit], share[lit] / share[lit].sum()) if most > 0.0 else (np.array([node]), np.ones(1))
         found.append(held)
     return tuple(found)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,6 +13,7 @@ from ..kernels import pattern as columns
 from ..optics.blade_form import BladeForm
 from ..optics.edge_ringing import (
     CORNER_SAMPLES,
+    EDGE_SAMPLES,
     PROFILE_SAMPLES,
     REACH,
     EdgeTables,
@@ -23,6 +25,13 @@ from ..optics.ringing import SHADOW
 
 Floats = NDArray[np.float64]
 Singles = NDArray[np.float32]
+
+
+SHORTEST = 5.0
+"""Half a blade and its distance from the middle are at least so long, in sqrt(lambda L / 2), to be served by tables."""
+
+FINE = 0.02
+"""Places in the stop may err by this part of sqrt(lambda L / 2) where a cell is drawn as one polygon."""
 
 
 @dataclass(frozen=True)
@@ -67,23 +76,28 @@ class EdgeCrossing:
     pixel_mm: float
     reach: float
 
-    def piece(self, waves: Floats, shares: Floats) -> Piece:
-        """Average the pattern over some light.
+    def pieces(self, bands: Sequence[tuple[Floats, Floats]]) -> list[Piece]:
+        """Average the pattern over the light of some bands.
 
         Parameters
         ----------
-        waves, shares : ndarray, shape (L,)
-            Wavelengths in nm, and their parts of the light.
+        bands : sequence of (ndarray, ndarray)
+            Of each its wavelengths in nm, and their parts of its light, which sum to 1.
 
         Returns
         -------
-        Piece
+        list of Piece
         """
+        waves, shares = (np.concatenate(column) for column in zip(*bands, strict=True))
+        first = np.cumsum([0, *(len(band) for band, _ in bands)])[:-1]
         squared = 0.5 * np.interp(waves, self.wavelengths_nm, np.abs(self.area) / self.wavelengths_nm) * waves
-        part = shares / shares.sum()
-        scale = math.sqrt(float(part @ squared))
         logs = 0.5 * np.log(squared)
-        spread = math.sqrt(max(float(part @ logs**2 - (part @ logs) ** 2), 0.0))
+        scales = np.sqrt(np.add.reduceat(shares * squared, first))
+        middle, square = (np.add.reduceat(shares * values, first) for values in (logs, logs**2))
+        spreads = np.sqrt(np.maximum(square - middle**2, 0.0))
+        return [self._piece(scale, spread) for scale, spread in zip(scales.tolist(), spreads.tolist(), strict=True)]
+
+    def _piece(self, scale: float, spread: float) -> Piece:
         tables = averaged(self.form, scale, spread, self.pixel_mm / scale)
         margin = len(tables.profile) // 2 / PROFILE_SAMPLES
         return edge_piece(self.form, tables, scale, margin * scale, gain(self.form, scale, tables))
@@ -105,7 +119,9 @@ def edge_crossing(form: BladeForm, wavelengths_nm: Floats, area: Floats, pixel_m
     """
     # light beyond the traced wavelengths belongs to the ends, and bands are a little wider than their mean
     largest = math.sqrt(0.6 * float(np.abs(area).max()))
-    if min(form.half_length, form.offset) < REACH * largest + 0.5 * pixel_mm:
+    # far fringes of a blade hardly know of its other end; those of a circle come to a focus in its middle
+    least = SHORTEST if len(form.corners) else REACH
+    if min(form.half_length, form.offset) < least * largest + 0.5 * pixel_mm:
         return None
     return EdgeCrossing(form, wavelengths_nm, area, pixel_mm, form.distance + SHADOW * largest)
 
@@ -134,22 +150,27 @@ def edge_piece(form: BladeForm, tables: EdgeTables, scale: float, margin: float,
     -------
     Piece
     """
-    rows, samples = tables.corner.shape, CORNER_SAMPLES / scale
-    found = np.zeros(columns.TABLE_COLUMNS)
-    found[columns.ROWS], found[columns.COLUMNS] = rows
-    found[[columns.PER_MM_X, columns.PER_MM_Y, columns.AT_X]] = samples, samples, tables.first
-    found[columns.OUTSIDE] = form.distance + margin
-    found[columns.CORNERS] = len(form.corners)
-    found[columns.EDGE], found[columns.EDGE_COUNT] = tables.corner.size, len(tables.profile)
-    found[columns.EDGE_PER_MM] = PROFILE_SAMPLES / scale
-    found[[columns.DISTANCE, columns.COSINE, columns.SINE]] = form.distance, math.cos(form.gamma), math.sin(form.gamma)
-    found[columns.OFFSET] = form.offset
-    found[columns.RADIUS] = 0.0 if form.curvature == 0.0 else 1.0 / form.curvature
-    found[columns.MARGIN] = margin
+    (rows, across), samples = tables.corner.shape, CORNER_SAMPLES / scale
+    row = [0.0] * columns.TABLE_COLUMNS
+    row[columns.ROWS], row[columns.COLUMNS] = rows, across
+    row[columns.PER_MM_X], row[columns.PER_MM_Y], row[columns.AT_X] = samples, samples, tables.first
+    row[columns.OUTSIDE] = form.distance + margin
+    row[columns.CORNERS] = len(form.corners)
+    row[columns.EDGE], row[columns.EDGE_COUNT] = tables.corner.size, tables.edge_count
+    row[columns.EDGE_PER_MM] = EDGE_SAMPLES / scale
+    row[columns.DISTANCE], row[columns.COSINE], row[columns.SINE] = (
+        form.distance,
+        math.cos(form.gamma),
+        math.sin(form.gamma),
+    )
+    row[columns.OFFSET] = form.offset
+    row[columns.RADIUS] = 0.0 if form.curvature == 0.0 else 1.0 / form.curvature
+    row[columns.MARGIN], row[columns.DEEP] = margin, max(form.offset - margin, 0.0)
+    row[columns.FINE] = FINE * scale
     if len(form.corners):
         blunt = form.gamma - form.bend
-        found[[columns.TO_ALONG, columns.TO_ACROSS]] = 0.5 / math.cos(blunt), 0.5 / math.sin(blunt)
-    return Piece(np.concatenate([tables.corner.ravel(), tables.profile]), found, brighter)
+        row[columns.TO_ALONG], row[columns.TO_ACROSS] = 0.5 / math.cos(blunt), 0.5 / math.sin(blunt)
+    return Piece(tables.values, np.array(row), brighter)
 
 
 def picture_piece(values: Singles, half: tuple[float, float]) -> Piece:
@@ -173,13 +194,16 @@ def picture_piece(values: Singles, half: tuple[float, float]) -> Piece:
     )
     found[columns.AT_X], found[columns.AT_Y] = 0.5 * values.shape[1] - 0.5, 0.5 * values.shape[0] - 0.5
     found[columns.OUTSIDE], found[columns.CORNERS] = max(half), -1.0
+    found[columns.FINE] = 0.5 / max(found[columns.PER_MM_X], found[columns.PER_MM_Y])
     return Piece(values.ravel(), found)
 
 
-def joined(pieces: list[Piece]) -> tuple[Singles, Floats, float]:
-    """Join the pieces of a path's crossings: their values, their table, and the gain of all."""
-    starts = np.cumsum([0, *(piece.values.size for piece in pieces)])[:-1]
-    table = np.stack([piece.row for piece in pieces])
-    table[:, columns.FIRST] += starts
-    table[:, columns.EDGE] += starts
-    return np.concatenate([piece.values for piece in pieces]), table, math.prod(piece.gain for piece in pieces)
+def joined(values: Sequence[Singles]) -> tuple[Singles, list[int]]:
+    """Join the patterns of a path's crossings: their values, each once, and where they begin."""
+    starts: dict[int, int] = {}
+    parts: list[Singles] = []
+    for one in values:
+        if id(one) not in starts:
+            starts[id(one)] = sum(part.size for part in parts)
+            parts.append(one)
+    return parts[0] if len(parts) == 1 else np.concatenate(parts), [starts[id(one)] for one in values]

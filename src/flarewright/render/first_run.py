@@ -41,7 +41,7 @@ def compile_for_render(project: Project, threads: int | None = None) -> None:
         if coated and not scattering:
             names += ["hits"]
         if project.quality.ringing != "off":
-            names += ["draw ringing", "open cells"]
+            names += ["draw ringing"]
     elif project.quality.mode == "draft" and iris.mask is None:
         # a draft through a mask is rare: its kernel is compiled when it is called
         names += ["matrices", "mirrors"] if coated else ["matrices"]

@@ -18,10 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..kernels.bundle import draw_bundle, measure_bundle, node_densities
-from ..kernels.trace import ALIVE, REL, X, Y
+from ..kernels.trace import ALIVE, REL, STOP_X, X, Y
 from ..model import Quality
 from ..optics.border import points
-from ..optics.bundle import Bundle, Region, find_region, measure_region, trace_bundle, trace_grid
+from ..optics.bundle import Bundle, Region, find_region, grown, measure_region, trace_bundle, trace_grid
 from ..optics.grating import GratingOrder, grating_orders
 from ..optics.paths import LightPath
 from .art import PLAIN, Frame, PathArt
@@ -45,8 +45,14 @@ SHIFT_QUANTILE = 0.9
 STEP_CONTRAST = 2e-3
 # and a ghost this many times fainter still needs one colour only
 ONE_COLOR = 1.0 / 6.0
-# patterns fade where the iris would cut: a grid of their zone need not follow a rim
-RING_FLUX = 1e-3
+# and where nothing but fringes ends a ghost, steps of this part of their scale sqrt(lambda L / 2)
+BRIDGE_FRINGES = 0.4
+# by which a grid may get the places of fringes wrong, of the same
+FRINGE_PART = 0.03
+# farther into the shadow than this part of it light is faint: half a percent or less
+FAINT_SHADOW = 0.5
+# a region is made larger by this part at most without looking for it anew
+MOST_GROWN = 0.25
 # never more drawings than this between two traced wavelengths
 MOST_BRIDGES = 32
 
@@ -234,18 +240,23 @@ def draw_final(
     bend = traced_bend(shot, path, bundle, item.to_pixels)
     if few and _drawn_in_few(item, bundle, bend, canvas.plane(detail), to_pixels):
         return
-    traced = [trace_bundle(shot.packed, w, bundle, tilt) for w in range(count)]
-    rings = None
+    rings, step_px = None, BRIDGE_PX
     if shot.ringing is not None and visibility >= STEP_CONTRAST:
         pixels_per_mm = (float(to_pixels[2]), float(to_pixels[3]))
         nearness = shot.packed.nearness / shot.incidence.tilt_cosine
-        rings = shot.ringing.of(shot.packed, path, shot.light, traced, pixels_per_mm, nearness)
-        if rings is not None:
-            bundle, traced = _with_shadow(item, rings, quality, scale)
-    pieces = _bridges(traced, item.view_radius, scale, visibility) if quality.bridge else [1] * (count - 1)
+        rings = shot.ringing.of(shot.packed, path, shot.light, bundle, pixels_per_mm, nearness)
+    if rings is not None:
+        if _is_soft(bundle, opening.radius):
+            step_px = max(BRIDGE_PX, BRIDGE_FRINGES * rings.fringe_px)
+        bundle = _with_shadow(item, rings, quality, scale)
+    traced = [trace_bundle(shot.packed, w, bundle, tilt) for w in range(count)]
+    pieces = [1] * (count - 1)
+    if quality.bridge:
+        limit = float("inf") if rings is None else opening.radius
+        pieces = _bridges(traced, limit, item.view_radius, scale, visibility, step_px)
     steps = [(w, k / n) for w, n in enumerate(pieces) for k in range(n)] + [(count - 1, 0.0)]
     fine_nm = np.interp([w + part for w, part in steps], np.arange(count), shot.packed.wavelengths_nm)
-    patterns = None if rings is None else rings.textures(fine_nm, canvas.plane(detail))
+    patterns = None if rings is None else rings.textures(fine_nm)
     for k, ((w, part), rgb) in enumerate(zip(steps, shot.weights(fine_nm, bend) * item.art.rgb, strict=True)):
         if stop is not None and stop.is_set():
             return
@@ -295,17 +306,36 @@ def _drawn_in_few(item: FinalPass, bundle: Bundle, bend: Floats | None, plane: P
     return True
 
 
-def _with_shadow(item: FinalPass, rings: Rings, quality: Quality, scale: float) -> tuple[Bundle, list[Floats]]:
-    """Trace a path anew, beyond the iris too: as far as its diffraction throws light."""
+def _is_soft(bundle: Bundle, iris_radius: float) -> bool:
+    """Tell whether nothing but the iris bounds a bundle: no rim cuts it, and it does not fold."""
+    for data in bundle.traced.values():
+        radius = np.hypot(data[:, STOP_X::2], data[:, STOP_X + 1 :: 2])
+        within = (data[:, ALIVE] > 0.0) & (radius <= iris_radius).all(axis=1)
+        if (data[within, REL] > 1.0).any():
+            return False
+        nodes = bundle.triangles[within[bundle.triangles].all(axis=1)]
+        x, y = data[nodes, X], data[nodes, Y]
+        area = (x[:, 1] - x[:, 0]) * (y[:, 2] - y[:, 0]) - (y[:, 1] - y[:, 0]) * (x[:, 2] - x[:, 0])
+        if area.size and area.min() * area.max() < 0.0:
+            return False
+    return True
+
+
+def _with_shadow(item: FinalPass, rings: Rings, quality: Quality, scale: float) -> Bundle:
+    """Lay a path's grid anew, beyond the iris too: as far as its diffraction throws light."""
     shot, opening, tilt = item.shot, item.shot.opening, item.shot.incidence.tilt
-    region = find_region(shot.packed, item.path, tilt, rings.reach, item.view_radius) or item.region
-    # fringes are as fine as an edge wherever they run
-    inner = max(0.0, opening.inner - (rings.reach - opening.radius))
-    bundle = trace_grid(
-        shot.packed, item.path, tilt, (rings.reach, inner), region,
-        tolerance=quality.tolerance_px, scale=scale, view_radius=item.view_radius, flux_tolerance=RING_FLUX,
+    more = rings.reach / opening.radius - 1.0
+    if more < MOST_GROWN:
+        region = grown(shot.packed, item.region, tilt, 0.75 * more)
+    else:
+        region = find_region(shot.packed, item.path, tilt, rings.reach, item.view_radius) or item.region
+    shadow = rings.reach - opening.radius
+    return trace_grid(
+        shot.packed, item.path, tilt, (rings.reach, max(0.0, opening.inner - shadow)), region,
+        tolerance=quality.tolerance_px, scale=scale, view_radius=item.view_radius,
+        fringe_px=max(quality.tolerance_px, FRINGE_PART * rings.fringe_px),
+        faint_radius=opening.radius + FAINT_SHADOW * shadow,
     )  # fmt: skip
-    return bundle, [trace_bundle(shot.packed, w, bundle, tilt) for w in range(len(shot.packed.wavelengths_nm))]
 
 
 def draw_alone(items: Sequence[FinalPass], quality: Quality, canvas: Canvas, stop: Event | None = None) -> None:
@@ -342,7 +372,9 @@ def draw_alone(items: Sequence[FinalPass], quality: Quality, canvas: Canvas, sto
     canvas.add(finish(pixels, art, frame, items[0].to_pixels / 2.0**detail, own), detail)
 
 
-def _bridges(traced: list[Floats], view_radius: float, scale: float, visibility: float) -> list[int]:
+def _bridges(
+    traced: list[Floats], iris_radius: float, view_radius: float, scale: float, visibility: float, step_px: float
+) -> list[int]:
     """Into how many pieces to divide each gap between traced wavelengths so that no step is seen."""
     most = min(MOST_BRIDGES, max(1, int(visibility / STEP_CONTRAST))) if visibility < float("inf") else MOST_BRIDGES
     if most == 1:
@@ -350,12 +382,14 @@ def _bridges(traced: list[Floats], view_radius: float, scale: float, visibility:
     pieces = []
     for short, long in pairwise(traced):
         passing = (short[:, ALIVE] * long[:, ALIVE] > 0.0) & (np.minimum(short[:, REL], long[:, REL]) <= 1.0)
+        for column in range(STOP_X, short.shape[1], 2):
+            passing &= short[:, column] ** 2 + short[:, column + 1] ** 2 <= iris_radius**2
         seen = passing & (short[:, X] ** 2 + short[:, Y] ** 2 <= view_radius**2)
         shift = ((long[:, X] - short[:, X]) ** 2 + (long[:, Y] - short[:, Y]) ** 2)[seen]
         # the few nodes that fly farthest carry hardly any light
         far = int(SHIFT_QUANTILE * (shift.size - 1))
         wide = sqrt(np.partition(shift, far)[far]) * scale if shift.size else 0.0
-        pieces.append(min(max(ceil(wide / BRIDGE_PX), 1), most))
+        pieces.append(min(max(ceil(wide / step_px), 1), most))
     return pieces
 
 

@@ -18,8 +18,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernels.bundle import draw_bundle
-from ..kernels.pattern import find_open
+from ..kernels.pattern import EDGE, FIRST
 from ..kernels.ringing import draw_ringing
 from ..kernels.trace import ALIVE, REL, STOP_X
 from ..model import Light
@@ -75,6 +74,7 @@ TEXEL_PX = 0.7
 
 KEPT_BYTES = 400_000_000
 KEPT_GRID_BYTES = 100_000_000
+KEPT_JOINED_BYTES = 20_000_000
 # a crossing is lit where rays come as near to its edge as this part of the circle within it
 LIT = 0.95
 
@@ -127,13 +127,14 @@ class Ringing:
     f_number: float
     _grids: _Kept = field(default_factory=lambda: _Kept(KEPT_GRID_BYTES), compare=False, repr=False)
     _patterns: _Kept = field(default_factory=lambda: _Kept(KEPT_BYTES), compare=False, repr=False)
+    _joined: _Kept = field(default_factory=lambda: _Kept(KEPT_JOINED_BYTES), compare=False, repr=False)
 
     def of(
         self,
         packed: PackedLens,
         path: LightPath,
         light: Light,
-        traced: Sequence[Floats],
+        bundle: Bundle,
         pixels_per_mm: tuple[float, float],
         nearness: float = 0.0,
     ) -> Rings | None:
@@ -144,8 +145,8 @@ class Ringing:
         packed : PackedLens
         path : LightPath
         light : Light
-        traced : sequence of ndarray, shape (N, 5 + 2 C)
-            Its bundle at the traced wavelengths.
+        bundle : Bundle
+            Traced as far as the iris.
         pixels_per_mm : tuple of float
             Across and down on the sensor.
         nearness : float
@@ -157,7 +158,7 @@ class Ringing:
             None where the edge of the iris is not lit, where its fringes are far below a pixel, and where the Fresnel
             number is below `LEAST_FRESNEL_NUMBER`: the plain picture is right then.
         """
-        return _rings(self, packed, path, light, traced, pixels_per_mm, nearness)
+        return _rings(self, packed, path, light, bundle, pixels_per_mm, nearness)
 
     def sample(self, x: Floats, y: Floats) -> tuple[Floats, Floats]:
         """Sample the opening at x, shape (Nx,), and y, shape (Ny, 1): amplitude and transmittance (`fresnel_grid`)."""
@@ -197,6 +198,17 @@ class Ringing:
     def form(self) -> BladeForm | None:
         """The blades by one of their corners; None for an image."""
         return None if self.opening.mask is not None else blade_form(self.opening.blades)
+
+    def joined(self, values: tuple[Singles, ...]) -> tuple[Singles, list[int]]:
+        """Join patterns (`edge_rings.joined`); the tables of edges come again and again."""
+        key = tuple(id(one) for one in values)
+        found = self._joined.get(key)
+        if found is None:
+            # what is kept keeps its parts, so that their numbers stay theirs
+            found = (joined(values), values)
+            self._joined.put(key, found, found[0][0].nbytes)
+        kept: tuple[Singles, list[int]] = found[0]
+        return kept
 
     def sharp(self, step: float) -> Piece:
         """Return the opening itself as a pattern, its border a few steps wide."""
@@ -248,35 +260,28 @@ class Rings:
         As traced.
     crossings : tuple of EdgeCrossing, _Crossing or Piece
         One a crossing of the stop; a piece where the edge is sharp.
+    fringe_px : float
+        The finest sqrt(lambda L / 2) of an edge that is lit, on the sensor in pixels; 0 where one is sharp.
     """
 
     ringing: Ringing
     light: Light
     wavelengths_nm: Floats
     crossings: tuple[EdgeCrossing | _Crossing | Piece, ...]
+    fringe_px: float
 
     @property
     def reach(self) -> float:
         """How far out in the stop light is looked for, mm."""
         return max(item.reach for item in self.crossings if not isinstance(item, Piece))
 
-    def textures(self, drawn_nm: Floats, plane: Plane) -> Textures:
-        """Prepare for drawing on a plane at some wavelengths."""
-        gray = np.zeros((plane.shape[0], plane.shape[1] * plane.shape[3]), dtype=np.float32)
-        return Textures(self, band_contents(self.light.spectrum, drawn_nm), gray)
+    def textures(self, drawn_nm: Floats) -> Textures:
+        """Prepare for drawing at some wavelengths."""
+        bands = band_contents(self.light.spectrum, drawn_nm)
+        edges = [item.pieces(bands) if isinstance(item, EdgeCrossing) else [] for item in self.crossings]
+        return Textures(self, bands, tuple(tuple(pieces) for pieces in edges))
 
-    def texture(self, waves: Floats, shares: Floats) -> tuple[Singles, Floats, float]:
-        """Return the patterns for some light and their table, as `kernels.ringing` takes them, and a gain."""
-        return joined([self._piece(item, waves, shares) for item in self.crossings])
-
-    def _piece(self, item: EdgeCrossing | _Crossing | Piece, waves: Floats, shares: Floats) -> Piece:
-        if isinstance(item, EdgeCrossing):
-            return item.piece(waves, shares)
-        if isinstance(item, _Crossing):
-            return picture_piece(*self._average(item, waves, shares))
-        return item
-
-    def _average(self, item: _Crossing, waves: Floats, shares: Floats) -> Pattern:
+    def average(self, item: _Crossing, waves: Floats, shares: Floats) -> Pattern:
         """Average a crossing's pattern over the light of a band."""
         sides = [np.interp(waves, self.wavelengths_nm, side / self.wavelengths_nm) * waves for side in item.area.T]
         middle = len(self.wavelengths_nm) // 2
@@ -310,37 +315,42 @@ class Textures:
     rings : Rings
     bands : tuple of (ndarray, ndarray)
         What light each drawn wavelength stands for.
-    gray : ndarray, shape (H, W), float32
-        To draw on.
+    edges : tuple of tuple of Piece
+        For each crossing of the stop its pieces at these wavelengths, where it has edges and corners.
     """
 
     rings: Rings
     bands: tuple[tuple[Floats, Floats], ...]
-    gray: Singles
+    edges: tuple[tuple[Piece, ...], ...]
 
     def draw(
         self, k: int, bundle: Bundle, data: Floats, densities: Floats, axes: Floats, to_pixels: Floats, gain: float,
         rgb: Floats, plane: Plane,
     ) -> None:  # fmt: skip
         """Draw a bundle at the k-th wavelength; the rest is as `kernels.bundle.draw_bundle` takes it."""
-        opening, crossings = self.rings.ringing.opening, len(self.rings.crossings)
-        patterns, table, brighter = self.rings.texture(*self.bands[k])
-        gain = gain * brighter
+        patterns, table, brighter = self._texture(k)
         form = self.rings.ringing.form
         corners = np.empty((0, 2)) if form is None else form.corners
-        rest = bundle.triangles
-        # what is far from the border has no pattern: it is drawn as ever
-        inside = find_open(data, rest, bundle.halves, crossings, axes, table, corners)
-        if inside.any():
-            draw_bundle(
-                data, bundle.pupil, rest[inside], densities, crossings, opening.blades, None, opening.half, axes,
-                to_pixels, gain, rgb, plane, bundle.halves,
-            )  # fmt: skip
-            rest = rest[~inside]
         draw_ringing(
-            data, bundle.pupil, rest, densities, crossings, patterns, table, corners, axes, to_pixels, gain, rgb, plane,
-            self.gray, bundle.halves,
+            data, bundle.pupil, bundle.triangles, densities, len(table), patterns, table, corners, axes, to_pixels,
+            gain * brighter, rgb, plane, bundle.halves,
         )  # fmt: skip
+
+    def _texture(self, k: int) -> tuple[Singles, Floats, float]:
+        """Return the k-th patterns and their table, as `kernels.ringing` takes them, and a gain."""
+        pieces: list[Piece] = []
+        for item, edges in zip(self.rings.crossings, self.edges, strict=True):
+            if isinstance(item, EdgeCrossing):
+                pieces.append(edges[k])
+            elif isinstance(item, _Crossing):
+                pieces.append(picture_piece(*self.rings.average(item, *self.bands[k])))
+            else:
+                pieces.append(item)
+        patterns, starts = self.rings.ringing.joined(tuple(piece.values for piece in pieces))
+        table = np.stack([piece.row for piece in pieces])
+        table[:, FIRST] += starts
+        table[:, EDGE] += starts
+        return patterns, table, math.prod(piece.gain for piece in pieces)
 
 
 def _cubic(t: float) -> tuple[float, float, float, float]:
@@ -354,12 +364,12 @@ def _rings(
     packed: PackedLens,
     path: LightPath,
     light: Light,
-    traced: Sequence[Floats],
+    bundle: Bundle,
     pixels_per_mm: tuple[float, float],
     nearness: float,
 ) -> Rings | None:
     ways = stop_to_sensor(packed, path, nearness)
-    lit = _lit(traced, path.stop_crossings, ringing.opening)
+    lit = _lit(list(bundle.traced.values()), path.stop_crossings, ringing.opening)
     found: list[EdgeCrossing | _Crossing | None] = [
         _crossing(ringing, packed.wavelengths_nm, way, light, pixels_per_mm) if shines else None
         for way, shines in zip(ways, lit, strict=True)
@@ -367,9 +377,14 @@ def _rings(
     if all(item is None for item in found):
         return None
     middle = len(packed.wavelengths_nm) // 2
-    steps = [0.5 / max(float(np.max(np.abs(way.magnification[middle]) * pixels_per_mm)), 1e-9) for way in ways]
-    crossings = [ringing.sharp(step) if item is None else item for item, step in zip(found, steps, strict=True)]
-    return Rings(ringing, light, packed.wavelengths_nm, tuple(crossings))
+    magnified = [float(np.max(np.abs(way.magnification[middle]) * pixels_per_mm)) for way in ways]
+    crossings = [ringing.sharp(0.5 / max(m, 1e-9)) if c is None else c for c, m in zip(found, magnified, strict=True)]
+    fringes = [
+        0.0 if item is None else m * math.sqrt(0.5 * float(np.abs(item.area).min()))
+        for item, m, shines in zip(found, magnified, lit, strict=True)
+        if shines
+    ]
+    return Rings(ringing, light, packed.wavelengths_nm, tuple(crossings), min(fringes))
 
 
 def _lit(traced: Sequence[Floats], crossings: int, opening: Opening) -> list[bool]:
