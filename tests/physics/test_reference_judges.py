@@ -223,11 +223,11 @@ def test_rays_of_one_path_are_the_references():
 
 @pytest.mark.slow
 @pytest.mark.parametrize("stopped", [False, True])
-@pytest.mark.parametrize("lens", [lens for lens in LENSES if lens not in ("canon-28-80", "nikon-28-75")])
+@pytest.mark.parametrize("lens", LENSES)
 def test_every_path_agrees(lens, stopped):
     """Every path above 1e-4 of the ghost light in the picture: within half a percent, apart from chance.
 
-    Not the zooms, whose 351 paths and more take minutes: docs/reference.md tells what they gave.
+    The zooms have 351 paths and more and take minutes.
     """
     widest = load_lens(lens).f_number
     f_number = (4.0 if widest < 2.0 else 2.8) * widest if stopped else None
