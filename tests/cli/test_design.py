@@ -70,7 +70,7 @@ def test_benchmark_tells_what_the_issue_asks_for(folder, capsys):
     assert one["psnr_black_db"] == pytest.approx(20.0, abs=0.2)
     assert one["psnr_db"] > one["psnr_black_db"]
     assert (folder / "a.png").stat().st_size > 1000
-    assert run(["design", "benchmark", "heliar", "--time", "0.1"]) == 0
+    assert run(["design", "benchmark", "heliar", "--cpu-time", "0.1"]) == 0
     assert "25.89 dB" in capsys.readouterr().out
 
 
@@ -161,6 +161,8 @@ def test_a_limit_no_lens_keeps_is_told_and_the_nearest_are_written(folder, capsy
         (["benchmark", "tessar"], "choose heliar or canon"),
         (["benchmark", "heliar", "--angle", "0"], "above 0"),
         (["benchmark", "heliar", "--unsigned", "--fresnel"], "keep one"),
+        (["benchmark", "heliar", "--time", "1", "--cpu-time", "1"], "keep one"),
+        (["benchmark", "heliar", "--cpu-time", "nan"], "--cpu-time nan"),
         (["benchmark", "heliar", "--picture", "a.gif"], "must be named"),
         (["identify", "heliar-tronnier"], "missing option '--light'"),
         (["identify", "heliar-tronnier", "--light", "0,0"], "on the axis"),

@@ -10,11 +10,16 @@ from flarewright.design.ghosts import differentiate, evaluate, placed_ghosts
 from flarewright.design.prescription import Structure, structure_of, vector_of
 from flarewright.errors import LensError
 from flarewright.kernels import design_ghosts as dg
-from flarewright.kernels.design_search import irradiance_of_ghosts
+from flarewright.kernels import design_sight
+from flarewright.kernels._jit import for_python
+from flarewright.kernels.design_cost import irradiance_of_ghosts
 from flarewright.model import Lines
 from flarewright.optics.paraxial import D_LINE_NM, first_order, path_matrices, vertex_positions
 from flarewright.optics.paths import ghost_path, ghost_paths
 from flarewright.render.prepare import load_lens
+
+reduce_rows, sight_row = for_python(dg.reduce_rows), for_python(design_sight.sight_row)
+fill_mirrors_of_ghosts = for_python(design_sight.fill_mirrors_of_ghosts)
 
 LENSES = ("heliar-tronnier", "canon-28-80", "tessar-brendel", "nikon-28-75")
 
@@ -101,6 +106,28 @@ def test_any_prescription_has_derivatives_of_differences(seed, rows, stop):
         measured, told = (there.values[:, column] - here.values[:, column]) / 2.0, exact @ way
         least = 1e-9 * np.abs(exact * way).max() + 1e-12 * np.abs(found.values[:, column]).max()
         assert np.all(np.abs(measured - told)[same] <= 1e-4 * np.abs(exact * way).max(axis=1)[same] + least)
+
+
+@pytest.mark.parametrize("name", LENSES)
+@pytest.mark.parametrize("entrance", [100.0, 0.5])
+def test_the_reach_has_derivatives_of_differences(name, entrance):
+    lens = load_lens(name)
+    structure, q = structure_of(lens), vector(lens)
+    rows = structure.rows
+    # the stop is flat and in air
+    way = np.random.default_rng(1).normal(size=len(q)) * 1e-6 * np.maximum(np.abs(q), 1e-3)
+    way[[1 + rows + structure.stop, 1 + 2 * rows + structure.stop]] = 0.0
+    sides = [1.0 / evaluate(structure, (q + sign * way)[None], entrance)[0][:, dg.REACH_THESIS] for sign in (1.0, -1.0)]
+    work, row = np.empty((dg.WORK_ROWS, rows)), np.empty(len(q))
+    reduce_rows(q, rows, work)
+    for g, (j, i) in enumerate(structure.pairs):
+        sight_row(q, rows, structure.stop, j, i, entrance, work, np.empty(dg.TRAIL * rows), np.zeros((4, rows)), row)
+        assert row @ way == pytest.approx(
+            (sides[0][g] - sides[1][g]) / 2.0, rel=1e-5, abs=1e-7 * np.abs(row * way).max()
+        )
+    between = np.empty((len(structure.pairs), 2), np.int64)
+    fill_mirrors_of_ghosts(structure.stop, rows, structure.mirrors, between)
+    assert [(int(j), int(i)) for j, i in between] == list(structure.pairs)
 
 
 def test_a_ghost_lands_where_the_draft_draws_it_and_is_as_bright():

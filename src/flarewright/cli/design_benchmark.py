@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -18,7 +18,7 @@ from .design_checks import check_color_fitness, check_films, check_fitness, chec
 if TYPE_CHECKING:
     from ..design.figures import Run
     from ..design.search import State
-    from ..design.solvers import Choice
+    from ..design.solvers import Choice, Limits
     from ..design.trials import Name, Trial
 
 EPILOG = (
@@ -48,7 +48,11 @@ def benchmark(
     ] = None,
     ghosts: Annotated[int, typer.Option(min=1, max=60, help="How many each seed scatters, for scratch.")] = 5,
     seeds: Annotated[int, typer.Option(min=1, max=1000, help="Run so many seeds, from 0.")] = 1,
-    time_s: Annotated[float, typer.Option("--time", help="Seconds a seed.")] = 10.0,
+    time_s: Annotated[float | None, typer.Option("--time", help="Seconds a seed; 10 when left out.")] = None,
+    cpu_s: Annotated[
+        float | None,
+        typer.Option("--cpu-time", help="Instead: processor seconds a seed, all cores together, for a busy machine."),
+    ] = None,
     solver: Solvers = None,
     fitness: Annotated[
         str | None,
@@ -69,7 +73,7 @@ def benchmark(
 ) -> None:
     """Find the ghosts or colours of a known lens without knowing the lens, and compare the pictures."""
     trial = _trial(case, angle_deg, coatings, ghosts, unsigned, fresnel)
-    check_time(time_s)
+    limits = _limits(time_s, cpu_s)
     seen = _seen(fitness, trial)
     for place, suffix in ((picture, ".png"), (report, ".html")):
         if place is not None:
@@ -84,7 +88,7 @@ def benchmark(
 
     choices = [chosen(text) for text in solver or ["pools"]]
     with interruptible() as asked, _telling() as progress:
-        done = _run_all(trial, seeds, choices, time_s, seen, threads, progress, asked)
+        done = _run_all(trial, seeds, choices, limits, seen, threads, progress, asked)
         cut_off = asked()
     runs = [run for run, _, _ in done]
     if cut_off:
@@ -122,6 +126,20 @@ def _trial(case: str, angle_deg: float, coatings: str | None, ghosts: int, unsig
     return Trial(name, angle_deg, ghosts, kind, layers, unsigned, fresnel)
 
 
+def _limits(time_s: float | None, cpu_s: float | None) -> Limits:
+    """Return how long each seed may take, checked."""
+    from ..design.solvers import Limits
+
+    if time_s is not None and cpu_s is not None:
+        raise ProjectError("--time and --cpu-time both tell when a seed ends; keep one")
+    if cpu_s is not None:
+        check_time(cpu_s, "--cpu-time")
+        return Limits(None, cpu_s=cpu_s)
+    limits = Limits(10.0 if time_s is None else time_s)
+    check_time(limits.time_s or 0.0)
+    return limits
+
+
 def _seen(fitness: str | None, trial: Trial) -> str:
     """Return what `--fitness` says, checked; the thesis' own when it was left out."""
     if trial.films is not None:
@@ -130,13 +148,12 @@ def _seen(fitness: str | None, trial: Trial) -> str:
 
 
 def _run_all(
-    trial: Trial, seeds: int, choices: Sequence[Choice], time_s: float, seen: Any, threads: int | None,
+    trial: Trial, seeds: int, choices: Sequence[Choice], limits: Limits, seen: Any, threads: int | None,
     progress: Callable[[str], None] | None, cancelled: Callable[[], bool],
 ) -> list[tuple[Run, Any, Any]]:  # fmt: skip
     """Run every solver with every seed, until somebody has had enough."""
     from ..design.benchmark import run_trial
     from ..design.benchmark_colors import run_colors
-    from ..design.solvers import Limits
 
     run_one: Any = run_trial if trial.films is None else run_colors
     done: list[tuple[Run, Any, Any]] = []
@@ -149,8 +166,8 @@ def _run_all(
                 if progress is not None:
                     progress(f"{choice.label}, seed {seed}: {now.searches} {choice.unit}")
 
-            limits = Limits(time_s, None, show, cancelled)
-            done.append(run_one(trial, seed=seed, limits=limits, choice=choice, measure=seen, threads=threads))
+            one = replace(limits, progress=show, cancelled=cancelled)
+            done.append(run_one(trial, seed=seed, limits=one, choice=choice, measure=seen, threads=threads))
     return done
 
 

@@ -13,10 +13,10 @@ if TYPE_CHECKING:
     from ..design.genes import Measure
 
 
-def check_time(time_s: float) -> None:
+def check_time(time_s: float, flag: str = "--time") -> None:
     """Refuse a time that is none."""
     if not (math.isfinite(time_s) and time_s > 0.0):
-        raise ProjectError(f"--time {time_s:g} is no time; give seconds above 0")
+        raise ProjectError(f"{flag} {time_s:g} is no time; give seconds above 0")
 
 
 def check_fitness(text: str) -> Measure:

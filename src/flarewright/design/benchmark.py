@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ..model.design import Bounds
 from ..render.prepare import load_lens
+from .freedom import alike
 from .genes import Measure
 from .hunt import Limits, Solution
 from .objective import diagonal_slope, fitness, fitness_thesis, own_objective
@@ -184,25 +185,25 @@ def run_trial(
     task = task_of(trial, seed)
     solver = chosen("pools") if choice is None else choice
     make_ready(solver, task.problem, measure)
-    cpu = time.process_time()
+    begun, cpu = time.perf_counter(), time.process_time()
     solution = solve_with(
         solver, task.problem, limits=limits or Limits(10.0), seed=seed, measure=measure, threads=threads
     )
-    cpu = time.process_time() - cpu
-    return _measured(task, solution, solver, cpu, measure)
+    best = _best(task.problem, solution, solver)
+    spent = time.perf_counter() - begun, time.process_time() - cpu
+    return _measured(task, solution, best, solver, spent, measure)
 
 
 def _measured(
-    task: Task, solution: Solution, solver: Choice, cpu: float, measure: Measure
+    task: Task, solution: Solution, best: Candidate, solver: Choice, spent: tuple[float, float], measure: Measure
 ) -> tuple[BenchmarkRun, Floats, Floats]:
-    """Compare what a solver found with what it should find."""
+    """Compare what a solver found with what it should find; `spent` are seconds, by the clock and of processors."""
     problem, state = task.problem, solution.state
-    best = _best(problem, solution, solver)
     found = problem.variables(best.structure).prescription(best.x)
     pictures = task.pictures(best.structure, found)
     lens = task.lens
     run = BenchmarkRun(
-        solver.label, measure if solver.evolves else "ours", state.seed, state.seconds, cpu, state.searches,
+        solver.label, measure if solver.evolves else "ours", state.seed, *spent, state.searches,
         fitness_thesis(problem.objective, best.structure, found), fitness(problem.objective, best.structure, found),
         psnr(*pictures), ssim(*pictures), psnr(pictures[0], np.zeros_like(pictures[0])), psnr_with_gain(*pictures),
         lens is not None and best.structure == lens[0] and same_lens(lens[1], found), _trace(problem, solution),
@@ -211,11 +212,11 @@ def _measured(
 
 
 def _best(problem: Problem, solution: Solution, solver: Choice) -> Candidate:
-    """Return what a solver made best: what it saw counts, and nobody but ours polishes."""
+    """Return what a solver made best: what it saw counts, and nobody but ours polishes and uses what is free."""
     if solver.evolves:
         return solution.steps[-1].best
     assert solution.state.best is not None
-    return _finest(problem, solution.state.best)
+    return alike(problem, _finest(problem, solution.state.best), seed=solution.state.seed)[0]
 
 
 def _trace(problem: Problem, solution: Solution) -> tuple[TracePoint, ...]:

@@ -16,11 +16,12 @@ from ..optics.paraxial import first_order
 from ..render.prepare import complete_lens
 from .constraints import Breach, breaches, kept, stiff
 from .finish import finish, traced_misfits
+from .freedom import alike, to_the_middle
 from .objective import fitness, fitness_thesis, misfits
 from .prescription import Structure
 from .rims import clear_radii
 from .rounding import held_indices, rounded
-from .search import KEPT, Candidate, Problem, State, merge, polish
+from .search import KEPT, SOLVED, Candidate, Problem, State, merge, polish
 
 Floats = NDArray[np.float64]
 
@@ -155,6 +156,8 @@ def outcomes(state: State, problem: Problem, *, count: int = 5, name: str = "Des
     for run in state.runs:
         pool = list(merge(pool, run.members, KEPT))
     pool.sort(key=lambda one: one.cost)
+    # where the ghosts are met, others that have them too come before those that only come near
+    pool[:1] = alike(problem, pool[0], seed=state.seed) if count > 1 and pool else pool[:1]
     if problem.traced:
         pool = _by_tracing(pool, problem)
     # the best lens with any index need not be the best with glasses
@@ -168,7 +171,7 @@ def outcomes(state: State, problem: Problem, *, count: int = 5, name: str = "Des
         if any(_same(one, other) for other in chosen):
             continue
         fine = polish(problem, [(one.structure, one.x)], steps=POLISHING_STEPS)[0]
-        fine = min(fine, one, key=lambda each: each.cost)
+        fine = to_the_middle(problem, min(fine, one, key=lambda each: each.cost))
         if any(_same(fine, other) for other in chosen):
             continue
         outcome = _outcome(fine, problem, name, iris)
@@ -177,7 +180,8 @@ def outcomes(state: State, problem: Problem, *, count: int = 5, name: str = "Des
             found.append(outcome)
         else:
             failures += 1
-    found.sort(key=lambda one: one.cost if one.fitness_traced is None else one.fitness_traced[1])
+    # lenses that meet their targets stay in order
+    found.sort(key=lambda one: max(one.cost, SOLVED) if one.fitness_traced is None else one.fitness_traced[1])
     return tuple(
         replace(one, lens=one.lens.replace(name=f"{name} {number}")) for number, one in enumerate(found[:count], 1)
     )

@@ -100,6 +100,7 @@ def colors_with(
     ProjectError
         When no ghost's colour is asked for.
     """
+    limits = limits.from_now()
     if not choice.evolves:
         return solve_colors(
             problem, seed=seed, starts=starts, threads=threads, time_limit=limits.time_s, cancelled=limits.cancelled,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 import numpy as np
@@ -43,12 +43,26 @@ class Limits:
         Called with the state now and then.
     cancelled : callable or None
         Asked now and then.
+    cpu_s : float or None
+        Seconds of processor time of this process, all its threads together; None: no limit.
     """
 
     time_s: float | None = 60.0
     most: int | None = None
     progress: Progress | None = None
     cancelled: Callable[[], bool] | None = None
+    cpu_s: float | None = None
+
+    def from_now(self) -> Limits:
+        """Return the same limits whose processor time begins to count."""
+        if self.cpu_s is None:
+            return self
+        end, asked = time.process_time() + self.cpu_s, self.cancelled
+
+        def over() -> bool:
+            return time.process_time() >= end or (asked is not None and asked())
+
+        return replace(self, cancelled=over, cpu_s=None)
 
 
 @dataclass(frozen=True)

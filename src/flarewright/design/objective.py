@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..kernels import design_ghosts as columns
+from ..kernels.design_cost import irradiance_of_ghosts
 from ..kernels.design_fitness import HIDDEN, sorted_misfit
 from ..kernels.design_match import match
-from ..kernels.design_search import irradiance_of_ghosts
 from ..model.design import Bounds
 from .ghosts import evaluate
 from .prescription import Structure
@@ -291,27 +291,29 @@ def own_objective(
     Returns
     -------
     Objective
-        Ghosts that cannot be seen at a light are no targets of it.
+        Ghosts that cannot be seen at a light are no targets of it; one whose middle cannot may do what it wants.
     """
     values = evaluate(structure, vector[None], entrance)[0]
     irradiance = np.empty(len(values))
     irradiance_of_ghosts(vector, structure.stop, structure.mirrors, values, irradiance)
-    targets, names, spans = [], [], [0]
+    targets, names, spans, counts = [], [], [0], []
     for light, slope in enumerate(slopes):
-        here = seen(values, float(slope))
+        here, middles = seen(values, float(slope)), seen(values, float(slope), thesis=True)
         for g, (j, i) in enumerate(structure.pairs):
             if here[g, 1] != HIDDEN:
                 radius = here[g, 1] if signed else abs(here[g, 1])
                 targets.append((here[g, 0], radius, irradiance[g]))
+                counts.append(middles[g, 1] != HIDDEN)
                 names.append(f"{j}-{i}" if len(slopes) == 1 else f"{j}-{i} at light {light}")
         spans.append(len(targets))
     table = np.array(targets).reshape(-1, 3)
     weight = relative_weights(table[:, 1]) if weights == "relative" else np.ones(len(table))
     # of the irradiance a tenth is worth as much as a tenth of the radius
     light_weight = np.full(len(table), 0.5 if brightness == "fresnel" else 0.0)
+    three = np.stack([weight, weight, light_weight], axis=1) * np.array(counts, dtype=np.float64)[:, None]
     return Objective(
         slopes=np.asarray(slopes, dtype=np.float64), spans=np.array(spans, dtype=np.int64), targets=table,
-        weights=np.stack([weight, weight, light_weight], axis=1), signed=signed, extra=extra, entrance=entrance,
+        weights=three, signed=signed, extra=extra, entrance=entrance,
         wishes=wishes_of(bounds), names=tuple(names), extra_part=RELATIVE_EXTRA if weights == "relative" else 1.0,
     )  # fmt: skip
 

@@ -119,6 +119,7 @@ def solve_with(
     ProjectError
         When there is nothing to search, or a package is missing.
     """
+    limits = limits.from_now()
     if choice.evolves:
         return _hunted(choice, genes_of(problem, measure), seed, limits)
     steps: list[Step] = []

@@ -7,8 +7,9 @@ the search variables in the order of `kernels.design_search`. A gene of an index
 import numpy as np
 
 from ._jit import compiled, inner
+from .design_cost import light_counts, light_values, rematch, total_cost
 from .design_ghosts import COLUMNS, PLACE, RADIUS, REACH_THESIS, WORK_ROWS, list_ghosts
-from .design_search import WISHES, light_counts, light_values, rematch, to_prescription, total_cost, wish_values
+from .design_search import WISHES, to_prescription, wish_values
 
 # which fitness
 OURS, ALGORITHM_1 = 0, 1
@@ -181,9 +182,10 @@ def fitness_of_genes(
     glass, mirrors, work = np.empty(rows, np.bool_), np.empty(rows, np.bool_), np.empty((WORK_ROWS, rows))
     values, light = np.empty((most, COLUMNS)), np.zeros(most)
     wished, beam = np.empty(WISHES + 2 * rows), np.empty(rows + 2)
-    chosen, small = np.empty(count, np.int64), np.empty((3, max(most, count) + 1), np.int64)
+    chosen, small = np.empty(count, np.int64), np.empty((3, max(most, count)), np.int64)
     table = np.empty((count, most) if kind == OURS else (1, 1))
-    reals, flags, taken = np.empty((3, most + 1)), np.empty(most + 1, np.bool_), np.empty(most, np.bool_)
+    prices, parts = np.empty((slopes.size, most)), np.empty((4, most))
+    flags, taken = np.empty(most, np.bool_), np.empty(most, np.bool_)
     found = np.empty((most, 2))
     lit = light_counts(weights)
     for b in range(genes.shape[0]):
@@ -198,8 +200,9 @@ def fitness_of_genes(
                 light_values(q, rows, stop, mirrors, values, light)
             for t in range(count):
                 chosen[t] = -1
-            rematch(ghosts, spans, slopes, signed, targets, weights, values, light, extra, chosen, table, small, reals,
-                    flags)  # fmt: skip
+            prices[:] = 0.0
+            rematch(ghosts, spans, slopes, signed, targets, weights, values, light, extra, chosen, table, prices,
+                    small, parts, flags)  # fmt: skip
             total = total_cost(ghosts, spans, slopes, signed, targets, weights, values, light, extra, chosen, taken,
                                wished)  # fmt: skip
         else:

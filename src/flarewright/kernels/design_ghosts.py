@@ -288,7 +288,7 @@ def differentiate_ghosts(q, rows, stop, mirrors, entrance, with_scale, work, tra
 
 
 @inner
-def _own_column(first, last, j, i, x0, x1, work):
+def own_column(first, last, j, i, x0, x1, work):
     """Send a ray along the two mirrors of one half."""
     y, w = x0, x1
     for k in range(first, j):
@@ -310,8 +310,8 @@ def _own_column(first, last, j, i, x0, x1, work):
 @inner
 def _front_ghost(q, rows, stop, j, i, e, f, entrance, with_scale, work, trail, slopes, common, values, jacobian, ghost):
     """Differentiate a ghost in front of the stop: Ma is its own, (e, f) the upper row of the Ms that all share."""
-    a, c = _own_column(0, stop, j, i, 1.0, 0.0, work)
-    b, d = _own_column(0, stop, j, i, 0.0, 1.0, work)
+    a, c = own_column(0, stop, j, i, 1.0, 0.0, work)
+    b, d = own_column(0, stop, j, i, 0.0, 1.0, work)
     half_stop, half_entrance = 0.5 * q[0], 0.5 * entrance
     for m in range(3 if with_scale else 2):
         row = jacobian[m, ghost]
@@ -342,8 +342,8 @@ def _rear_ghost(
     q, rows, stop, j, i, a, b, c, d, entrance, with_scale, work, trail, slopes, common, values, jacobian, ghost
 ):
     """Differentiate a ghost behind the stop: Ms is its own, Ma = [[a, b], [c, d]] is what all share."""
-    e, _ = _own_column(stop, rows, j, i, 1.0, 0.0, work)
-    f, _ = _own_column(stop, rows, j, i, 0.0, 1.0, work)
+    e, _ = own_column(stop, rows, j, i, 1.0, 0.0, work)
+    f, _ = own_column(stop, rows, j, i, 0.0, 1.0, work)
     half_stop, half_entrance = 0.5 * q[0], 0.5 * entrance
     for m in range(3 if with_scale else 2):
         row = jacobian[m, ghost]

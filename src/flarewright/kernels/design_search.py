@@ -7,12 +7,22 @@ The variables of a search are log stop diameter, log thicknesses, curvatures and
 import numpy as np
 
 from ._jit import compiled, inner
+from .design_cost import (
+    T_LIGHT,
+    T_PLACE,
+    T_RADIUS,
+    TINY,
+    hidden_weight,
+    light_counts,
+    light_values,
+    rematch,
+    total_cost,
+)
 from .design_edges import edge_row, edge_values, fill_beam
 from .design_ghosts import (
     COLUMNS,
     PLACE,
     RADIUS,
-    SCALE,
     TRAIL,
     WORK_ROWS,
     add_by_prescription,
@@ -23,15 +33,11 @@ from .design_ghosts import (
     list_ghosts,
     reduce_rows,
 )
-from .design_match import assign
+from .design_sight import beyond, fill_mirrors_of_ghosts, sight_row
 
-# columns of targets and of weights: place on the line (mm), signed radius (mm), log irradiance
-T_PLACE, T_RADIUS, T_LIGHT = 0, 1, 2
 # wishes: least and largest 1/efl (1/mm), 1/f-number, length from the first vertex to the last (mm), and their weights;
 # then least edge (mm), steepest surface and the weight of both, for every row (`design_edges`)
 WISHES = 3
-# an extra ghost is not pushed out of sight any more beyond this radius, mm
-_TINY = 1e-3
 
 
 @inner
@@ -39,96 +45,6 @@ def to_prescription(x, logs, q):
     """Turn a search's variables into a prescription; the first `logs` of them are logarithms."""
     for v in range(x.size):
         q[v] = np.exp(x[v]) if v < logs else x[v]
-
-
-@inner
-def light_counts(weights):
-    """Return whether the irradiance of any target counts.
-
-    What is told by a function is no constant to the compiler, which would make kernels of their own for yes and for no.
-    """
-    for t in range(weights.shape[0]):
-        if weights[t, T_LIGHT] > 0.0:
-            return True
-    return False
-
-
-@inner
-def light_values(q, rows, stop, mirrors, values, light):
-    """Fill the logarithm of each ghost's irradiance, as `brightness_of_ghosts` does."""
-    through = 0.0
-    for k in range(rows):
-        before = 1.0 if k == 0 else q[2 * rows + k]
-        r = (q[1 + 2 * rows + k] - before) / (q[1 + 2 * rows + k] + before)
-        through += np.log(1.0 - r * r)
-    ghost = 0
-    for half in range(2):
-        first, last = (0, stop) if half == 0 else (stop, rows)
-        for j in range(first, last):
-            if not mirrors[j]:
-                continue
-            between = 0.0
-            for i in range(j - 1, first - 1, -1):
-                before = 1.0 if i == 0 else q[2 * rows + i]
-                ri = (q[1 + 2 * rows + i] - before) / (q[1 + 2 * rows + i] + before)
-                if mirrors[i]:
-                    before = 1.0 if j == 0 else q[2 * rows + j]
-                    rj = (q[1 + 2 * rows + j] - before) / (q[1 + 2 * rows + j] + before)
-                    light[ghost] = (
-                        through + 2.0 * between + np.log(max(ri * ri * rj * rj, 1e-300))
-                        - 2.0 * np.log(max(abs(values[ghost, SCALE]), 1e-300))
-                    )  # fmt: skip
-                    ghost += 1
-                between += np.log(1.0 - ri * ri)
-
-
-@compiled
-def irradiance_of_ghosts(q, stop, mirrors, values, light):
-    """Compute the logarithm of each ghost's irradiance with bare surfaces, the light's being 1.
-
-    Parameters
-    ----------
-    q : ndarray, shape (1 + 3 K,)
-    stop, mirrors
-        As in `kernels.design_ghosts.ghosts_of_many`.
-    values : ndarray, shape (G, COLUMNS)
-        Of the same prescription.
-    light : ndarray, shape (G,)
-        Filled.
-    """
-    light_values(q, (q.size - 1) // 3, stop, mirrors, values, light)
-
-
-@inner
-def misfit(t, g, slope, signed, targets, weights, values, light, extra):
-    """Squared misfit of one ghost as one target, less what it would cost as an extra ghost."""
-    radius = values[g, RADIUS] if signed else abs(values[g, RADIUS])
-    place = weights[t, T_PLACE] * (values[g, PLACE] * slope - targets[t, T_PLACE])
-    size = weights[t, T_RADIUS] * (radius - targets[t, T_RADIUS])
-    total = place * place + size * size
-    if weights[t, T_LIGHT] > 0.0:
-        bright = weights[t, T_LIGHT] * (light[g] - targets[t, T_LIGHT])
-        total += bright * bright
-    return total - extra / max(abs(values[g, RADIUS]), _TINY)
-
-
-@inner
-def rematch(ghosts, spans, slopes, signed, targets, weights, values, light, extra, chosen, cost, small, reals, flags):
-    """Match the ghosts of every light to its targets; return whether anything changed."""
-    changed = False
-    for s in range(slopes.size):
-        first, last = spans[s], spans[s + 1]
-        for t in range(first, last):
-            for g in range(ghosts):
-                away = misfit(t, g, slopes[s], signed, targets, weights, values, light, extra)
-                # a ghost at infinity must not spoil the sums
-                cost[t - first, g] = min(away, 1e30) if away == away else 1e30
-        assign(cost, last - first, ghosts, small[0], reals, small[1], small[2], reals[2], flags)
-        for t in range(first, last):
-            if chosen[t] != small[0, t - first]:
-                chosen[t] = small[0, t - first]
-                changed = True
-    return changed
 
 
 @inner
@@ -180,27 +96,6 @@ def wishes_missed(q, stop, entrance, wishes, out):
 
 
 @inner
-def total_cost(ghosts, spans, slopes, signed, targets, weights, values, light, extra, chosen, taken, wished):
-    """Sum the squared residuals."""
-    total = 0.0
-    for m in range(wished.size):
-        total += wished[m] * wished[m]
-    for s in range(slopes.size):
-        for g in range(ghosts):
-            taken[g] = False
-        for t in range(spans[s], spans[s + 1]):
-            g = chosen[t]
-            taken[g] = True
-            total += misfit(t, g, slopes[s], signed, targets, weights, values, light, 0.0)
-        if extra > 0.0:
-            for g in range(ghosts):
-                if not taken[g]:
-                    total += extra / max(abs(values[g, RADIUS]), _TINY)
-    # not a number is no lens
-    return total if total == total else np.inf
-
-
-@inner
 def _row(system, residual, m, weight, by, free, scale):
     """Write one residual's derivatives by the free variables, times a weight."""
     for v in range(free.size):
@@ -211,7 +106,7 @@ def _row(system, residual, m, weight, by, free, scale):
 @inner
 def fill_system(
     q, rows, stop, entrance, ghosts, spans, slopes, signed, targets, weights, values, jacobian, light, light_by, extra,
-    chosen, taken, wishes, wished, free, scale, work, beam, trail, partial, row, system,
+    chosen, taken, wishes, wished, free, scale, work, beam, trail, partial, row, system, between,
 ):  # fmt: skip
     """Fill the residuals (last column) and their derivatives; return how many."""
     m = 0
@@ -236,10 +131,15 @@ def fill_system(
                 w = weights[t, T_LIGHT]
                 _row(system, w * (light[g] - targets[t, T_LIGHT]), m, w, light_by[g], free, scale)
                 m += 1
+            away, w = beyond(g, slopes[s], values), hidden_weight(t, targets, weights)
+            if away > 0.0 and w > 0.0:
+                sight_row(q, rows, stop, between[g, 0], between[g, 1], entrance, work, trail, partial, row)
+                _row(system, w * away, m, w * slopes[s], row, free, scale)
+                m += 1
         if extra > 0.0:
             for g in range(ghosts):
                 radius = values[g, RADIUS]
-                if not taken[g] and abs(radius) > _TINY:
+                if not taken[g] and abs(radius) > TINY and beyond(g, slopes[s], values) == 0.0:
                     r = np.sqrt(extra / abs(radius))
                     _row(system, r, m, -0.5 * r / radius, jacobian[1, g], free, scale)
                     m += 1
@@ -389,11 +289,14 @@ def polish_many(
     common, jacobian = np.empty((6, size)), np.empty((3, most, size))
     values, light, light_by = np.empty((most, COLUMNS)), np.zeros(most), np.zeros((most, size))
     unknowns = free.size
-    system = np.empty((3 * count + lights * most + WISHES + 2 * rows + 4, unknowns + 1))
+    between = np.empty((most, 2), np.int64)
+    fill_mirrors_of_ghosts(stop, rows, mirrors, between)
+    system = np.empty((4 * count + lights * most + WISHES + 2 * rows + 4, unknowns + 1))
     normal, factor = np.empty((unknowns + 1, unknowns + 1)), np.empty((unknowns, unknowns))
     step, scale, held = np.empty(unknowns), np.empty(unknowns), np.empty(unknowns, np.bool_)
-    cost_table, small = np.empty((count, most)), np.empty((3, max(most, count) + 1), np.int64)
-    reals, flags, taken = np.empty((3, most + 1)), np.empty(most + 1, np.bool_), np.empty(most, np.bool_)
+    cost_table, small = np.empty((count, most)), np.empty((3, max(most, count)), np.int64)
+    prices, parts = np.empty((lights, most)), np.empty((4, most))
+    flags, taken = np.empty(most, np.bool_), np.empty(most, np.bool_)
     wished, beam, row = np.empty(WISHES + 2 * rows), np.empty(rows + 2), np.empty(size)
     x, trial, q = np.empty(size), np.empty(size), np.empty(size)
     chosen = np.empty(count, np.int64)
@@ -403,12 +306,14 @@ def polish_many(
             x[v] = min(max(starts[b, v], low[v]), high[v])
         for t in range(count):
             chosen[t] = -1
+        # a search does not depend on the one before
+        prices[:] = 0.0
         to_prescription(x, logs, q)
         list_ghosts(q, rows, stop, mirrors, entrance, work, values)
         if lit:
             light_values(q, rows, stop, mirrors, values, light)
-        rematch(most, spans, slopes, signed, targets, weights, values, light, extra, chosen, cost_table, small, reals,
-                flags)  # fmt: skip
+        rematch(most, spans, slopes, signed, targets, weights, values, light, extra, chosen, cost_table, prices,
+                small, parts, flags)  # fmt: skip
         wish_values(q, rows, stop, entrance, work, wishes, beam, wished)
         cost = total_cost(most, spans, slopes, signed, targets, weights, values, light, extra, chosen, taken, wished)
         damping, pause, since = 1e-2, patience, 0
@@ -422,6 +327,7 @@ def polish_many(
             filled = fill_system(
                 q, rows, stop, entrance, most, spans, slopes, signed, targets, weights, values, jacobian, light,
                 light_by, extra, chosen, taken, wishes, wished, free, scale, work, beam, trail, partial, row, system,
+                between,
             )  # fmt: skip
             normal_equations(system, filled, unknowns, normal)
             for v in range(unknowns):
@@ -467,7 +373,7 @@ def polish_many(
                 since = 0
                 pause += pause // 2 + 1
                 changed = rematch(most, spans, slopes, signed, targets, weights, values, light, extra, chosen,
-                                  cost_table, small, reals, flags)  # fmt: skip
+                                  cost_table, prices, small, parts, flags)  # fmt: skip
                 if changed:
                     cost = total_cost(
                         most, spans, slopes, signed, targets, weights, values, light, extra, chosen, taken, wished

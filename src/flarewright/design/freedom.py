@@ -1,0 +1,163 @@
+"""What the wanted ghosts leave free: of all lenses that have the very same ghosts, the most moderate."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..kernels import design_ghosts as columns
+from .ghosts import differentiate, evaluate
+from .objective import Objective, misfits
+from .prescription import Structure
+from .search import FEW, SOLVED, STEPS, Candidate, Problem, polish, solve
+from .variables import Variables
+
+Floats = NDArray[np.float64]
+
+# what a misfit weighs against a variable at its bound, squared inversely, round after round
+TIGHTER = (1e-1, 1e-2, 1e-3, 1e-4)
+# most evaluations of a round
+MOST = 200
+# local searches for the same ghosts in another structure
+SEARCHES = 5000
+
+
+def moderation(known: Variables, x: Floats) -> float:
+    """Sum how far the free variables are from the middle of their bounds: squares of 0, the middle, to 1, a bound.
+
+    Parameters
+    ----------
+    known : Variables
+    x : ndarray, shape (1 + 3 K,)
+
+    Returns
+    -------
+    float
+    """
+    return float((_off_middle(known, x[known.free]) ** 2).sum())
+
+
+def alike(problem: Problem, solved: Candidate, *, seed: int = 0) -> tuple[Candidate, ...]:
+    """Find lenses of several structures that have the ghosts of one that meets its targets.
+
+    Parameters
+    ----------
+    problem : Problem
+    solved : Candidate
+    seed : int
+
+    Returns
+    -------
+    tuple of Candidate
+        One a structure, the most moderate first; other structures only where they are few and the targets have no
+        signs. The candidate alone when its cost is above `search.SOLVED`.
+
+    Notes
+    -----
+    Looking for signs is what takes long: once they are known, a lens of another structure takes a second, or there is
+    none.
+    """
+    if solved.cost > SOLVED:
+        return (solved,)
+    found = [to_the_middle(problem, solved)]
+    if not problem.objective.signed and len(problem.structures) <= FEW:
+        signed = replace(problem, objective=_with_signs(problem, solved), begin_with=())
+        for structure in problem.structures:
+            if structure == solved.structure:
+                continue
+            state = solve(
+                replace(signed, structures=(structure,)), seed=seed, time_limit=None, most_searches=SEARCHES
+            )  # fmt: skip
+            if state.best is not None and state.best.cost <= SOLVED:
+                found.append(to_the_middle(problem, state.best))
+    return tuple(sorted(found, key=lambda one: moderation(problem.variables(one.structure), one.x)))
+
+
+def to_the_middle(problem: Problem, solved: Candidate) -> Candidate:
+    """Move the variables of a lens that meets its targets to the middle of their bounds as far as its ghosts stay.
+
+    Parameters
+    ----------
+    problem : Problem
+    solved : Candidate
+
+    Returns
+    -------
+    Candidate
+        The same where its cost is above `search.SOLVED`, or where nothing is gained.
+
+    Notes
+    -----
+    A penalty method: squares of the misfits, weighted ever more, and of the distances from the middle.
+    """
+    if solved.cost > SOLVED:
+        return solved
+    from scipy.optimize import least_squares  # type: ignore[import-untyped]
+
+    known, structure = problem.variables(solved.structure), solved.structure
+    _, _, ghosts = misfits(problem.objective, structure, known.prescription(solved.x))
+    free = known.free
+    low, high = known.low[free], known.high[free]
+    slopes, z = np.diag(2.0 / (high - low)), solved.x[free]
+
+    def at(z: Floats) -> tuple[Floats, Floats]:
+        x = solved.x.copy()
+        x[free] = z
+        return _linearised(problem, structure, known, ghosts, x)
+
+    for tight in TIGHTER:
+        # the method begins inside the bounds
+        begin = np.clip(z, low + 1e-9 * (high - low), high - 1e-9 * (high - low))
+
+        def residuals(z: Floats, tight: float = tight) -> Floats:
+            return np.concatenate([at(z)[0] / tight, _off_middle(known, z)])
+
+        def jacobian(z: Floats, tight: float = tight) -> Floats:
+            return np.concatenate([at(z)[1] / tight, slopes])
+
+        z = least_squares(residuals, begin, jacobian, bounds=(low, high), max_nfev=MOST).x
+    moved = solved.x.copy()
+    moved[free] = z
+    done = polish(problem, [(structure, moved)], steps=4 * STEPS)[0]
+    better = done.cost <= SOLVED and moderation(known, done.x) < moderation(known, solved.x)
+    return done if better else solved
+
+
+def _linearised(
+    problem: Problem, structure: Structure, known: Variables, ghosts: tuple[tuple[int, int], ...], x: Floats
+) -> tuple[Floats, Floats]:
+    """Return the weighted misfits of the ghosts that stand for the targets, and their derivatives: (3 N,), (3 N, F)."""
+    aim, vector = problem.objective, known.prescription(x)
+    at = {pair: g for g, pair in enumerate(structure.pairs)}
+    chosen, lights = [at[pair] for pair in ghosts], np.repeat(aim.slopes, np.diff(aim.spans))
+    by = differentiate(structure, vector, aim.entrance)
+    place, radius = by.values[chosen, columns.PLACE], by.values[chosen, columns.RADIUS]
+    sign = np.where(aim.signed | (radius >= 0.0), 1.0, -1.0)
+    found = np.stack([lights * place, sign * radius, by.log_irradiance[chosen]], axis=1)
+    slopes = np.stack(
+        [lights[:, None] * by.place[chosen], sign[:, None] * by.radius[chosen], by.log_irradiance_by[chosen]], axis=1
+    )
+    logs = 1 + structure.rows
+    slopes[:, :, :logs] *= vector[:logs]
+    off = aim.weights * (found - aim.targets)
+    return off.ravel(), (aim.weights[:, :, None] * slopes)[:, :, known.free].reshape(off.size, -1)
+
+
+def _with_signs(problem: Problem, solved: Candidate) -> Objective:
+    """Return the targets with the signs that the ghosts of a lens have."""
+    aim, structure = problem.objective, solved.structure
+    vector = problem.variables(structure).prescription(solved.x)
+    _, _, ghosts = misfits(aim, structure, vector)
+    at = {pair: g for g, pair in enumerate(structure.pairs)}
+    radii = evaluate(structure, vector[None], aim.entrance)[0][[at[pair] for pair in ghosts], columns.RADIUS]
+    targets = aim.targets.copy()
+    targets[:, 1] = np.copysign(targets[:, 1], radii)
+    return replace(aim, targets=targets, signed=True)
+
+
+def _off_middle(known: Variables, z: Floats) -> Floats:
+    """Tell how far free variables are from the middle of their bounds, -1 to 1."""
+    low, high = known.low[known.free], known.high[known.free]
+    return np.asarray((2.0 * z - low - high) / (high - low), dtype=np.float64)
