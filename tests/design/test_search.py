@@ -9,12 +9,13 @@ from hypothesis import strategies as st
 from planted import planted
 
 from flarewright.design.candidate import outcomes
+from flarewright.design.ghosts import evaluate
 from flarewright.design.prescription import Structure, glass_patterns, structures, surfaces_for
-from flarewright.design.search import State, advance, neighbour, polish, propose, solve
+from flarewright.design.search import State, advance, neighbour, polish, polish_within, propose, solve
 from flarewright.design.store import read_state, write_state
 from flarewright.design.target import problem_of
 from flarewright.errors import FlarewrightError, ProjectError
-from flarewright.kernels.design_ghosts import REACH_THESIS
+from flarewright.kernels.design_ghosts import RADIUS, REACH, REACH_THESIS
 from flarewright.kernels.design_search import polish_many
 from flarewright.model import Design, GhostWish, Light, Project
 from flarewright.model.design import Bounds
@@ -80,8 +81,6 @@ def test_the_cost_is_that_of_the_objective(entrance, steps, some_hidden):
         start, structure.stop, structure.mirrors, aim.entrance, known.low, known.high, known.free, known.longest,
         aim.slopes, aim.spans, aim.targets, aim.weights, True, 0.0, wishes, steps, 4, 0.0, ends, costs, matches,
     )  # fmt: skip
-    from flarewright.design.ghosts import evaluate
-
     values = evaluate(structure, known.prescription(ends), aim.entrance)[0][matches[0]]
     place = aim.weights[:, 0] * (values[:, 0] * aim.slopes[0] - aim.targets[:, 0])
     size = aim.weights[:, 1] * (values[:, 1] - aim.targets[:, 1])
@@ -90,6 +89,25 @@ def test_the_cost_is_that_of_the_objective(entrance, steps, some_hidden):
     assert costs[0] == pytest.approx((place**2).sum() + (size**2).sum() + (hidden**2).sum(), rel=1e-9)
     assert hidden.any() == some_hidden
     assert costs[0] < 1e6
+
+
+@pytest.mark.parametrize(("entrance", "some_hidden"), [(100.0, False), (0.1, True)])
+def test_ghosts_that_nobody_wants_cost_what_is_seen_of_them(entrance, some_hidden):
+    problem, _, _ = planted(extra=0.0)
+    structure = problem.structures[0]
+    known = problem.variables(structure)
+    x = known.random_points(np.random.default_rng(3), 1)
+    # none of the targets counts, so that each takes whichever ghost would cost most
+    aim = replace(problem.objective, entrance=entrance, wishes=problem.objective.wishes * [1.0, 1.0, 0.0])
+    aim = replace(
+        aim, targets=aim.targets[:2], weights=np.zeros((2, 3)), spans=np.array([0, 2]), extra=3.0, extra_part=1.0
+    )
+    (cost,) = polish_within(known, x, aim, 0)[1]
+    values = evaluate(structure, known.prescription(x), entrance)[0]
+    shown = aim.slopes[0] <= values[:, REACH]
+    each = np.where(shown, 3.0 / np.abs(values[:, RADIUS]), 0.0)
+    assert cost == pytest.approx(np.sort(each)[:-2].sum(), rel=1e-9)
+    assert (~shown).any() == some_hidden
 
 
 def test_threads_and_interruptions_do_not_change_the_result(tmp_path):

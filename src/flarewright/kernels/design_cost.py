@@ -3,7 +3,7 @@
 import numpy as np
 
 from ._jit import compiled, inner
-from .design_ghosts import PLACE, RADIUS, SCALE
+from .design_ghosts import PLACE, RADIUS, REACH, SCALE
 from .design_match import assign
 from .design_sight import beyond
 
@@ -79,8 +79,8 @@ def hidden_weight(t, targets, weights):
 
 @inner
 def extra_cost(g, slope, values, extra):
-    """Return what a ghost without a target costs; nothing when it is out of sight."""
-    return 0.0 if beyond(g, slope, values) > 0.0 else extra / max(abs(values[g, RADIUS]), TINY)
+    """Return what a ghost without a target costs; nothing when no part of it is in sight."""
+    return 0.0 if slope > values[g, REACH] else extra / max(abs(values[g, RADIUS]), TINY)
 
 
 @inner

@@ -23,6 +23,7 @@ from .design_ghosts import (
     COLUMNS,
     PLACE,
     RADIUS,
+    REACH,
     TRAIL,
     WORK_ROWS,
     add_by_prescription,
@@ -139,7 +140,7 @@ def fill_system(
         if extra > 0.0:
             for g in range(ghosts):
                 radius = values[g, RADIUS]
-                if not taken[g] and abs(radius) > TINY and beyond(g, slopes[s], values) == 0.0:
+                if not taken[g] and abs(radius) > TINY and slopes[s] <= values[g, REACH]:
                     r = np.sqrt(extra / abs(radius))
                     _row(system, r, m, -0.5 * r / radius, jacobian[1, g], free, scale)
                     m += 1
