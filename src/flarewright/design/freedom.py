@@ -141,8 +141,11 @@ def _linearised(
     )
     logs = 1 + structure.rows
     slopes[:, :, :logs] *= vector[:logs]
-    off = aim.weights * (found - aim.targets)
-    return off.ravel(), (aim.weights[:, :, None] * slopes)[:, :, known.free].reshape(off.size, -1)
+    # what does not count may be infinite
+    counts = aim.weights > 0.0
+    off = np.where(counts, aim.weights * (found - aim.targets), 0.0)
+    slopes = np.where(counts[:, :, None], aim.weights[:, :, None] * slopes, 0.0)
+    return off.ravel(), slopes[:, :, known.free].reshape(off.size, -1)
 
 
 def _with_signs(problem: Problem, solved: Candidate) -> Objective:
