@@ -31,8 +31,7 @@ _NOTHING = np.empty((0, 0, 3, 19))
 def light_px(model: GhostModel, constellation_deg: float, roll_deg: float = 0.0) -> tuple[float, float]:
     """Return where the light's image lies in the captures' picture, (x, y)."""
     t = float(np.tan(np.radians(constellation_deg)))
-    a, b = model.distortion
-    reach = model.focal_px * t * (1.0 + a * t**2 + b * t**4)
+    reach = model.focal_px * t * (1.0 + model.distortion * t * t)
     turn = np.radians(roll_deg)
     return (
         model.axis_px[0] + reach * float(np.cos(turn)),

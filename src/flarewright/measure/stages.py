@@ -27,7 +27,7 @@ from .joint import lit
 from .journal import Journal
 from .numbers import channel_numbers
 from .pursuit import pursue
-from .replay import draw
+from .replay import draw, light_px
 from .settle import Settling, settle, to_model
 from .sprite_fit import axis_sprite, drawn, light_sprites
 from .views import Pixels, View, halved, views_of
@@ -41,6 +41,8 @@ AROUND_LIGHT = 40.0 / 720.0
 LEFT_BEHIND = 0.1
 # tangent of the constellation from which the light's distance from the axis tells the focal length
 _OFF_AXIS = 0.02
+# rounds in which stray places lose their weight, and how well a light's place is known at best
+_LAW_ROUNDS, _LIGHT_PX = 20, 0.05
 # ghosts are looked for in pictures halved until they are no wider
 SEARCH_WIDTH = 400
 
@@ -258,16 +260,18 @@ def with_rest(model: GhostModel, views: Sequence[View]) -> GhostModel:
     views : sequence of View
         As photographed.
     """
-    left = []
+    left, placed = [], []
     for view in views:
         turn = float(np.degrees(np.arctan2(view.frame[3], view.frame[2])))
         roll = turn - (180.0 if view.constellation_deg < 0.0 else 0.0)
         ghosts = draw(model, view.constellation_deg, roll, view.size_px)
         known = np.where(np.isfinite(view.variance), view.pixels, np.nan)
-        left.append((known - ghosts - _light(model.halo, model.star, view)).astype(np.float32))
-    going = light_sprites(views, left)
-    left = [each - drawn(going, view) for each, view in zip(left, views, strict=True)]
-    out: GhostModel = model.replace(sprites=(*going, axis_sprite(views, left)))
+        # the light where a replay puts it
+        placed.append(replace(view, light_px=light_px(model, view.constellation_deg, roll)))
+        left.append((known - ghosts - _light(model.halo, model.star, placed[-1])).astype(np.float32))
+    going = light_sprites(placed, left)
+    left = [each - drawn(going, view) for each, view in zip(left, placed, strict=True)]
+    out: GhostModel = model.replace(sprites=(*going, axis_sprite(placed, left)))
     return out
 
 
@@ -350,23 +354,31 @@ def _found(ghost: AberrationGhost, views: Sequence[View]) -> Found:
     return Found((shapes[0], shapes[1], shapes[2]), first, last)
 
 
-def light_law(views: Sequence[View], px_per_rad: float) -> tuple[float, tuple[float, float]]:
+def light_law(views: Sequence[View], px_per_rad: float) -> tuple[float, float]:
     """Return focal length (pixels) and distortion that tell where the views' lights are; see `GhostModel`.
 
     Parameters
     ----------
     views : sequence of View
+        Those whose light lies in the picture count: places beyond it are foretold, not seen.
     px_per_rad : float
-        Taken where fewer than four views have the light well off the axis.
+        Taken where fewer than four of them have the light well off the axis.
     """
     t = np.array([np.tan(np.radians(abs(view.constellation_deg))) for view in views])
     away = np.array([np.hypot(*np.subtract(view.light_px, view.frame[:2])) for view in views])
-    off = t > _OFF_AXIS
-    if np.unique(np.round(t[off], 4)).size < 4:
-        return px_per_rad, (0.0, 0.0)
-    bent = np.stack([t, t**3, t**5], axis=1)[off]
-    focal, a, b = np.linalg.lstsq(bent, away[off], rcond=None)[0]
-    return float(focal), (float(a / focal), float(b / focal))
+    inside = [all(0.0 <= at <= side for at, side in zip(view.light_px, view.size_px, strict=True)) for view in views]
+    seen = np.array(inside) & (t > _OFF_AXIS)
+    if np.unique(np.round(t[seen], 4)).size < 4:
+        return px_per_rad, 0.0
+    basis, away = np.stack([t, t**3], axis=1)[seen], away[seen]
+    law = np.array([np.median(away / basis[:, 0]), 0.0])
+    for _ in range(_LAW_ROUNDS):
+        # a light that was taken for another counts less and less
+        off = np.abs(away - basis @ law)
+        root = 1.0 / np.hypot(1.0, off / (3.0 * max(1.4826 * float(np.median(off)), _LIGHT_PX)))
+        law = np.linalg.lstsq(basis * root[:, None], away * root, rcond=None)[0]
+    focal, bent = law
+    return float(focal), float(bent / focal)
 
 
 def _model(run: MergedRun, ghosts: tuple[AberrationGhost, ...], dim: Dimmed, views: Sequence[View]) -> GhostModel:

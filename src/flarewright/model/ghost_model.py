@@ -240,8 +240,8 @@ class GhostModel(Frozen):
         Where the optical axis meets the picture; pixel k spans k to k + 1, row 0 is at the top.
     focal_px : float
         Pixels per unit of tangent, near the axis.
-    distortion : tuple of float
-        (a, b): with t = tan(constellation) the light's image lies focal_px t (1 + a t^2 + b t^4) from the axis.
+    distortion : float
+        With t = tan(constellation) the light's image lies focal_px t (1 + distortion t^2) from the axis.
     largest_deg : float
         Constellation at which the field has length 1.
     constellation_deg : tuple of float
@@ -263,7 +263,7 @@ class GhostModel(Frozen):
     size_px: tuple[int, int]
     axis_px: tuple[float, float]
     focal_px: float = Field(gt=0.0)
-    distortion: tuple[float, float] = (0.0, 0.0)
+    distortion: float = 0.0
     largest_deg: float = Field(gt=0.0, lt=90.0)
     constellation_deg: tuple[float, float]
     ghosts: tuple[Ghost, ...] = ()
