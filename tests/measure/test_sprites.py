@@ -1,7 +1,9 @@
 """Sprites: what is drawn is where it should be, what is learned foretells left-out constellations, ghosts stay out."""
 
 import json
+from base64 import b64encode
 from dataclasses import replace
+from zlib import compress
 
 import numpy as np
 import pytest
@@ -173,6 +175,7 @@ def test_a_broken_sprite_is_told_in_a_sentence(tmp_path):
     for cells, words in (
         ("AAAA", "not base64 of zlib"),
         (sprite([slope(3, 3)]).cells, "hold 54 bytes instead of 3600"),
+        (b64encode(compress(bytes(10_000_000))).decode(), "hold more than 3600 bytes"),
     ):
         said["sprites"][0]["cells"] = cells
         path.write_text(json.dumps(said))
