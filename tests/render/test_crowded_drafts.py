@@ -73,3 +73,11 @@ def test_brightest_ghosts_keep_all_detail():
     assert not details[brightness == 0.0].any()
     order = np.argsort(-brightness[brightness > 0.0], kind="stable")
     assert (np.diff(details[brightness > 0.0][order]) >= 0).all()
+
+
+def test_a_light_that_is_off_says_nothing_of_the_others(monkeypatch):
+    monkeypatch.setattr(ghosts, "CROWD", 1)
+    dark, bright = (Light(field_deg=(x, 3.0), intensity=power) for x, power in ((8.0, 0.0), (4.0, 1.0)))
+    together, alone = (render(CANON.replace(lights=lights)) for lights in ((bright, dark), (bright,)))
+    sums = [next(one for one in done.layers if one.name == "ghosts").pixels.sum() for done in (together, alone)]
+    assert sums[0] == pytest.approx(sums[1], rel=2e-3)

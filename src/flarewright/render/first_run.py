@@ -6,7 +6,6 @@ from ..kernels.first_run import absent, compile_together, cores
 from ..model import Bare, Project
 from ..optics.pack import resolve_coatings
 from ..optics.paths import ghost_paths
-from .ghosts import CROWD
 from .prepare import settle
 
 # what every command calls that traces rays
@@ -44,6 +43,9 @@ def compile_for_render(project: Project, threads: int | None = None) -> None:
             names += ["draw ringing"]
     elif project.quality.mode == "draft" and iris.mask is None:
         # a draft through a mask is rare: its kernel is compiled when it is called
+        # only here: what the ghost analysis starts with need not know how ghosts are drawn
+        from .ghosts import CROWD
+
         names += ["matrices", "mirrors"] if coated else ["matrices"]
         if len(ghost_paths(settled.lens, project.quality.paths)) * len(project.lights) >= CROWD:
             names += ["ghosts' light"]

@@ -145,9 +145,10 @@ def draft_details(shots: Sequence[Shot], paths: Sequence[LightPath], colors: Seq
     """
     middle = sorted(range(len(shots)), key=lambda k: shots[k].incidence.tilt)[len(shots) // 2]
     shot = shots[middle]
-    seen = weigh_drafts(shot, paths, colors[middle]) / shot.light.intensity
+    seen = weigh_drafts(shot, paths, colors[middle])
     width, height = shot.size_px
-    power = np.array([shot.light.intensity for shot in shots])
+    # against the light that was weighed; where that is dark, nothing is known of any
+    power = np.array([each.light.intensity for each in shots]) / (shot.light.intensity or 1.0)
     level = power.sum() * seen[:, 0].sum() / (width * height)
     contrast = np.full((len(shots), len(paths)), np.inf)
     # what is dark at the middle wavelength says nothing
