@@ -32,6 +32,7 @@ from flarewright.model import (
 )
 from flarewright.optics.coatings import film_stack, stack_reflectance
 from flarewright.optics.ghosts import ghost_table
+from flarewright.optics.mask_levels import mask_levels
 from flarewright.optics.pack import pack_lens
 from flarewright.optics.paraxial import D_LINE_NM, first_order
 from flarewright.optics.paths import direct_path, ghost_path, ghost_paths
@@ -157,8 +158,8 @@ def test_folded_cells_dropped():
     pupil = np.stack([px, py], axis=1)
     plane = blank_plane(64, 64)
     draw_bundle(
-        data, pupil, triangles, node_densities(data, pupil, triangles), 1, np.zeros((0, 4)), np.ones((1, 1)), 1.0,
-        np.eye(2), np.array([32.0, 32.0, 2.0, 2.0]), 1.0, np.ones(3), plane, 2,
+        data, pupil, triangles, node_densities(data, pupil, triangles), 1, np.zeros((0, 4)),
+        mask_levels(np.ones((2, 2)), 1.0), np.eye(2), np.array([32.0, 32.0, 2.0, 2.0]), 1.0, np.ones(3), plane, 2,
     )  # fmt: skip
     drawn = to_pixels(plane, 64)[..., 0]
     assert drawn.sum(dtype=float) == pytest.approx(2.0, rel=1e-5)  # the half and its mirror image

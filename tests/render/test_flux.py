@@ -436,6 +436,30 @@ def test_a_mask_darkens_the_direct_image_by_its_own_mean(tmp_path):
     assert flux[1] == pytest.approx(flux[0], rel=3e-3)
 
 
+@pytest.mark.parametrize("mode", ["draft", "final"])
+@pytest.mark.parametrize("turn", [90.0, 30.0])
+def test_a_turned_mask_is_a_mask_of_the_turned_image(tmp_path, mode, turn):
+    """Ghosts turn with the image, as the starburst does."""
+    pytest.importorskip("PIL")
+    parts = {"layers": "passes", "starburst": False, "mode": mode, "size_px": (160, 90)}
+    at = (np.arange(256) + 0.5) / 128.0 - 1.0
+    x, y = at, -at[:, None]
+    pictures = []
+    for baked in (0.0, turn):
+        c, s = np.cos(np.radians(baked)), np.sin(np.radians(baked))
+        along, across = c * x + s * y, c * y - s * x
+        # a triangle, its corners within the square however it is turned
+        far = np.max([-across, 0.866 * along + 0.5 * across, -0.866 * along + 0.5 * across], axis=0)
+        iris = write_mask(tmp_path / f"{baked}.png", np.clip((0.48 - far) * 128.0 + 0.5, 0.0, 1.0))
+        turned = iris.replace(rotation_deg=turn - baked)
+        layers = layers_of(scene("heliar-tronnier", mono((8.0, 5.0)), iris=turned, **parts))
+        pictures.append(picture(layers["ghosts"], (160, 90)))
+    unturned = layers_of(scene("heliar-tronnier", mono((8.0, 5.0)), iris=turned.replace(rotation_deg=50.0), **parts))
+    # a soft border is interpolated once more
+    assert np.abs(pictures[0] - pictures[1]).sum() < 0.01 * pictures[0].sum()
+    assert np.abs(picture(unturned["ghosts"], (160, 90)) - pictures[1]).sum() > 0.1 * pictures[1].sum()
+
+
 # --- what is left out is told
 
 

@@ -16,7 +16,7 @@ from .clip import (
     cut_to_rectangle,
     polygon_area,
 )
-from .mask import fill_through_mask, mask_value
+from .mask import even_value, fill_through_mask, mask_texture, masked_point
 from .raster import add_to_pixel, fill_polygon, plane_size, splat_line
 from .trace import ALIVE, REL, STOP_X, WEIGHT, X, Y
 
@@ -73,8 +73,7 @@ def node_densities(data, pupil, triangles):
 
 @compiled
 def draw_bundle(
-    data, pupil, triangles, densities, crossings, blades, mask, mask_half, axes, to_pixels, gain, rgb,
-    plane, halves,
+    data, pupil, triangles, densities, crossings, blades, mask, axes, to_pixels, gain, rgb, plane, halves,
 ):  # fmt: skip
     """Add a bundle, and its mirror image where it has one, to a picture, flux for flux.
 
@@ -86,8 +85,8 @@ def draw_bundle(
         From `node_densities`.
     crossings, blades, axes
         As in `clip_triangle`.
-    mask, mask_half
-        As in `fill_through_mask`; the mask is None where the iris has blades, and its code is not compiled then.
+    mask : tuple of ndarray, or None
+        As in `fill_through_mask`; None where the iris has blades, and its code is not compiled then.
     to_pixels : ndarray, shape (4,)
         Column of the axis, row of the axis, pixels per mm across and down.
     gain : float
@@ -111,6 +110,8 @@ def draw_bundle(
     corner = np.empty((3, 3))
     spots, blocked = np.empty((pupil.shape[0], 2)), np.empty(pupil.shape[0], dtype=np.int64)
     pixel_area = to_pixels[2] * to_pixels[3]
+    if mask is not None:
+        texture, stops = mask_texture(mask, crossings, width), np.empty((crossings, 3, 2))
     for half in range(halves):
         mirror = 1.0 - 2.0 * half
         _place_nodes(data, mirror, crossings, blades, axes, to_pixels, spots, blocked)
@@ -121,9 +122,15 @@ def draw_bundle(
             end = start + 1
             while end < triangles.shape[0] and triangles[end, 0] == triangles[start, 0]:
                 end += 1
-            if mask is None and end - start >= 4:
+            if end - start >= 4:
                 count = _gather_cell(spots, blocked, triangles, start, end, width, height, polygon)
-                if count > 0:
+                alike = 1.0
+                if mask is not None and count > 0:
+                    alike = _even_over_cell(data, triangles, start, end, mirror, crossings, axes, mask)
+                    if alike == 0.0:
+                        start = end
+                        continue
+                if count > 0 and alike > 0.0:
                     flux, area = 0.0, 0.0
                     for t in range(start, end):
                         part, spread = _triangle_flux(data, pupil, triangles[t, 0], triangles[t, 1], triangles[t, 2])
@@ -134,6 +141,9 @@ def draw_bundle(
                         spots, densities, triangles, start, end, flux / drawn, gain / pixel_area, drawn
                     )
                     if fits:
+                        if mask is not None:
+                            base, gx, gy = base * alike, gx * alike, gy * alike
+                            dense_low, dense_high = dense_low * alike, dense_high * alike
                         fill_polygon(polygon, count, base, gx, gy, dense_low, dense_high, rgb, plane)
                         start = end
                         continue
@@ -173,10 +183,7 @@ def draw_bundle(
                     if not whole or mask is not None:
                         part = abs(polygon_area(polygon, count, PP, PQ)) / _pupil_area(pupil, a, b, c)
                     if mask is not None:
-                        for m in range(crossings):
-                            part *= mask_value(
-                                mask, mask_half, polygon[0, PSTOP + 2 * m], polygon[0, PSTOP + 2 * m + 1]
-                            )
+                        part *= masked_point(polygon, crossings, mask, texture)
                     _splat_polygon(polygon, count, flux * part, rgb, plane)
                     continue
                 for m in range(3):
@@ -184,9 +191,12 @@ def draw_bundle(
                     corner[m, 0], corner[m, 1], corner[m, 2] = spots[k, 0], spots[k, 1], densities[k]
                 base, gx, gy, dense_low, dense_high = _plane_through(corner, flux / drawn, gain / pixel_area, drawn)
                 if mask is not None:
+                    for m in range(3):
+                        _put_in_stop(data, triangles[t, m], mirror, axes, stops, m)
                     fill_through_mask(
-                        polygon, count, crossings, mask, mask_half, base, gx, gy, dense_low, dense_high, rgb, plane
-                    )
+                        polygon, count, crossings, corner, stops, mask, texture, base, gx, gy, dense_low, dense_high,
+                        rgb, plane, other, values,
+                    )  # fmt: skip
                     continue
                 if left < 0.0 or right > width or top < 0.0 or bottom > height:
                     count = cut_to_rectangle(polygon, count, other, values, float(width), float(height))
@@ -194,6 +204,32 @@ def draw_bundle(
                         continue
                 fill_polygon(polygon, count, base, gx, gy, dense_low, dense_high, rgb, plane)
             start = end
+
+
+@inner
+def _put_in_stop(data, node, mirror, axes, stops, m):
+    """Fill in where a node crosses the stop, in the upright frame, as the m-th place."""
+    for k in range(stops.shape[0]):
+        u, v = mirror * data[node, STOP_X + 2 * k], data[node, STOP_X + 2 * k + 1]
+        stops[k, m, 0], stops[k, m, 1] = u * axes[0, 0] + v * axes[1, 0], u * axes[0, 1] + v * axes[1, 1]
+
+
+@inner
+def _even_over_cell(data, triangles, start, end, mirror, crossings, axes, mask):
+    """Return what a mask lets through of a cell where it is even at all crossings, 0 where it is dark, else -1."""
+    alike = 1.0
+    for c in range(crossings):
+        u_low, u_high, v_low, v_high = np.inf, -np.inf, np.inf, -np.inf
+        for t in range(start, end):
+            k = triangles[t, 1]
+            x, y = mirror * data[k, STOP_X + 2 * c], data[k, STOP_X + 2 * c + 1]
+            u, v = x * axes[0, 0] + y * axes[1, 0], x * axes[0, 1] + y * axes[1, 1]
+            u_low, u_high, v_low, v_high = min(u_low, u), max(u_high, u), min(v_low, v), max(v_high, v)
+        value = even_value(mask, u_low, u_high, v_low, v_high)
+        if value == 0.0:
+            return 0.0
+        alike = -1.0 if value < 0.0 or alike < 0.0 else alike * value
+    return alike
 
 
 @inner

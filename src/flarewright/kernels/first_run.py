@@ -27,6 +27,7 @@ _MARK = "FLAREWRIGHT_HELPER"
 _GEOMETRY = "i8[::1], i8[::1], f8[::1], f8[::1], f8[::1], f8[::1]"
 _BUNDLE = "f8[:,::1], f8[:,::1], i8[:,::1]"
 _CANVAS = "f8[:,::1], f8[::1], f8, f8[::1], f4[:,:,:,::1]"
+_MASK = "Tuple((f4[::1], f8[:,::1], i8[:,::1]))"
 _WINGS = "f8[::1], f8[::1], f8[::1], f8[::1]"
 
 # module and kernel of each root, its types as a render calls it (tests/contracts compares them with real calls), and
@@ -42,8 +43,8 @@ ROOTS = {
         f"{_GEOMETRY}, f8[::1], f8[:,::1], f8, f8, f8, i8, f8, f8, f8[::1], i8, i8, f8, f8",
         3.9,
     ),
-    "draw": ("bundle.draw_bundle", f"{_BUNDLE}, f8[::1], i8, f8[:,::1], none, f8, {_CANVAS}, i8", 4.2),
-    "draw masked": ("bundle.draw_bundle", f"{_BUNDLE}, f8[::1], i8, f8[:,::1], f8[:,::1], f8, {_CANVAS}, i8", 4.8),
+    "draw": ("bundle.draw_bundle", f"{_BUNDLE}, f8[::1], i8, f8[:,::1], none, {_CANVAS}, i8", 4.2),
+    "draw masked": ("bundle.draw_bundle", f"{_BUNDLE}, f8[::1], i8, f8[:,::1], {_MASK}, {_CANVAS}, i8", 4.8),
     "draw ringing": (
         "ringing.draw_ringing",
         f"{_BUNDLE}, f8[::1], i8, f4[::1], f8[:,::1], f8[:,::1], {_CANVAS}, i8",
@@ -54,7 +55,7 @@ ROOTS = {
     "matrices": (
         "matrix.draw_matrix_ghosts",
         "i8[::1], i8[::1], i8[::1], i8[::1], f8[::1], none, f8[::1], f8[:,::1], f8[:,:,::1], f8, f8, f8, f8, f8, "
-        "f8[:,::1], f8, none, f8, f8[:,::1], f8[::1], f8, f8[:,:,::1], f8[:,:,::1]",
+        "f8[:,::1], f8, none, f8[:,::1], f8[::1], f8, f8[:,:,::1], f8[:,:,::1]",
         2.9,
     ),
     "ghosts' light": (

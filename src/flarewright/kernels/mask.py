@@ -1,12 +1,39 @@
-"""An iris given as an image: the part of a polygon's light that each place of the stop lets through."""
+"""An iris given as an image: the part of a polygon's light that each place of the stop lets through.
 
-from math import ceil, floor
+The light of a polygon is woven with the image pixel by pixel (`kernels.pattern.weave`). The image is at hand at ever
+half its resolution (`optics.mask_levels`), so that a pixel sees about the mean of what it covers; where the image is
+even, which a summed-area table of its changes tells at once, nothing is looked up.
+"""
+
+from math import floor, log2
 
 import numpy as np
 
 from ._jit import inner
-from .clip import MAX_VERTICES, PSTOP, PX, PY, cut_to_rectangle
+from .clip import PSTOP, cut_to_rectangle
+from .pattern import (
+    AT_X,
+    AT_Y,
+    COLUMNS,
+    CORNERS,
+    FIRST,
+    OPEN,
+    PER_MM_X,
+    PER_MM_Y,
+    PICTURE,
+    PLACE_COLUMNS,
+    ROWS,
+    TABLE_COLUMNS,
+    TOGETHER,
+    U_LOW,
+    WAY,
+    pattern_value,
+)
 from .raster import fill_polygon, plane_size
+
+# a level's samples are so many times closer than what a pixel covers of the stop, to the nearest octave: interpolated
+# linearly, they then blur about as much as the mean over a pixel does
+LEVEL = 0.58
 
 
 @inner
@@ -26,105 +53,145 @@ def mask_value(mask, half, u, v):
 
 
 @inner
-def _uniform(polygon, count, crossing, mask, half):
-    """Return the mask's value where it does not vary over a polygon, else -1."""
-    rows, columns = mask.shape
-    u_low, u_high, v_low, v_high = np.inf, -np.inf, np.inf, -np.inf
-    for k in range(count):
-        u, v = polygon[k, PSTOP + 2 * crossing], polygon[k, PSTOP + 2 * crossing + 1]
-        u_low, u_high = min(u_low, u), max(u_high, u)
-        v_low, v_high = min(v_low, v), max(v_high, v)
-    if u_high < -half or u_low > half or v_high < -half or v_low > half:
+def mask_texture(mask, crossings, width):
+    """Return what `fill_polygon` takes as its texture, for a picture so many pixels wide."""
+    wide = width + TOGETHER
+    return (
+        mask[0], np.zeros((crossings, TABLE_COLUMNS)), np.empty((0, 2)), np.zeros((crossings, PLACE_COLUMNS)),
+        np.zeros(wide, dtype=np.float32), np.zeros(wide, dtype=np.int32), np.zeros(wide, dtype=np.float32),
+        np.zeros(wide, dtype=np.float32),
+    )  # fmt: skip
+
+
+@inner
+def even_value(mask, u_low, u_high, v_low, v_high):
+    """Return the mask's value where it does not vary over a rectangle of the stop, else -1."""
+    values, levels, changes = mask
+    rows, columns = changes.shape
+    left, right = u_low * levels[0, PER_MM_X] + levels[0, AT_X], u_high * levels[0, PER_MM_X] + levels[0, AT_X]
+    # the image's first row is up
+    top, bottom = v_high * levels[0, PER_MM_Y] + levels[0, AT_Y], v_low * levels[0, PER_MM_Y] + levels[0, AT_Y]
+    if right < -0.5 or left > columns - 0.5 or bottom < -0.5 or top > rows - 0.5:
         return 0.0
-    if u_low < -half or u_high > half or v_low < -half or v_high > half:
+    c0, c1 = int(min(max(floor(left), 0.0), columns - 1.0)), int(min(max(floor(right) + 1.0, 0.0), columns - 1.0))
+    r0, r1 = int(min(max(floor(top), 0.0), rows - 1.0)), int(min(max(floor(bottom) + 1.0, 0.0), rows - 1.0))
+    if changes[r1, c1] - changes[r0, c1] - changes[r1, c0] + changes[r0, c0] != 0:
         return -1.0
-    c0 = max(int(floor((u_low / half + 1.0) * 0.5 * columns - 0.5)), 0)
-    c1 = min(int(floor((u_high / half + 1.0) * 0.5 * columns - 0.5)) + 1, columns - 1)
-    r0 = max(int(floor((1.0 - v_high / half) * 0.5 * rows - 0.5)), 0)
-    r1 = min(int(floor((1.0 - v_low / half) * 0.5 * rows - 0.5)) + 1, rows - 1)
-    first = mask[r0, c0]
-    for r in range(r0, r1 + 1):
-        for c in range(c0, c1 + 1):
-            if mask[r, c] != first:
-                return -1.0
-    return first
+    return float(values[r0 * columns + c0])
 
 
 @inner
-def _pieces(polygon, k, crossings, mask, half):
-    """How finely to divide a fan triangle: to a texel of the mask or to a pixel, whichever is coarser."""
-    texels, pixels = 1.0, 1.0
-    for a, b in ((0, k), (k, k + 1), (k + 1, 0)):
-        pixels = max(pixels, abs(polygon[a, PX] - polygon[b, PX]), abs(polygon[a, PY] - polygon[b, PY]))
-        for c in range(crossings):
-            m = PSTOP + 2 * c
-            span = max(abs(polygon[a, m] - polygon[b, m]), abs(polygon[a, m + 1] - polygon[b, m + 1]))
-            texels = max(texels, span / (2.0 * half) * max(mask.shape[0], mask.shape[1]))
-    return int(ceil(min(min(texels, pixels), 256.0)))
+def place_mask(polygon, count, crossings, corner, stops, mask, texture):
+    """Fill in how the mask is looked up over a polygon; return what is alike over all of it, 0 where it is dark.
+
+    Parameters
+    ----------
+    polygon : ndarray, shape (V, 6 + 2 C)
+        Vertices in pixels with their places in the stop (`kernels.clip`).
+    count, crossings : int
+    corner : ndarray, shape (3, >= 2)
+        Three places in pixels that span the polygon's plane.
+    stops : ndarray, shape (C, >= 3, 2)
+        Their places in the stop.
+    mask, texture
+        As in `fill_through_mask`.
+    """
+    table, places = texture[1], texture[3]
+    x1, y1 = corner[1, 0] - corner[0, 0], corner[1, 1] - corner[0, 1]
+    x2, y2 = corner[2, 0] - corner[0, 0], corner[2, 1] - corner[0, 1]
+    inverse = 1.0 / (x1 * y2 - x2 * y1)
+    alike = 1.0
+    for c in range(places.shape[0]):
+        places[c, WAY] = OPEN
+    for c in range(crossings):
+        for q in range(2):
+            low, high = np.inf, -np.inf
+            for k in range(count):
+                low, high = min(low, polygon[k, PSTOP + 2 * c + q]), max(high, polygon[k, PSTOP + 2 * c + q])
+            places[c, U_LOW + 2 * q], places[c, U_LOW + 2 * q + 1] = low, high
+        u_low, u_high, v_low, v_high = (
+            places[c, U_LOW],
+            places[c, U_LOW + 1],
+            places[c, U_LOW + 2],
+            places[c, U_LOW + 3],
+        )
+        value = even_value(mask, u_low, u_high, v_low, v_high)
+        if value == 0.0:
+            return 0.0
+        if value > 0.0:
+            alike *= value
+            continue
+        covered = 0.0
+        for q in range(2):
+            d0, d1, d2 = stops[c, 0, q], stops[c, 1, q], stops[c, 2, q]
+            gx = ((d1 - d0) * y2 - (d2 - d0) * y1) * inverse
+            gy = ((d2 - d0) * x1 - (d1 - d0) * x2) * inverse
+            places[c, 3 * q] = d0 - gx * corner[0, 0] - gy * corner[0, 1]
+            places[c, 3 * q + 1], places[c, 3 * q + 2] = gx, gy
+            # a pixel covers no more than the polygon itself does
+            extent = min(max(abs(gx), abs(gy)), places[c, U_LOW + 2 * q + 1] - places[c, U_LOW + 2 * q])
+            covered = max(covered, extent * abs(mask[1][0, PER_MM_X if q == 0 else PER_MM_Y]))
+        places[c, WAY] = PICTURE
+        take_level(mask, table, c, covered)
+    return alike
 
 
 @inner
-def fill_through_mask(polygon, count, crossings, mask, half, density, gx, gy, density_low, density_high, rgb, plane):
+def take_level(mask, table, c, covered):
+    """Fill the table's row of a crossing with the level for pixels that cover so many samples of the mask."""
+    level = 0
+    if LEVEL * covered > 1.0:
+        level = int(min(floor(log2(LEVEL * covered) + 0.5), mask[1].shape[0] - 1.0))
+    for m in (FIRST, ROWS, COLUMNS, PER_MM_X, PER_MM_Y, AT_X, AT_Y):
+        table[c, m] = mask[1][level, m]
+    # the pattern is a picture
+    table[c, CORNERS] = -1.0
+
+
+@inner
+def fill_through_mask(
+    polygon, count, crossings, corner, stops, mask, texture, density, gx, gy, density_low, density_high, rgb, plane,
+    other, values,
+):  # fmt: skip
     """Draw a polygon as `fill_polygon` does, its light multiplied by the mask at every crossing of the stop.
 
     Parameters
     ----------
     polygon : ndarray, shape (V, 6 + 2 C)
         Vertices in pixels with their places in the stop (`kernels.clip`); may reach outside the picture.
-    count, crossings : int
-    mask : ndarray, shape (A, B)
-        Transmittance, row 0 up.
-    half : float
-        The mask spans [-half, half] in the stop, mm.
+    count, crossings, corner, stops
+        As in `place_mask`.
+    mask : tuple of ndarray
+        Levels of the mask, their table, and the sums of its changes (`optics.mask_levels`).
+    texture : tuple of ndarray
+        From `mask_texture`; changed.
     density ... plane
         As in `fill_polygon`.
+    other, values
+        Scratch, as in `kernels.clip.clip_triangle`.
 
     Notes
     -----
-    Where the mask varies, the polygon is divided linearly until a piece is a texel or a pixel.
+    Over a polygon the places in the stop are linear in the picture.
     """
-    height, width = plane_size(plane)
-    value = 1.0
-    for c in range(crossings):
-        here = _uniform(polygon, count, c, mask, half)
-        if here == 0.0:
-            return
-        value = -1.0 if here < 0.0 or value < 0.0 else value * here
-    piece, other = np.empty((MAX_VERTICES, 2)), np.empty((MAX_VERTICES, 2))
-    values = np.empty(MAX_VERTICES)
-    if value >= 0.0:
-        for k in range(count):
-            piece[k, 0], piece[k, 1] = polygon[k, PX], polygon[k, PY]
-        kept = cut_to_rectangle(piece, count, other, values, float(width), float(height))
-        if kept >= 3:
-            fill_polygon(piece, kept, density, gx, gy, density_low, density_high, rgb * value, plane)
+    alike = place_mask(polygon, count, crossings, corner, stops, mask, texture)
+    if alike == 0.0:
         return
-    for k in range(1, count - 1):
-        n = _pieces(polygon, k, crossings, mask, half)
-        for i in range(n):
-            for j in range(2 * (n - i) - 1):
-                value = 1.0
-                # corners of the j-th small triangle of strip i, in steps of 1 / n from vertex 0
-                a, b, down = i, j // 2, j % 2
-                for c in range(crossings):
-                    s, t = (a + (1.0 + down) / 3.0) / n, (b + (1.0 + down) / 3.0) / n
-                    m = PSTOP + 2 * c
-                    u = polygon[0, m] + s * (polygon[k, m] - polygon[0, m]) + t * (polygon[k + 1, m] - polygon[0, m])
-                    m += 1
-                    v = polygon[0, m] + s * (polygon[k, m] - polygon[0, m]) + t * (polygon[k + 1, m] - polygon[0, m])
-                    value *= mask_value(mask, half, u, v)
-                if value == 0.0:
-                    continue
-                for m in range(3):
-                    # upward: (a, b), (a + 1, b), (a, b + 1); downward: (a + 1, b), (a + 1, b + 1), (a, b + 1)
-                    ga = a + (1 if m == 1 or (down and m == 0) else 0)
-                    gb = b + (1 if m == 2 or (down and m == 1) else 0)
-                    for q in range(2):
-                        piece[m, q] = (
-                            polygon[0, q]
-                            + ga / n * (polygon[k, q] - polygon[0, q])
-                            + gb / n * (polygon[k + 1, q] - polygon[0, q])
-                        )
-                kept = cut_to_rectangle(piece, 3, other, values, float(width), float(height))
-                if kept >= 3:
-                    fill_polygon(piece, kept, density, gx, gy, density_low, density_high, rgb * value, plane)
+    height, width = plane_size(plane)
+    count = cut_to_rectangle(polygon, count, other, values, float(width), float(height))
+    if count >= 3:
+        fill_polygon(
+            polygon, count, density * alike, gx * alike, gy * alike, density_low * alike, density_high * alike, rgb,
+            plane, texture,
+        )  # fmt: skip
+
+
+@inner
+def masked_point(polygon, crossings, mask, texture):
+    """Return what the mask lets through at the first vertex of a polygon."""
+    part = 1.0
+    for c in range(crossings):
+        take_level(mask, texture[1], c, 0.0)
+        u, v = polygon[0, PSTOP + 2 * c], polygon[0, PSTOP + 2 * c + 1]
+        part *= pattern_value(texture[0], texture[1], texture[2], c, u, v)
+    return part

@@ -6,7 +6,7 @@ import numpy as np
 
 from ._jit import compiled, inner
 from .clip import MAX_VERTICES, PP, PQ, PREL, PSTOP, PW, PX, PY, cut_by_blades, cut_to_rectangle, polygon_area
-from .mask import fill_through_mask
+from .mask import fill_through_mask, mask_texture
 from .raster import fill_polygon
 from .trace import REFLECT, STOP
 
@@ -201,7 +201,7 @@ def mirror_squares(
 @compiled
 def draw_matrix_ghosts(
     rows, actions, starts, crossings, curvature, curvature_x, z_vertex, n_gap, reflectance, sensor_z,
-    entrance, slope, slope_x, nearness, edges, iris_radius, mask, mask_half, axes, to_pixels, gain, rgb, plane,
+    entrance, slope, slope_x, nearness, edges, iris_radius, mask, axes, to_pixels, gain, rgb, plane,
 ):  # fmt: skip
     """Draw many paths at many wavelengths with matrices (Lee and Eisemann 2013; Van Acoleyen 2025, chapter 4).
 
@@ -229,7 +229,7 @@ def draw_matrix_ghosts(
     edges : ndarray, shape (B, 4)
         The iris as straight blades.
     iris_radius : float
-    mask, mask_half, axes, to_pixels, gain
+    mask, axes, to_pixels, gain
         As in `draw_bundle`.
     rgb : ndarray, shape (P, W, 3)
     plane : ndarray, shape (H, W, 3), float64
@@ -247,6 +247,9 @@ def draw_matrix_ghosts(
     to_stop = np.empty((MOST_CROSSINGS, 2, 2))
     across = to_stop if curvature_x is None else np.empty((MOST_CROSSINGS, 2, 2))
     rim = _rim(entrance)
+    if mask is not None:
+        texture = mask_texture(mask, MOST_CROSSINGS, width)
+        corner, stops = np.empty((3, 2)), np.empty((MOST_CROSSINGS, 3, 2))
     for p in range(starts.size - 1):
         path_rows, path_actions = rows[starts[p] : starts[p + 1]], actions[starts[p] : starts[p + 1]]
         for w in range(n_gap.shape[0]):
@@ -259,8 +262,10 @@ def draw_matrix_ghosts(
                 continue
             even *= gain
             if mask is not None:
+                _take_corners(polygon, count, crossings[p], corner, stops)
                 fill_through_mask(
-                    polygon, count, crossings[p], mask, mask_half, even, 0.0, 0.0, even, even, rgb[p, w], plane,
+                    polygon, count, crossings[p], corner, stops, mask, texture, even, 0.0, 0.0, even, even, rgb[p, w],
+                    plane, other, values,
                 )  # fmt: skip
                 continue
             count = cut_to_rectangle(polygon, count, other, values, float(width), float(height))
@@ -338,6 +343,16 @@ def _place_ghost(
         count = _square(polygon, polygon[0, PX], polygon[0, PY])
         area = SPOT * SPOT
     return count, flux / area
+
+
+@inner
+def _take_corners(polygon, count, crossings, corner, stops):
+    """Fill in three vertices that lie well apart, and their places in the stop."""
+    for m in range(3):
+        k = m * count // 3
+        corner[m, 0], corner[m, 1] = polygon[k, PX], polygon[k, PY]
+        for c in range(crossings):
+            stops[c, m, 0], stops[c, m, 1] = polygon[k, PSTOP + 2 * c], polygon[k, PSTOP + 2 * c + 1]
 
 
 @inner

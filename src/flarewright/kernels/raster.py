@@ -176,6 +176,33 @@ def _mark_strip(flat, width, row, depth, xl0, xl1, xr0, xr1, density, rgb):
             before = here
 
 
+@inner
+def _mark_woven(flat, width, row, depth, xl0, xl1, xr0, xr1, density, rgb, light):
+    """Add a strip as `_mark_strip` does, multiplied by `light`."""
+    la, lb = min(xl0, xl1), max(xl0, xl1)
+    ra, rb = min(xr0, xr1), max(xr0, xr1)
+    first = int(la)
+    count = min(int(rb) + 1, width) - first
+    la, lb, ra, rb = la - first, lb - first, ra - first, rb - first
+    l_inverse, r_inverse = 0.5 / max(lb - la, 1e-9), 0.5 / max(rb - ra, 1e-9)
+    whole, rest = int(lb) + 1, int(ra)
+    before = 0.0
+    for c in range(count + 1):
+        here = 0.0
+        if c < count:
+            here = light[np.uint64(first + c)] * density
+            if c < whole or c >= rest:
+                here *= _share(float(c), la, lb, l_inverse, ra, rb, r_inverse)
+        # where the patterns are even there is nothing to mark
+        if here != before and first + c < width:
+            place = np.uint64(3 * (row * width + first + c))
+            change = (here - before) * depth
+            flat[place] += rgb[0] * change
+            flat[place + np.uint64(1)] += rgb[1] * change
+            flat[place + np.uint64(2)] += rgb[2] * change
+        before = here
+
+
 @compiled
 def sum_rows(differences):
     """Turn a picture of differences into the picture, in place.
@@ -212,7 +239,7 @@ def fill_polygon(polygon, count, density, gx, gy, density_low, density_high, rgb
         Added to. In the second form the density is even, and only the differences along the rows are marked, which
         costs no more for large polygons than for small ones; `sum_rows` turns them into the picture.
     texture : tuple of ndarray, or None
-        Patterns that the light is multiplied by, only in the first form: what `kernels.pattern.weave` takes first.
+        Patterns that the light is multiplied by: what `kernels.pattern.weave` takes first.
 
     Notes
     -----
@@ -266,7 +293,11 @@ def fill_polygon(polygon, count, density, gx, gy, density_low, density_high, rgb
             yl, yr = polygon[left, PY], polygon[right, PY]
             xl0, xl1 = xl + (y - yl) * left_slope, xl + (y_next - yl) * left_slope
             xr0, xr1 = xr + (y - yr) * right_slope, xr + (y_next - yr) * right_slope
-            if plane.ndim == 3:
+            if plane.ndim == 3 and texture is not None and woven:
+                first, last = int(min(xl0, xl1)), min(int(max(xr0, xr1)), plane.shape[1] - 1)
+                weave(patterns, table, corners, places, light, where, beside, below, row, first, last)
+                _mark_woven(flat, plane.shape[1], row, y_next - y, xl0, xl1, xr0, xr1, density, rgb, light)
+            elif plane.ndim == 3:
                 _mark_strip(flat, plane.shape[1], row, y_next - y, xl0, xl1, xr0, xr1, density, rgb)
             else:
                 if texture is not None and woven:

@@ -10,6 +10,7 @@ from .bundle import (
     _plane_over_cell,
     _plane_through,
     _pupil_area,
+    _put_in_stop,
     _splat_polygon,
     _triangle_flux,
 )
@@ -179,14 +180,6 @@ def _find_deep(data, crossings, table, deep):
             u, v = data[k, STOP_X + 2 * c], data[k, STOP_X + 2 * c + 1]
             inside = inside and u * u + v * v < table[c, DEEP] * table[c, DEEP]
         deep[k] = inside
-
-
-@inner
-def _put_in_stop(data, node, mirror, axes, stops, m):
-    """Fill in where a node crosses the stop, in the upright frame, as the m-th place."""
-    for k in range(stops.shape[0]):
-        u, v = mirror * data[node, STOP_X + 2 * k], data[node, STOP_X + 2 * k + 1]
-        stops[k, m, 0], stops[k, m, 1] = u * axes[0, 0] + v * axes[1, 0], u * axes[0, 1] + v * axes[1, 1]
 
 
 @inner

@@ -419,7 +419,7 @@ def _peak(
     view = np.array([side / 2 - centre[0] / patch, side / 2 + centre[1] / patch, 1.0 / patch, 1.0 / patch])
     densities = node_densities(data, bundle.pupil, bundle.triangles)
     draw_bundle(
-        data, bundle.pupil, bundle.triangles, densities, bundle.path.stop_crossings, blades, None, 1.0, light.axes,
+        data, bundle.pupil, bundle.triangles, densities, bundle.path.stop_crossings, blades, None, light.axes,
         view, light.cosine, np.array([1.0, 0.0, 0.0]), plane, bundle.halves,
     )  # fmt: skip
     return float(to_pixels(plane, side)[:, :, 0].max()) / patch**2, patch

@@ -89,8 +89,8 @@ def _through_mask(shot: Shot, bundle: Bundle, data: Floats, sums: Floats) -> flo
     view = np.array([side / 2 - centre[0] * zoom, side / 2 + centre[1] * zoom, zoom, zoom])
     opening, densities = shot.opening, node_densities(data, bundle.pupil, bundle.triangles)
     draw_bundle(
-        data, bundle.pupil, bundle.triangles, densities, bundle.path.stop_crossings, opening.blades, opening.mask,
-        opening.half, shot.incidence.axes, view, shot.incidence.cosine, np.array([1.0, 0.0, 0.0]), plane,
+        data, bundle.pupil, bundle.triangles, densities, bundle.path.stop_crossings, opening.blades, opening.levels,
+        shot.incidence.axes, view, shot.incidence.cosine, np.array([1.0, 0.0, 0.0]), plane,
         bundle.halves,
     )  # fmt: skip
     return float(to_pixels(plane, side)[:, :, 0].sum(dtype=np.float64))
@@ -163,7 +163,7 @@ def traced_spot(lens: Lens, shot: Shot, offset: tuple[float, float] = (0.0, 0.0)
     view[1] = reach[1] + 0.5 + offset[1] + y * view[3]
     draw_bundle(
         data, bundle.pupil, bundle.triangles, node_densities(data, bundle.pupil, bundle.triangles), crossings,
-        opening.blades, opening.mask, opening.half, axes, view, 1.0, np.array([1.0, 0.0, 0.0]), plane, bundle.halves,
+        opening.blades, opening.levels, axes, view, 1.0, np.array([1.0, 0.0, 0.0]), plane, bundle.halves,
     )  # fmt: skip
     drawn = to_pixels(plane, 2 * reach[0] + 1)[:, :, 0].astype(np.float64)
     total = float(drawn.sum())
@@ -230,8 +230,8 @@ def traced_pupil(lens: Lens, shot: Shot, f_number: float) -> Floats | None:
     view = np.array([PUPIL_SIDE / 2, PUPIL_SIDE / 2, zoom, zoom])
     densities = node_densities(data, bundle.pupil, bundle.triangles)
     draw_bundle(
-        data, bundle.pupil, bundle.triangles, densities, crossings, opening.blades, opening.mask,
-        opening.half, axes, view, 1.0, np.array([1.0, 0.0, 0.0]), plane, bundle.halves,
+        data, bundle.pupil, bundle.triangles, densities, crossings, opening.blades, opening.levels, axes, view, 1.0,
+        np.array([1.0, 0.0, 0.0]), plane, bundle.halves,
     )  # fmt: skip
     lit = to_pixels(plane, PUPIL_SIDE)[:, :, 0].astype(np.float64)
     level = float(np.median(lit[lit > 0.3 * lit.max()])) if lit.max() > 0.0 else 0.0

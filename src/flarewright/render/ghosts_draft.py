@@ -45,8 +45,8 @@ def draw_draft(shot: Shot, paths: Sequence[LightPath], differences: Floats, colo
     packed, opening = shot.packed, shot.opening
     steps, view, axes = _steps(shot, paths)
     draw_matrix_ghosts(
-        *steps, packed.n_gap, packed.reflectance, packed.sensor_z, *view, opening.edges, opening.radius, opening.mask,
-        opening.half, axes, shot.to_pixels, shot.gain, draft_colors(shot, paths) if colors is None else colors,
+        *steps, packed.n_gap, packed.reflectance, packed.sensor_z, *view, opening.edges, opening.radius,
+        opening.levels, axes, shot.to_pixels, shot.gain, draft_colors(shot, paths) if colors is None else colors,
         differences,
     )  # fmt: skip
 

@@ -270,8 +270,8 @@ def draw_final(
                 patterns.draw(k, bundle, data, densities, shot.incidence.axes, place, shot.gain, rgb * share, plane)
             else:
                 draw_bundle(
-                    data, bundle.pupil, bundle.triangles, densities, path.stop_crossings, opening.blades, opening.mask,
-                    opening.half, shot.incidence.axes, place, shot.gain, rgb * share, plane, bundle.halves,
+                    data, bundle.pupil, bundle.triangles, densities, path.stop_crossings, opening.blades,
+                    opening.levels, shot.incidence.axes, place, shot.gain, rgb * share, plane, bundle.halves,
                 )  # fmt: skip
 
 
@@ -300,7 +300,7 @@ def _drawn_in_few(item: FinalPass, bundle: Bundle, bend: Floats | None, plane: P
         data = bundle.traced[w]
         draw_bundle(
             data, bundle.pupil, bundle.triangles, node_densities(data, bundle.pupil, bundle.triangles),
-            path.stop_crossings, opening.blades, opening.mask, opening.half, shot.incidence.axes, to_pixels, shot.gain,
+            path.stop_crossings, opening.blades, opening.levels, shot.incidence.axes, to_pixels, shot.gain,
             rgb, plane, bundle.halves,
         )  # fmt: skip
     return True

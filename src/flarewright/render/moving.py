@@ -29,8 +29,6 @@ from .starburst_pass import OUT_OF_FOCUS_PX, read_soil, starburst_of
 
 Floats = NDArray[np.float32]
 
-# texels a side of an iris that is an image, in ghosts
-MASK_PX = 64
 # a picture of more lights takes long by its ghosts alone, and their sheets much memory
 MOST_LIGHTS = 4
 
@@ -144,8 +142,6 @@ def moving_picture(project: Project, kept: Sequence[Sheet]) -> Still | None:
             return None
         stars.append(star)
     paths = ghost_paths(settled.lens, project.quality.paths, sensor=settled.sensor is not None)
-    if mask is not None:
-        shots = tuple(replace(shot, opening=make_opening(settled, _coarse(mask))) for shot in shots)
     layer = render_ghosts(shots, paths, project.quality, art=art.paths).total
     by_hand = art.gain.get("ghosts", 1.0)
     ghosts = layer.pixels if by_hand == 1.0 else layer.pixels * np.float32(by_hand)
@@ -215,15 +211,6 @@ def _mask(iris: Iris) -> NDArray[np.float64] | None:
 def _read_mask(path: str, _: int) -> NDArray[np.float64]:
     """Read a mask once, and anew when its file has changed."""
     return read_mask(path)
-
-
-def _coarse(mask: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Average a mask over cells, for each texel of it is a piece of every ghost."""
-    cell = -(-max(mask.shape) // MASK_PX)
-    rows, columns = (-(-side // cell) * cell for side in mask.shape)
-    # the border goes on
-    whole = np.pad(mask, ((0, rows - mask.shape[0]), (0, columns - mask.shape[1])), mode="edge")
-    return np.asarray(whole.reshape(rows // cell, cell, columns // cell, cell).mean(axis=(1, 3)))
 
 
 def _drawn(

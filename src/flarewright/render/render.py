@@ -99,7 +99,7 @@ def render(
     tables = scatter_of(settled, shots)
     soil = read_soil(project.dirt)
     if soil is not None and project.dirt.in_ghosts:
-        dirty = soiled_opening(opening, settled.iris, settled.order.stop_semi_diameter, soil)
+        dirty = soiled_opening(opening, settled.order.stop_semi_diameter, soil)
         seen = tuple(replace(shot, opening=dirty) for shot in shots)
     if project.quality.ringing != "off" and project.quality.mode == "final":
         from .ringing import Ringing

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,6 +20,7 @@ from ..optics.coating_curves import CURVE_NM, CoatingCurves, coating_curves
 from ..optics.diffraction import Soil
 from ..optics.dirt import lay_elements, rasterise
 from ..optics.iris import blade_edges, outline, transmission
+from ..optics.mask_levels import MaskLevels, mask_levels
 from ..optics.pack import PackedLens, facing, pack_lens, resolve_coatings
 from ..optics.source import parts
 from ..optics.spectrum import band_parts, band_weights, traced_wavelengths
@@ -61,10 +62,16 @@ class Opening:
     mask: Floats | None
     half: float
 
+    @cached_property
+    def levels(self) -> MaskLevels | None:
+        """The mask as kernels that draw read it."""
+        return None if self.mask is None else mask_levels(self.mask, self.half)
+
     @property
     def mean_transmittance(self) -> float:
-        """Mean of the mask over the square that it spans; 1 without a mask."""
-        return 1.0 if self.mask is None else float(self.mask.mean())
+        """Mean of the mask over the square around the round opening; 1 without a mask."""
+        # a turned one spans more than that square
+        return 1.0 if self.mask is None else float(self.mask.mean()) * 2.0 * (self.half / self.radius) ** 2
 
 
 @dataclass(frozen=True)
@@ -183,10 +190,10 @@ def make_opening(settled: Settled, mask: Floats | None) -> Opening:
     semi = settled.order.stop_semi_diameter
     if mask is not None:
         # the mask ends at its own border, so the border cuts as four blades
-        sides = ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))
-        square = np.array([[x, y, semi, 0.0] for x, y in sides])
-        image = np.ascontiguousarray(mask, dtype=np.float64)
-        return Opening(square, square, float(np.sqrt(2.0) * semi), 0.5 * semi, image, semi)
+        turn = np.radians(settled.iris.rotation_deg) + 0.5 * np.pi * np.arange(4)
+        square = np.stack([np.cos(turn), np.sin(turn), np.full(4, semi), np.zeros(4)], axis=1)
+        image, half = _turned(np.asarray(mask, dtype=np.float64), settled.iris.rotation_deg)
+        return Opening(square, square, float(np.sqrt(2.0) * semi), 0.5 * semi, image, half * semi)
     iris = settled.iris
     curved = iris.blades == 0 or iris.rounding > 0.0
     edges = blade_edges(iris, semi)
@@ -205,14 +212,25 @@ def make_opening(settled: Settled, mask: Floats | None) -> Opening:
     )
 
 
-def soiled_opening(opening: Opening, iris: Iris, semi: float, soil: Soil) -> Opening:
+def _turned(mask: Floats, rotation_deg: float) -> tuple[Floats, float]:
+    """Turn a mask as `optics.iris.transmission` does; return it, and half of what it spans then, in radii."""
+    if rotation_deg % 90.0 == 0.0:
+        return np.ascontiguousarray(np.rot90(mask, round(rotation_deg / 90.0))), 1.0
+    # the square around the turned one, as fine as the mask is
+    half = float(np.sqrt(2.0))
+    count = int(np.ceil(half * max(mask.shape)))
+    at = ((np.arange(count) + 0.5) * 2.0 / count - 1.0) * half
+    seen = transmission(Iris(rotation_deg=rotation_deg), 1.0, at, at[:, None], mask=mask)
+    return np.ascontiguousarray(seen[::-1]), half
+
+
+def soiled_opening(opening: Opening, semi: float, soil: Soil) -> Opening:
     """Lay dirt on an opening, for ghosts.
 
     Parameters
     ----------
     opening : Opening
         From `make_opening`; its edges stay as they are.
-    iris : Iris
     semi : float
         Semi-diameter of the round opening, mm.
     soil : Soil
@@ -225,9 +243,9 @@ def soiled_opening(opening: Opening, iris: Iris, semi: float, soil: Soil) -> Ope
     spacing = 2.0 * SOIL_SPAN / SOIL_SIDE
     at = np.asarray((np.arange(SOIL_SIDE) + 0.5) * spacing - SOIL_SPAN, dtype=np.float64)
     _, light = rasterise(lay_elements(soil.dirt, semi), at)
-    for image, turned in ((soil.image, Iris()), (opening.mask, iris)):
+    for image, half in ((soil.image, 1.0), (opening.mask, opening.half / semi)):
         if image is not None:
-            seen = transmission(turned, 1.0, at, at[:, None], mask=image)
+            seen = transmission(Iris(), half, at, at[:, None], mask=image)
             if image is soil.image:
                 seen[np.maximum(np.abs(at), np.abs(at)[:, None]) >= 1.0] = 1.0
             light = light * seen
