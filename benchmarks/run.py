@@ -48,10 +48,11 @@ from flarewright.model import (
     Rule,
     Scatter,
 )
-from flarewright.optics.bundle import find_region, front_box, trace_points
+from flarewright.optics.bundle import trace_points
 from flarewright.optics.pack import pack_lens
 from flarewright.optics.paraxial import first_order
 from flarewright.optics.paths import direct_path, ghost_paths
+from flarewright.optics.region import find_region, front_box
 from flarewright.render.montecarlo import HEROES, ray_source, run_batch
 from flarewright.render.prepare import build, load_lens, settle
 from flarewright.render.reference import spectral_shots

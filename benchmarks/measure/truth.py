@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flarewright.kernels.trace import ALIVE, REL, STOP_X, X, Y
-from flarewright.optics.bundle import find_region, trace_points
+from flarewright.optics.bundle import trace_points
 from flarewright.optics.paths import LightPath, ghost_paths
+from flarewright.optics.region import find_region
 from flarewright.render.prepare import settle
 from flarewright.render.shot import Shot, make_opening, make_shots
 

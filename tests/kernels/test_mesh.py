@@ -10,9 +10,10 @@ import pytest
 from flarewright.kernels.bundle import measure_bundle
 from flarewright.kernels.trace import trace_nodes
 from flarewright.model import Iris, Light, Project
-from flarewright.optics.bundle import _arguments, find_region, front_box, trace_grid, trace_points
+from flarewright.optics.bundle import trace_grid, trace_points
 from flarewright.optics.iris import blade_edges
 from flarewright.optics.paths import LightPath, ghost_path, ghost_paths
+from flarewright.optics.region import find_region, front_box, tracing_arguments
 from flarewright.render.art import PLAIN
 from flarewright.render.ghosts_final import find_entry, find_final
 from flarewright.render.prepare import load_lens, settle
@@ -31,13 +32,13 @@ def shot_of(lens: str, field_deg, f_number: float, wavelengths: int = 3) -> Shot
     return make_shots(settled, make_opening(settled, None))[0]
 
 
-def mesh_of(shot: Shot, path: LightPath, tolerance: float = 0.25, scale: float = 10.0):
+def mesh_of(shot: Shot, path: LightPath, tolerance: float = 0.25, scale: float = 10.0, rough: int = 0):
     region = find_region(shot.packed, path, shot.incidence.tilt, shot.opening.radius, shot.view_radius)
     if region is None:
         return None, None
     bundle = trace_grid(
         shot.packed, path, shot.incidence.tilt, (shot.opening.radius, shot.opening.inner), region,
-        tolerance=tolerance, scale=scale,
+        tolerance=tolerance, scale=scale, rough=rough,
     )  # fmt: skip
     return region, bundle
 
@@ -127,6 +128,48 @@ def test_a_finer_tolerance_makes_a_finer_grid_and_the_same_flux():
     assert found[1][1] == pytest.approx(found[2][1], rel=1e-3)
 
 
+@pytest.mark.parametrize("rough", [1, 3])
+def test_a_rough_rim_takes_fewer_rays_and_keeps_the_flux(rough):
+    """Against fine grids of the same paths: a faint ghost may lose a little, faint ghosts together next to nothing."""
+    shot = shot_of("canon-28-80", (15.0, 8.0), 8.0)
+    blades = blade_edges(Iris(blades=6), shot.packed.stop_semi)
+    flux, nodes = [], []
+    for path in ghost_paths(load_lens("canon-28-80"), "same-side")[::9]:
+        grids = [mesh_of(shot, path, tolerance, 10.0, r)[1] for tolerance, r in ((0.05, 0), (0.25, 0), (0.25, rough))]
+        if grids[0] is None:
+            continue
+        crossings = path.stop_crossings
+        flux.append(
+            [
+                measure_bundle(b.traced[1], b.pupil, b.triangles, crossings, blades, shot.incidence.axes, 2)[0]
+                for b in grids
+            ]
+        )
+        nodes.append([len(b.pupil) for b in grids])
+    fine, _, coarse = np.array(flux).T
+    share = np.array(nodes)[:, 2].sum() / np.array(nodes)[:, 1].sum()
+    assert len(flux) > 12
+    assert share < 0.75
+    lit = fine > 1e-6 * fine.max()
+    # such a ghost has less than 1.5 % of the picture's mean, so this is less than 0.1 % of it
+    assert coarse[lit] == pytest.approx(fine[lit], rel=0.05)
+    assert np.median(np.abs(coarse[lit] / fine[lit] - 1.0)) < 2e-3
+    assert coarse.sum() == pytest.approx(fine.sum(), rel=2e-3)
+
+
+@pytest.mark.parametrize("count", [1, 7, 8, 9, 63, 64, 65, 127])
+def test_a_ray_is_the_same_among_any_number(count):
+    """Sets of lanes are as long as there are rays, in whole vectors: the last set too must trace what it is given."""
+    shot = shot_of("heliar-tronnier", (8.0, 5.0), 3.5)
+    path = ghost_path(load_lens("heliar-tronnier"), 8, 3)
+    points = np.random.default_rng(3).uniform(-12.0, 12.0, (130, 2))
+    every = trace_points(shot.packed, 1, path, shot.incidence.tilt, points)
+    some = trace_points(shot.packed, 1, path, shot.incidence.tilt, points[:count])
+    alive = every[:count, 4] > 0.0
+    assert np.array_equal(some[:, 4] > 0.0, alive)
+    assert some[alive] == pytest.approx(every[:count][alive], rel=1e-12, abs=1e-12)
+
+
 def dense_flux(shot: Shot, path: LightPath, w: int, n: int) -> tuple[float, float]:
     """Flux of a dense scan of half the front, and the part of it inside a box."""
     packed, tilt = shot.packed, shot.incidence.tilt
@@ -135,7 +178,7 @@ def dense_flux(shot: Shot, path: LightPath, w: int, n: int) -> tuple[float, floa
     px, py = np.meshgrid(x0 + hx * (np.arange(n) + 0.5), y0 + hy * (np.arange(2 * n) + 0.5), indexing="ij")
     px, py = px.ravel(), py.ravel()
     data = np.empty((px.size, 5 + 2 * path.stop_crossings))
-    trace_nodes(*_arguments(packed, w, path, tilt), px, py, data)
+    trace_nodes(*tracing_arguments(packed, w, path, tilt), px, py, data)
     passing = (data[:, 4] > 0) & (data[:, 3] <= 1.0)
     for c in range(path.stop_crossings):
         passing &= np.hypot(data[:, 5 + 2 * c], data[:, 6 + 2 * c]) <= shot.opening.radius

@@ -7,12 +7,13 @@ import pytest
 
 from flarewright.kernels.trace import ALIVE, REL, WEIGHT
 from flarewright.model import AsLens, Everywhere, QuarterWave
-from flarewright.optics.bundle import find_region, trace_points
+from flarewright.optics.bundle import trace_points
 from flarewright.optics.coating_curves import CURVE_NM, bends, coating_curves, mirror_squares_traced, passed
 from flarewright.optics.coatings import film_stack, stack_reflectance
 from flarewright.optics.pack import SensorMirror, facing, pack_lens, resolve_coatings
 from flarewright.optics.paraxial import D_LINE_NM, first_order, gap_indices
 from flarewright.optics.paths import ghost_path, sensor_path
+from flarewright.optics.region import find_region
 from flarewright.render.prepare import load_lens
 
 FILM = Everywhere(coating=QuarterWave(center_wavelength_nm=550.0))

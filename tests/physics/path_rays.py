@@ -12,7 +12,7 @@ import numpy as np
 from numba import njit
 
 from flarewright.kernels.montecarlo import _cross, _passes_stop
-from flarewright.optics.bundle import front_box
+from flarewright.optics.region import front_box
 from flarewright.render.montecarlo import spectrum_of
 from flarewright.render.shot import Shot
 

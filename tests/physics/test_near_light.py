@@ -10,11 +10,12 @@ from prescriptions import HELIAR, lens, system
 
 from flarewright.errors import ProjectError
 from flarewright.model import Camera, Iris, Light, Lines, Output, Project, Quality
-from flarewright.optics.bundle import front_box, incidence, trace_points
+from flarewright.optics.bundle import incidence, trace_points
 from flarewright.optics.color import luminance_weights
 from flarewright.optics.pack import facing, pack_lens
 from flarewright.optics.paraxial import D_LINE_NM, first_order, path_matrices
 from flarewright.optics.paths import direct_path, ghost_path
+from flarewright.optics.region import front_box
 from flarewright.render.analysis import ghosts
 from flarewright.render.direct import defocus_mm, direct_image, traced_spot
 from flarewright.render.ledger import trace_ledger

@@ -10,9 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from flarewright.model import Camera, Iris, Light, Lines, Output, Project, Quality
-from flarewright.optics.bundle import front_box, trace_points
+from flarewright.optics.bundle import trace_points
 from flarewright.optics.iris import transmission
 from flarewright.optics.paths import LightPath, direct_path, ghost_path
+from flarewright.optics.region import front_box
 from flarewright.render.prepare import settle
 from flarewright.render.render import Rendering, render
 from flarewright.render.shot import Shot, make_opening, make_shots

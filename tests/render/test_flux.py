@@ -9,9 +9,9 @@ import pytest
 from pupil_sum import D_LINE, by_name, count, layer_flux, layers_of, mono, path_of, picture, scene, shots_of
 
 from flarewright.model import D65, Everywhere, Iris, Light, QuarterWave
-from flarewright.optics.bundle import find_region
 from flarewright.optics.ghosts import ghost_table
 from flarewright.optics.paths import ghost_paths
+from flarewright.optics.region import find_region
 from flarewright.render.ghosts import render_ghosts
 from flarewright.render.prepare import load_lens
 from flarewright.render.render import render

@@ -35,7 +35,7 @@ _WINGS = "f8[::1], f8[::1], f8[::1], f8[::1]"
 ROOTS = {
     "mesh": (
         "mesh.build_mesh",
-        f"{_GEOMETRY}, f8[:,::1], f8[:,:,::1], f8, f8, f8, i8, f8, f8, f8[::1], i8, i8, i8, f8, f8, f8, f8, f8, f8",
+        f"{_GEOMETRY}, f8[:,::1], f8[:,:,::1], f8, f8, f8, i8, f8, f8, f8[::1], i8, i8, i8, i8, f8, f8, f8, f8, f8, f8",
         4.7,
     ),
     "prepass": (

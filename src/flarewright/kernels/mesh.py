@@ -10,8 +10,6 @@ from .trace import ALIVE, REL, STOP_X, WEIGHT, X, Y, trace_lanes
 UNKNOWN, LEAF, SPLIT, EMPTY, FLAT = 0, 1, 2, 3, 4
 # away from the rim positions may err by this part of the cell
 INNER_BEND = 0.02
-# cells that the rim crosses are halved at least this often
-RIM_LEVEL = 2
 # cells in fringes are no larger than this many pixels: of a small one most often one edge tells the pattern
 FRINGE_CELL = 128.0
 # cells whose rays all end, but not at one surface, are halved so often
@@ -20,8 +18,8 @@ SLIVER_LEVEL = 3
 
 @inner
 def _judge(
-    data, nodes, crossings, iris_radius, iris_inner, level, max_level, h, tolerance, flux_tolerance, fringe_tolerance,
-    faint_radius, scale, view_radius,
+    data, nodes, crossings, iris_radius, iris_inner, level, rim_level, max_level, h, tolerance, flux_tolerance,
+    fringe_tolerance, faint_radius, scale, view_radius,
 ):  # fmt: skip
     """Decide whether a cell of 3 x 3 nodes is EMPTY, to be SPLIT, a LEAF, or a FLAT one.
 
@@ -57,7 +55,7 @@ def _judge(
                 at_fringes = True
                 continue
             # a rim met by several surfaces has corners that a coarse cell cannot tell
-            if level < RIM_LEVEL:
+            if level < rim_level:
                 return SPLIT
             at_rim = True
             part = bend / max(high - low, 1e-12)
@@ -78,7 +76,7 @@ def _judge(
         if extent > 5.0:
             ratio = max(abs(area_low), abs(area_high)) / max(min(abs(area_low), abs(area_high)), 1e-300)
             error = max(error, 4.0 * (ratio - 1.0))
-    if extent > 5.0 or level <= RIM_LEVEL:
+    if extent > 5.0 or level <= rim_level:
         error = max(error, _bend(data, nodes, np.int64(WEIGHT)) / (0.005 * abs(data[nodes[4], WEIGHT]) + 1e-300))
     if error > 4.0:
         return SPLIT
@@ -148,8 +146,8 @@ def _fan_areas(data, nodes):
 @compiled
 def build_mesh(
     rows, actions, curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, tilt, nearness,
-    crossings, iris_radius, iris_inner, box, nx, ny, max_level, tolerance, flux_tolerance, fringe_tolerance,
-    faint_radius, scale, view_radius,
+    crossings, iris_radius, iris_inner, box, nx, ny, rim_level, max_level, tolerance, flux_tolerance,
+    fringe_tolerance, faint_radius, scale, view_radius,
 ):  # fmt: skip
     """Trace a path on a grid that is refined where the map bends, folds or is cut, and triangulate it without cracks.
 
@@ -164,6 +162,9 @@ def build_mesh(
         Pupil region, mm.
     nx, ny : int
         Coarsest cells; each may be halved `max_level` times.
+    rim_level : int
+        How often at least those are halved that the rim crosses.
+    max_level : int
     tolerance : float
         Largest error of interpolated positions, pixels.
     flux_tolerance : float
@@ -224,7 +225,7 @@ def build_mesh(
             verdict = EMPTY
             for v in range(n_gap.shape[0]):
                 found = _judge(
-                    data[v], nodes, crossings, iris_radius, iris_inner, level, max_level, h,
+                    data[v], nodes, crossings, iris_radius, iris_inner, level, rim_level, max_level, h,
                     tolerance, flux_tolerance, fringe_tolerance, faint_radius, scale, view_radius,
                 )  # fmt: skip
                 if found == SPLIT:

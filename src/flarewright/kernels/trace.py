@@ -16,6 +16,10 @@ __all__ = [
 ]  # fmt: skip
 
 
+# lanes are taken in multiples of this, whole vectors to the compiler
+VECTOR = 8
+
+
 @inner
 def trace_lanes(
     rows, actions, curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, tilt, nearness, px, py, out,
@@ -73,7 +77,9 @@ def trace_lanes(
     cos_low = np.empty(LANES)
     for start in range(0, n_rays, LANES):
         count = min(LANES, n_rays - start)
-        for m in range(LANES):
+        # the few rays of a cell that is halved do not take the time of a full set
+        lanes = (count + VECTOR - 1) // VECTOR * VECTOR
+        for m in range(lanes):
             k = start + min(m, count - 1)
             x[m] = px[k]
             y[m] = py[k]
@@ -86,7 +92,7 @@ def trace_lanes(
             alive[m] = 1.0
             passed[m] = 0.0
         if nearness > 0.0:
-            for m in range(LANES):
+            for m in range(lanes):
                 dx[m], dy[m], dz[m], weight[m] = ray_from_near(tilt, nearness, x[m], y[m])
         heading = 1.0
         crossing = 0
@@ -95,7 +101,7 @@ def trace_lanes(
             action = actions[step]
             vertex = z_vertex[row]
             if action == STOP:
-                for m in range(LANES):
+                for m in range(lanes):
                     t = (vertex - z[m]) / dz[m]
                     x[m] += t * dx[m]
                     y[m] += t * dy[m]
@@ -117,7 +123,7 @@ def trace_lanes(
             eta = n_in / n_out
             mirror = 1.0 if action == REFLECT else 0.0
             low_in = 1.0 if n_in <= n_out else 0.0
-            for m in range(LANES):
+            for m in range(lanes):
                 zl = z[m] - vertex
                 t, root, discriminant = intersect_conic(c, kappa, x[m], y[m], zl, dx[m], dy[m], dz[m], heading)
                 hx = x[m] + t * dx[m]
@@ -142,12 +148,12 @@ def trace_lanes(
                 dy[m] = ny
                 dz[m] = nz
             living = 0.0
-            for m in range(LANES):
+            for m in range(lanes):
                 living += alive[m]
             if living == 0.0:
                 break
             table = reflectance[row]
-            for m in range(LANES):
+            for m in range(lanes):
                 place = min(cos_low[m], 1.0) * (samples - 1)
                 cell = min(np.int64(place), last_cell)
                 low = table[cell]

@@ -12,9 +12,9 @@ from ..kernels.scatter import FLUX, REL, STOP_X, STOP_Y, TX, TY
 from ..kernels.trace import REL as NODE_REL
 from ..kernels.trace import STOP_X as NODE_STOP_X
 from ..kernels.trace import WEIGHT, trace_hits, trace_nodes
-from .bundle import front_box
 from .pack import PackedLens
 from .paths import LightPath
+from .region import front_box
 
 Floats = NDArray[np.float64]
 

@@ -1,35 +1,29 @@
-"""The ray bundle of one path: its region in the pupil, its grid, its rays."""
+"""The ray bundle of one path: where its light comes from, its grid, its rays."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from math import atan, atan2, ceil, cos, hypot, radians, sin, sqrt, tan
-from typing import Any
+from dataclasses import dataclass
+from math import atan, atan2, cos, hypot, radians, sin, sqrt, tan
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernels.intersect import AXES, ORIGIN, sag_of_shape
 from ..kernels.mesh import build_mesh
-from ..kernels.prepass import PROBES, find_box
 from ..kernels.trace import STOP_X, trace_nodes
 from .pack import PackedLens
 from .paths import LightPath
+from .region import Region, cells_across, tracing_arguments, wavelengths_fitted
 
 Floats = NDArray[np.float64]
 
-# cells of the pre-pass over half the pupil: 64 across the whole
-PREPASS = (32, 64)
-# and of the scans of a part of it; of what reaches the stop at least ENTRY, for a spot must be found at first
-FINER, ENTRY = (12, 24), (20, 40)
-# and of a part's scans at other wavelengths, once the middle one has shown that no small spot is looked for: so many
-# cells of the whole front or of a part
-COARSE = (8, 16)
-SPECK, SMALL_REGION = 16, 64
 # coarsest cells of a bundle's grid over half its region, and how often each may be halved; of a whole region twice as
 # many stand side by side
 GRID = (4, 8)
 MAX_LEVEL = 6
+# cells that the rim crosses are halved at least this often, and once less where it may be rough
+RIM_LEVEL = 2
+# largest relative error of a bundle's flux from its rim
+FLUX_TOLERANCE = 3e-4
 
 
 @dataclass(frozen=True)
@@ -145,259 +139,6 @@ class Bundle:
     halves: int = 2
 
 
-def _arguments(packed: PackedLens, w: int | list[int], path: LightPath, tilt: float) -> Any:
-    """List what every tracing kernel takes first."""
-    geometry = (packed.curvature, packed.form, packed.z_vertex, packed.inv_semi)
-    light = (tilt, packed.nearness)
-    if w == list(range(len(packed.wavelengths_nm))):
-        # a list would copy them
-        return (path.rows, path.actions, *geometry, packed.n_gap, packed.reflectance, packed.sensor_z, *light)
-    return (path.rows, path.actions, *geometry, packed.n_gap[w], packed.reflectance[w], packed.sensor_z, *light)
-
-
-def front_box(packed: PackedLens, tilt: float) -> Floats:
-    """Return the part of the first vertex' plane through which light can reach the first surface: x0, x1, y0, y1.
-
-    Of a lens of revolution only the half x >= 0.
-    """
-    first = packed.first_surface
-    if packed.shapes is not None:
-        return _shaped_box(packed, tilt, first)
-    if packed.nearness > 0.0:
-        return _near_box(packed, tilt, first)
-    semi, c = packed.semi[first], packed.curvature[first]
-    sag = c * semi**2 / (1.0 + sqrt(max(1.0 - (1.0 + packed.conic[first]) * (c * semi) ** 2, 0.0)))
-    # a rim at z = sag is met by rays that cross z = 0 displaced by sag tan(tilt)
-    low, high = -semi - max(0.0, sag * tan(tilt)), semi + max(0.0, -sag * tan(tilt))
-    lead = abs(packed.z_vertex[first] * tan(tilt))
-    return np.array([0.0, semi, low - lead, high + lead]) * (1.0 + 1e-9)
-
-
-def _near_box(packed: PackedLens, tilt: float, first: int) -> Floats:
-    """Bound the front of a lens of revolution as a near light sees it: circles of the first surface, projected."""
-    semi, c = float(packed.semi[first]), float(packed.curvature[first])
-    radius = semi * np.linspace(0.0, 1.0, 33)
-    root = np.sqrt(np.maximum(1.0 - (1.0 + packed.conic[first]) * (c * radius) ** 2, 0.0))
-    z = packed.z_vertex[first] + c * radius**2 / (1.0 + root)
-    distance, height = cos(tilt) / packed.nearness, -sin(tilt) / packed.nearness
-    # seen from the light, a circle across the axis is a circle on every plane across it
-    part = distance / np.maximum(distance + z, 1e-3 * distance)
-    centre, reach = height * (1.0 - part), radius * part
-    # between two circles the bound bulges a little
-    slack = 1e-3 * semi
-    return np.array([0.0, reach.max() + slack, (centre - reach).min() - slack, (centre + reach).max() + slack])
-
-
-def _shaped_box(packed: PackedLens, tilt: float, first: int) -> Floats:
-    """Bound the front of a lens whose first surface may have any shape and place: by the rim and heights on it."""
-    semi, shape = float(packed.semi[first]), packed.form[first]
-    angle = np.linspace(0.0, 2.0 * np.pi, 65)
-    x, y = semi * np.cos(angle), semi * np.sin(angle)
-    height = np.array([sag_of_shape(packed.form, first, u, v)[0] for u, v in zip(x, y, strict=True)])
-    rim = np.stack([x, y, height], axis=1) @ shape[AXES : AXES + 9].reshape(3, 3) + shape[ORIGIN : ORIGIN + 3]
-    # the rim's chords cut its arcs short, and the surface may bulge beyond its rim's height
-    slack = 0.01 * semi + float(np.ptp(np.append(rim[:, 2], shape[ORIGIN + 2])) * abs(tan(tilt)))
-    z = packed.z_vertex[first] + rim[:, 2]
-    at, across = rim[:, 1] - z * tan(tilt), rim[:, 0]
-    if packed.nearness > 0.0:
-        distance, lift = cos(tilt) / packed.nearness, -sin(tilt) / packed.nearness
-        part = distance / np.maximum(distance + z, 1e-3 * distance)
-        at, across = lift + (rim[:, 1] - lift) * part, rim[:, 0] * part
-    left = 0.0 if packed.symmetric else float(across.min()) - slack
-    return np.array([left, float(across.max()) + slack, float(at.min()) - slack, float(at.max()) + slack])
-
-
-def _cells(packed: PackedLens, cells: tuple[int, int]) -> tuple[int, int]:
-    """Cells across and along the part of the pupil that is traced, from those of half of it."""
-    return (cells[0] * (3 - packed.halves), cells[1])
-
-
-@dataclass(frozen=True)
-class Region:
-    """What the pre-pass found of a path, per unit irradiance.
-
-    Attributes
-    ----------
-    box : ndarray, shape (4,)
-        x0, x1, y0, y1 of the accepted pupil in the meridional frame, mm.
-    flux : float
-        Rough flux, mm^2.
-    seen_flux : float
-        The part of it that may land in the picture; 0 when the path passes it by.
-    brightness : float
-        Irradiance on the sensor, weighted by flux.
-    share : float
-        Part of the box that passes light.
-    """
-
-    box: Floats
-    flux: float
-    seen_flux: float
-    brightness: float
-    share: float
-
-
-def find_region(
-    packed: PackedLens,
-    path: LightPath,
-    tilt: float,
-    iris_radius: float,
-    view_radius: float = float("inf"),
-    within: Floats | None = None,
-) -> Region | None:
-    """Find the part of the pupil that a path accepts (Hullin 2011, section 4.2, "Ray Bounding").
-
-    Parameters
-    ----------
-    packed : PackedLens
-    path : LightPath
-    tilt : float
-    iris_radius : float
-        Radius around the iris, mm.
-    view_radius : float
-        Radius around the axis that the picture covers, mm.
-    within : ndarray, shape (4,), optional
-        A box that holds the region; None: the whole front.
-
-    Returns
-    -------
-    Region or None
-        None when nothing passes.
-    """
-    limits = (path.stop_crossings, iris_radius, view_radius)
-    middle, *others = [(*_arguments(packed, w, path, tilt), *limits) for w in _fitted(packed)]
-    box, cells = front_box(packed, tilt), _cells(packed, PREPASS)
-    finest = _finest(packed, tilt)
-    if within is not None:
-        # as dense as on the whole front
-        parts = (within[1::2] - within[0::2]) / (box[1::2] - box[0::2])
-        few = _cells(packed, ENTRY)
-        cells = (max(ceil(cells[0] * parts[0]), few[0]), max(ceil(cells[1] * parts[1]), few[1]))
-        box = within
-    whole = True
-    held = np.array([np.inf, -np.inf, np.inf, -np.inf])
-    for _ in range(4):
-        found, sums, spots = _scan(packed, middle, box, cells, finest)
-        plenty = sums[4] >= (SPECK if whole else SMALL_REGION)
-        near, few = box, _cells(packed, COARSE) if plenty else cells
-        if whole and sums[4] > 0.0:
-            # the whole front is too much to scan thrice where one colour has shown the place
-            near, few = _around(found, box, cells), _cells(packed, COARSE if plenty else FINER)
-        for other in others:
-            elsewhere, more, _ = _scan(packed, other, near, few, finest)
-            found = join_boxes(found, elsewhere)
-            if not plenty:
-                sums = np.maximum(sums, more)
-        if found[1] <= found[0] or sums[0] <= 0.0:
-            return None
-        if sums[4] > 0.0 and spots[1] > spots[0]:
-            # the next scan need not see again what hid between the samples beside the main region
-            held = join_boxes(held, spots)
-        found = join_boxes(found, held)
-        area = float((found[1] - found[0]) * (found[3] - found[2]))
-        shrunk = area < 0.3 * (box[1] - box[0]) * (box[3] - box[2])
-        box, cells, whole = found, _cells(packed, FINER), False
-        if not shrunk:
-            break
-    seen = float(sums[1]) if sums[3] > 0.0 else 0.0
-    return Region(box, float(sums[0]), seen, float(sums[2] / sums[0]), float(np.clip(sums[5] / area, 1e-3, 1.0)))
-
-
-def _finest(packed: PackedLens, tilt: float) -> tuple[float, float]:
-    """Tell how finely what hides between the samples of a part is looked for: as on the whole front."""
-    box, cells = front_box(packed, tilt), _cells(packed, PREPASS)
-    return float(box[1] - box[0]) / (PROBES * cells[0]), float(box[3] - box[2]) / (PROBES * cells[1])
-
-
-def measure_region(
-    packed: PackedLens, path: LightPath, tilt: float, iris_radius: float, view_radius: float, box: Floats
-) -> Region | None:
-    """Estimate what a path carries through a part of the pupil that is known to hold all that it accepts.
-
-    Parameters
-    ----------
-    packed, path, tilt, iris_radius, view_radius
-        As in `find_region`.
-    box : ndarray, shape (4,)
-
-    Returns
-    -------
-    Region or None
-        None when nothing passes.
-    """
-    w, cells = _fitted(packed)[0], _cells(packed, FINER)
-    arguments = (*_arguments(packed, w, path, tilt), path.stop_crossings, iris_radius, view_radius)
-    found, sums, _ = _scan(packed, arguments, box, cells, _finest(packed, tilt))
-    if found[1] <= found[0] or sums[0] <= 0.0:
-        return None
-    # other colours than the middle one may pass a little beside: one more cell of room
-    low = np.maximum(found[0::2] - (box[1::2] - box[0::2]) / cells, box[0::2])
-    high = np.minimum(found[1::2] + (box[1::2] - box[0::2]) / cells, box[1::2])
-    box = np.array([low[0], high[0], low[1], high[1]])
-    area = float((box[1] - box[0]) * (box[3] - box[2]))
-    seen = float(sums[1]) if sums[3] > 0.0 else 0.0
-    return Region(box, float(sums[0]), seen, float(sums[2] / sums[0]), float(np.clip(sums[5] / area, 1e-3, 1.0)))
-
-
-def grown(packed: PackedLens, region: Region, tilt: float, part: float) -> Region:
-    """Widen a region on each side by a part of its size, within the front.
-
-    Parameters
-    ----------
-    packed : PackedLens
-    region : Region
-    tilt : float
-        From `incidence`.
-    part : float
-
-    Returns
-    -------
-    Region
-        Of the same light.
-    """
-    box, front = region.box, front_box(packed, tilt)
-    more = part * (box[1::2] - box[0::2])
-    low, high = np.maximum(box[0::2] - more, front[0::2]), np.minimum(box[1::2] + more, front[1::2])
-    wide = np.array([low[0], high[0], low[1], high[1]])
-    share = region.share * float(np.prod(box[1::2] - box[0::2]) / np.prod(high - low))
-    return replace(region, box=wide, share=share)
-
-
-def join_boxes(a: Floats, b: Floats) -> Floats:
-    """Return the box around two boxes of the pupil, each shape (4,): x0, x1, y0, y1."""
-    low, high = np.minimum(a[0::2], b[0::2]), np.maximum(a[1::2], b[1::2])
-    return np.array([low[0], high[0], low[1], high[1]])
-
-
-def _around(found: Floats, box: Floats, cells: tuple[int, int]) -> Floats:
-    """Widen a region to three times its size and by four cells of the scan that found it, within the scan's box."""
-    wide = max(found[1] - found[0], 4.0 * (box[1] - box[0]) / cells[0])
-    high = max(found[3] - found[2], 4.0 * (box[3] - box[2]) / cells[1])
-    grown = found + np.array([-wide, wide, -high, high])
-    return np.array([max(grown[0], box[0]), min(grown[1], box[1]), max(grown[2], box[2]), min(grown[3], box[3])])
-
-
-def _fitted(packed: PackedLens) -> list[int]:
-    """Choose the wavelengths that stand for all: the middle one, then the ends."""
-    last = len(packed.wavelengths_nm) - 1
-    return [last // 2, *(w for w in (0, last) if w != last // 2)]
-
-
-def _scan(
-    packed: PackedLens,
-    arguments: tuple[Any, ...],
-    box: Floats,
-    cells: tuple[int, int],
-    finest: tuple[float, float],
-) -> tuple[Floats, Floats, Floats]:
-    """Run the pre-pass over a box at one wavelength."""
-    found, sums, spots = find_box(*arguments, box, *cells, *finest)
-    if packed.halves == 1:
-        # the kernel counts every ray for its mirror image too
-        sums[:3] *= 0.5
-    return found, sums, spots
-
-
 def trace_grid(
     packed: PackedLens,
     path: LightPath,
@@ -408,7 +149,8 @@ def trace_grid(
     tolerance: float,
     scale: float,
     view_radius: float = float("inf"),
-    flux_tolerance: float = 3e-4,
+    flux_tolerance: float = FLUX_TOLERANCE,
+    rough: int = 0,
     fringe_px: float = 0.0,
     faint_radius: float = float("inf"),
     one_color: bool = False,
@@ -431,6 +173,9 @@ def trace_grid(
         What lies farther from the axis on the sensor, mm, is not refined.
     flux_tolerance : float
         Largest relative error of the bundle's flux from its rim.
+    rough : int
+        How often that may be doubled, of a ghost drawn in less detail; from once on, cells with a rim that looks
+        straight stay larger.
     fringe_px : float
         Largest error between the circles around and within the iris, pixels, where light fades there in fringes; 0
         where blades cut it.
@@ -443,12 +188,13 @@ def trace_grid(
     -------
     Bundle
     """
-    fitted = sorted(_fitted(packed)[: 1 if one_color else None])
+    fitted = sorted(wavelengths_fitted(packed)[: 1 if one_color else None])
     # the rim's error adds up along the rim of what passes, which may be little of the box
-    rim_tolerance = flux_tolerance * sqrt(region.share)
+    rim_tolerance = flux_tolerance * 2.0**rough * sqrt(region.share)
+    rim_level = RIM_LEVEL - 1 if rough else RIM_LEVEL
     pupil, data, triangles = build_mesh(
-        *_arguments(packed, fitted, path, tilt), path.stop_crossings, *iris,
-        region.box, *_cells(packed, GRID), MAX_LEVEL, tolerance, rim_tolerance, fringe_px,
+        *tracing_arguments(packed, fitted, path, tilt), path.stop_crossings, *iris,
+        region.box, *cells_across(packed, GRID), rim_level, MAX_LEVEL, tolerance, rim_tolerance, fringe_px,
         faint_radius, scale, view_radius,
     )  # fmt: skip
     return Bundle(path, pupil, triangles, dict(zip(fitted, data, strict=True)), packed.halves)
@@ -495,5 +241,5 @@ def trace_points(packed: PackedLens, w: int, path: LightPath, tilt: float, point
     """
     data = np.empty((len(points), STOP_X + 2 * path.stop_crossings))
     x, y = np.ascontiguousarray(points[:, 0]), np.ascontiguousarray(points[:, 1])
-    trace_nodes(*_arguments(packed, w, path, tilt), x, y, data)
+    trace_nodes(*tracing_arguments(packed, w, path, tilt), x, y, data)
     return data

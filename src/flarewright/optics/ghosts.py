@@ -16,11 +16,12 @@ from ..kernels.bundle import draw_bundle, measure_bundle, node_densities
 from ..kernels.raster import blank_plane, to_pixels
 from ..kernels.trace import ALIVE, REL, STOP_X, WEIGHT, X, Y
 from ..model import AsLens, CoatingChoice, Iris, Lens
-from .bundle import Bundle, Incidence, Region, find_region, incidence, trace_bundle, trace_grid, trace_points
+from .bundle import Bundle, Incidence, incidence, trace_bundle, trace_grid, trace_points
 from .iris import blade_edges
 from .pack import PackedLens, SensorMirror, facing, pack_lens, resolve_coatings
 from .paraxial import D_LINE_NM, FirstOrder, first_order, path_matrices
 from .paths import LightPath, direct_path, ghost_paths
+from .region import Region, find_region
 
 Floats = NDArray[np.float64]
 Mirror = int | Literal["sensor"]

@@ -12,9 +12,10 @@ from ..kernels.bundle import draw_bundle, measure_bundle, node_densities
 from ..kernels.raster import blank_plane, to_pixels
 from ..kernels.trace import ALIVE, REL, WEIGHT, X, Y
 from ..model import Lens
-from ..optics.bundle import Bundle, find_region, trace_bundle, trace_grid, trace_points
+from ..optics.bundle import Bundle, trace_bundle, trace_grid, trace_points
 from ..optics.paraxial import D_LINE_NM, path_matrices
 from ..optics.paths import direct_path
+from ..optics.region import find_region
 from .shot import Shot
 
 Floats = NDArray[np.float64]

@@ -21,9 +21,10 @@ from ..kernels.bundle import draw_bundle, measure_bundle, node_densities
 from ..kernels.trace import ALIVE, REL, STOP_X, X, Y
 from ..model import Quality
 from ..optics.border import points
-from ..optics.bundle import Bundle, Region, find_region, grown, measure_region, trace_bundle, trace_grid
+from ..optics.bundle import Bundle, trace_bundle, trace_grid
 from ..optics.grating import GratingOrder, grating_orders
 from ..optics.paths import LightPath
+from ..optics.region import Region, find_region, grown, measure_region
 from .art import PLAIN, Frame, PathArt
 from .canvas import DETAIL_CONTRAST, DETAILS, Canvas, Plane, blank, merge
 from .few_colors import gathered_weights
@@ -235,6 +236,7 @@ def draw_final(
     bundle = trace_grid(
         shot.packed, path, tilt, (opening.radius, opening.inner), item.region,
         tolerance=quality.tolerance_px, scale=scale, view_radius=item.view_radius, one_color=few and one_color,
+        rough=detail,
     )  # fmt: skip
     count = len(shot.packed.wavelengths_nm)
     bend = traced_bend(shot, path, bundle, item.to_pixels)

@@ -12,8 +12,8 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ..optics.bundle import front_box, join_boxes
 from ..optics.paths import LightPath
+from ..optics.region import front_box, join_boxes
 from .art import PLAIN, PathArt
 from .ghosts_final import FinalPass, find_entry, find_final
 from .shot import Shot

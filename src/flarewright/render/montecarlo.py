@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from ..kernels.montecarlo import BESIDE, ENTERED, IN_PICTURE, TALLIES, trace_batch
 from ..kernels.stray import STRAYS
 from ..optics.border import brightness, content, mapped, points, solid_angle
-from ..optics.bundle import front_box
 from ..optics.color import luminance_weights
+from ..optics.region import front_box
 from ..optics.scatter import ScatterTables
 from .camera_rays import CameraSource, run_camera
 from .shot import Shot, moved

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from ..kernels.bundle import measure_bundle
 from ..optics.border import content, mapped, points, rim
-from ..optics.bundle import find_region, trace_bundle, trace_grid
+from ..optics.bundle import trace_bundle, trace_grid
 from ..optics.paths import LightPath
+from ..optics.region import find_region
 from .ghosts_draft import draft_centre
 from .shot import Shot, moved
 
