@@ -19,7 +19,7 @@ class _Session:
 
 @pytest.mark.parametrize("possible", [True, False])
 def test_what_no_lens_can_do_is_told(project, monkeypatch, possible):
-    monkeypatch.setattr(solving, "compile_kernels", lambda: None)
+    monkeypatch.setattr(solving, "compile_kernels", lambda picture: None)
     monkeypatch.setattr(solving, "solve", lambda *_, **__: SimpleNamespace(searches=3, seconds=0.1))
     monkeypatch.setattr(solving, "outcomes", lambda *_, **__: ())
     wish = GhostWish(place_mm=1.0, radius_mm=1.0) if possible else GhostWish(at_mm=(0.0, 5.0), radius_mm=1.0)

@@ -14,10 +14,10 @@ from .freedom import alike
 from .genes import Measure
 from .hunt import Limits, Solution
 from .objective import diagonal_slope, fitness, fitness_thesis, own_objective
-from .picture import GAIN, grey_picture, psnr, psnr_with_gain, ssim
+from .picture import GAIN, OWN_STOP, grey_picture, psnr, psnr_with_gain, ssim
 from .prescription import Structure, structure_of, structures, vector_of
 from .scratch import random_wishes, scratch_project, wanted_picture
-from .search import STEPS, Candidate, Problem, polish
+from .search import STEPS, Candidate, Problem, finer, finest
 from .solvers import Choice, chosen, make_ready, solve_with
 from .target import problem_of
 from .trials import CASES, Trial
@@ -25,8 +25,6 @@ from .trials import CASES, Trial
 Floats = NDArray[np.float64]
 
 
-# stop diameter, mm, by which scattered ghosts are drawn: the thesis' for the Heliar
-SCRATCH_STOP = 4.5
 # points of a trace
 TOLD = 60
 
@@ -110,8 +108,8 @@ class Task:
         aim, gain = self.problem.objective, self.gain
         if self.lens is None:
             # wanted ghosts have no light of their own; a lens gets as much as makes a ghost of one size as bright
-            target = wanted_picture(aim, SCRATCH_STOP, ghosts=aim.wanted, gain=gain)
-            gain *= SCRATCH_STOP / float(vector[0]) * len(structure.pairs) / aim.wanted
+            target = wanted_picture(aim, OWN_STOP, ghosts=aim.wanted, gain=gain)
+            gain *= OWN_STOP / float(vector[0]) * len(structure.pairs) / aim.wanted
         else:
             target = grey_picture(*self.lens, self.slope, entrance=aim.entrance, blades=self.blades, gain=gain)
         found = grey_picture(structure, vector, self.slope, entrance=aim.entrance, blades=self.blades, gain=gain)
@@ -216,7 +214,8 @@ def _best(problem: Problem, solution: Solution, solver: Choice) -> Candidate:
     if solver.evolves:
         return solution.steps[-1].best
     assert solution.state.best is not None
-    return alike(problem, _finest(problem, solution.state.best), seed=solution.state.seed)[0]
+    fine = finer(problem)
+    return alike(fine, finest(fine, solution.state.best, 4 * STEPS), seed=solution.state.seed)[0]
 
 
 def _trace(problem: Problem, solution: Solution) -> tuple[TracePoint, ...]:
@@ -234,12 +233,6 @@ def _trace(problem: Problem, solution: Solution) -> tuple[TracePoint, ...]:
             )
         )  # fmt: skip
     return tuple(points)
-
-
-def _finest(problem: Problem, best: Candidate) -> Candidate:
-    """Polish the best a last time."""
-    polished = polish(problem, [(best.structure, best.x)], steps=4 * STEPS)[0]
-    return min(polished, best, key=lambda one: one.cost)
 
 
 def same_lens(one: Floats, other: Floats) -> bool:

@@ -21,7 +21,7 @@ from .objective import fitness, fitness_thesis, misfits
 from .prescription import Structure
 from .rims import clear_radii
 from .rounding import held_indices, rounded
-from .search import KEPT, SOLVED, Candidate, Problem, State, merge, polish
+from .search import KEPT, SOLVED, Candidate, Problem, State, finer, finest, merge
 
 Floats = NDArray[np.float64]
 
@@ -152,6 +152,7 @@ def outcomes(state: State, problem: Problem, *, count: int = 5, name: str = "Des
     tuple of Outcome
         Best first; distinct as lenses, not copies of one; what makes no image is left out.
     """
+    problem = finer(problem)
     pool = list(state.ended)
     for run in state.runs:
         pool = list(merge(pool, run.members, KEPT))
@@ -170,8 +171,7 @@ def outcomes(state: State, problem: Problem, *, count: int = 5, name: str = "Des
             break
         if any(_same(one, other) for other in chosen):
             continue
-        fine = polish(problem, [(one.structure, one.x)], steps=POLISHING_STEPS)[0]
-        fine = to_the_middle(problem, min(fine, one, key=lambda each: each.cost))
+        fine = to_the_middle(problem, finest(problem, one, POLISHING_STEPS))
         if any(_same(fine, other) for other in chosen):
             continue
         outcome = _outcome(fine, problem, name, iris)

@@ -120,7 +120,7 @@ def without_ghosts(problem: Problem, *, searches: int = 96, seed: int = 0) -> tu
         By how much the nearest lens breaks them; empty when one keeps them. That there is none is not proven.
     """
     aim = problem.objective
-    free = stiff(replace(problem, objective=replace(aim, weights=np.zeros_like(aim.weights), extra=0.0)))
+    free = stiff(replace(problem, objective=replace(aim, weights=np.zeros_like(aim.weights), extra=0.0, picture=None)))
     random, found = np.random.default_rng(seed), []
     chosen = problem.structures[:: max(1, len(problem.structures) // 12)][:12]
     for structure in chosen:

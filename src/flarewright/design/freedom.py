@@ -157,7 +157,7 @@ def _with_signs(problem: Problem, solved: Candidate) -> Objective:
     radii = evaluate(structure, vector[None], aim.entrance)[0][[at[pair] for pair in ghosts], columns.RADIUS]
     targets = aim.targets.copy()
     targets[:, 1] = np.copysign(targets[:, 1], radii)
-    return replace(aim, targets=targets, signed=True)
+    return replace(aim, targets=targets, signed=True, picture=None)
 
 
 def _off_middle(known: Variables, z: Floats) -> Floats:

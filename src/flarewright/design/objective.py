@@ -13,6 +13,7 @@ from ..kernels.design_cost import irradiance_of_ghosts
 from ..kernels.design_fitness import HIDDEN, sorted_misfit
 from ..kernels.design_match import match
 from ..model.design import Bounds
+from .canvas import Canvas
 from .ghosts import evaluate
 from .prescription import Structure
 from .rims import STEEPEST
@@ -53,6 +54,8 @@ class Objective:
         What each target is, for reports.
     extra_part : float
         Part of `extra` that the search charges, which has no unit of mm^2 where its weights are relative.
+    picture : Canvas or None
+        What a search makes least is the error of this picture, once it is near; None: of places and sizes.
     """
 
     slopes: Floats
@@ -65,6 +68,7 @@ class Objective:
     wishes: Floats
     names: tuple[str, ...]
     extra_part: float = 1.0
+    picture: Canvas | None = None
 
     @property
     def wanted(self) -> int:

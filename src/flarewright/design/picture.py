@@ -20,6 +20,8 @@ HALF_FRAME = 23.3
 # as it says, 20.0 and 24.5 dB for the Heliar
 GAIN = 1.1
 DIAGONAL = (0.5**0.5, 0.5**0.5)
+# stop diameter, mm, by which ghosts of no lens are drawn: the thesis' for the Heliar
+OWN_STOP = 4.5
 
 
 def grey_picture(
@@ -67,6 +69,11 @@ def grey_picture(
     shapes = np.where(values[:, columns.BOUND] == 0.0, blades, 0)
     picture = disc_picture(values[:, columns.PLACE] * slope, radii, light, DIAGONAL, HALF_FRAME, SIDE, shapes)
     return picture[..., 0] if colors is None else picture
+
+
+def light_of_ghosts(count: int, stop_diameter: float = OWN_STOP, gain: float = GAIN) -> float:
+    """Return the level of a grey ghost times its radius, mm, when so many share the light (see `grey_picture`)."""
+    return gain * 2.0 / count * 0.5 * stop_diameter
 
 
 def disc_picture(

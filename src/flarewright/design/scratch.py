@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from ..model import Camera, Light, Project
 from ..model.design import Bounds, Design, GhostWish
 from .objective import Objective
-from .picture import DIAGONAL, GAIN, HALF_FRAME, SIDE, disc_picture
+from .picture import DIAGONAL, GAIN, HALF_FRAME, SIDE, disc_picture, light_of_ghosts
 
 
 def random_wishes(count: int, seed: int) -> tuple[GhostWish, ...]:
@@ -51,6 +51,7 @@ def scratch_project(
     stop_diameter : float, optional
         mm; None: free.
     signed : bool
+        False: the picture counts in the end.
 
     Returns
     -------
@@ -58,7 +59,10 @@ def scratch_project(
         The lens in it stands for its place only.
     """
     bounds = Bounds() if stop_diameter is None else Bounds(stop_diameter=(stop_diameter, stop_diameter))
-    design = Design(own_ghosts=False, wishes=wishes, surfaces=surfaces, bounds=bounds, signed=signed)
+    design = Design(
+        own_ghosts=False, wishes=wishes, surfaces=surfaces, bounds=bounds, signed=signed,
+        judge="ghosts" if signed else "picture",
+    )  # fmt: skip
     light = Light(field_deg=field_deg)
     camera = Camera(size_px=(640, 640), sensor_mm=(2.0 * HALF_FRAME, 2.0 * HALF_FRAME))
     return Project(lens="heliar-tronnier", lights=(light,), design=design, camera=camera)
@@ -82,6 +86,6 @@ def wanted_picture(aim: Objective, stop_diameter: float, *, ghosts: int, gain: f
     ndarray, shape (512, 512)
     """
     radii = aim.targets[:, 1]
-    light = gain * 2.0 / ghosts * 0.5 * stop_diameter / np.abs(radii)
+    light = light_of_ghosts(ghosts, stop_diameter, gain) / np.abs(radii)
     shapes = np.full(len(radii), 6)
     return disc_picture(aim.targets[:, 0], radii, light[:, None], DIAGONAL, HALF_FRAME, SIDE, shapes)[..., 0]

@@ -21,9 +21,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ProjectError
+from ..kernels.design_picture import polish_by_picture
 from ..kernels.design_search import polish_many
 from ..model import Medium
 from ..model.design import Bounds
+from .canvas import canvas
 from .glass_list import GlassList
 from .objective import Objective
 from .prescription import Structure
@@ -44,6 +46,8 @@ ENOUGH = 1e-18
 SOLVED = 1e-14
 # more structures than this are not gone through one by one
 FEW = 24
+# one run in so many begins with them
+HEIRS = 3
 # best lenses remembered of runs that ended
 KEPT = 60
 
@@ -229,7 +233,9 @@ def _done(state: State, most_searches: int | None) -> bool:
 def _with_new_runs(state: State, problem: Problem) -> State:
     runs, number = list(state.runs), state.next_run
     while len(runs) < ACTIVE:
-        runs.append(Run(number, _home(number, state, problem)))
+        heirs = _heirs(number, state)
+        known = FIRST if heirs else 0
+        runs.append(Run(number, _home(number, state, problem), heirs, searches=known, best_at=known))
         number += 1
     return replace(state, runs=tuple(runs), next_run=number)
 
@@ -246,6 +252,14 @@ def _home(number: int, state: State, problem: Problem) -> Structure:
         chosen = state.ended[min(int(random.exponential(2.0)), len(state.ended) - 1)].structure
         return chosen if count <= FEW else neighbour(chosen, random)
     return problem.structures[int(random.integers(count))]
+
+
+def _heirs(number: int, state: State) -> tuple[Candidate, ...]:
+    """Return what a run begins with: for one in a few half of the best of those that ended, drawn by chance."""
+    if number % HEIRS or len(state.ended) < KEPT:
+        return ()
+    random = np.random.default_rng([state.seed, 4, number])
+    return merge((), [one for one in state.ended if random.random() < 0.5], POOL)
 
 
 def _without_stale_runs(state: State, problem: Problem) -> State:
@@ -288,7 +302,9 @@ def advance(run: Run, problem: Problem, seed: int) -> Run:
     starts = _first_points(run, problem, known, random, count) if first else [
         propose(run.members, problem, random) for _ in range(count)
     ]  # fmt: skip
-    found = polish(problem, starts)
+    # what is twice as bad as the worst of a full pool is not worth a closer look
+    worth = 2.0 * run.members[-1].cost if len(run.members) == POOL else np.inf
+    found = polish(problem, starts, worth=worth)
     members = merge(run.members, found, POOL)
     better = not run.members or members[0].cost < 0.999 * run.members[0].cost
     searches = run.searches + count
@@ -366,7 +382,7 @@ def neighbour(structure: Structure, random: np.random.Generator) -> Structure:
 
 def polish(
     problem: Problem, starts: Sequence[tuple[Structure, Floats]], *, objective: Objective | None = None,
-    steps: int = STEPS,
+    steps: int = STEPS, worth: float = np.inf,
 ) -> list[Candidate]:  # fmt: skip
     """Run a local search from each of several points.
 
@@ -377,11 +393,14 @@ def polish(
     objective : Objective, optional
         None: the problem's.
     steps : int
+    worth : float
+        Where the picture counts: a lens that costs more before its picture is polished stays as it is.
 
     Returns
     -------
     list of Candidate
-        In the same order; inside the bounds whatever the points were.
+        In the same order; inside the bounds whatever the points were. Where the picture counts, places and sizes are
+        polished first, for a picture does not feel a ghost that is far off; one that meets them all is kept so.
     """
     aim = problem.objective if objective is None else objective
     groups: dict[Structure, list[int]] = {}
@@ -389,14 +408,20 @@ def polish(
         groups.setdefault(structure, []).append(k)
     found: dict[int, Candidate] = {}
     for structure, which in groups.items():
+        known = problem.variables(structure)
         points = np.array([starts[k][1] for k in which])
-        ends, costs = polish_within(problem.variables(structure), points, aim, steps)
+        ends, costs = polish_within(known, points, replace(aim, picture=None), steps)
+        near = np.flatnonzero((costs > SOLVED) & np.isfinite(costs))
+        if aim.picture is not None and near.size:
+            ends[near], costs[near] = polish_within(known, ends[near], aim, steps // 2, worth=worth)
         found.update((k, Candidate(float(costs[m]), structure, ends[m])) for m, k in enumerate(which))
     return [found[k] for k in range(len(starts))]
 
 
-def polish_within(known: Variables, points: Floats, aim: Objective, steps: int = STEPS) -> tuple[Floats, Floats]:
-    """Run a local search from each of several points of one structure.
+def polish_within(
+    known: Variables, points: Floats, aim: Objective, steps: int = STEPS, *, worth: float = np.inf
+) -> tuple[Floats, Floats]:
+    """Run a local search from each of several points of one structure, by the picture where that counts.
 
     Parameters
     ----------
@@ -406,6 +431,8 @@ def polish_within(known: Variables, points: Floats, aim: Objective, steps: int =
     aim : Objective
     steps : int
         0: only the cost is wanted.
+    worth : float
+        Where the picture counts: a point that costs more stays where it is.
 
     Returns
     -------
@@ -414,6 +441,14 @@ def polish_within(known: Variables, points: Floats, aim: Objective, steps: int =
     """
     structure = known.structure
     ends, costs = np.empty_like(points), np.empty(len(points))
+    picture = aim.picture
+    if picture is not None:
+        polish_by_picture(
+            points, structure.stop, structure.mirrors, aim.entrance, known.low, known.high, known.free, known.longest,
+            aim.slopes, aim.wishes, picture.light, picture.unit, picture.edges, picture.rows, picture.limits,
+            picture.start, picture.pixel, picture.wanted, steps, worth, ends, costs,
+        )  # fmt: skip
+        return ends, costs
     matches = np.empty((len(points), len(aim.targets)), np.int64)
     polish_many(
         points, structure.stop, structure.mirrors, aim.entrance, known.low, known.high, known.free, known.longest,
@@ -444,14 +479,47 @@ def merge(members: Sequence[Candidate], found: Sequence[Candidate], most: int) -
     return tuple(out[:most])
 
 
-@lru_cache(maxsize=1)
-def compile_kernels() -> None:
-    """Compile what a search calls, so that its time is spent searching."""
+def finer(problem: Problem) -> Problem:
+    """Return the problem for the last steps: with a finer picture, where the picture counts."""
+    picture = problem.objective.picture
+    if picture is None or picture.fine is None:
+        return problem
+    return replace(problem, objective=replace(problem.objective, picture=picture.fine))
+
+
+def finest(problem: Problem, one: Candidate, steps: int) -> Candidate:
+    """Polish a lens a last time.
+
+    Parameters
+    ----------
+    problem : Problem
+        `finer` than that of the search.
+    one : Candidate
+    steps : int
+
+    Returns
+    -------
+    Candidate
+        Its cost is that of the finer picture, where the picture counts.
+    """
+    aim = problem.objective
+    if aim.picture is None or one.cost <= SOLVED:
+        return min(polish(problem, [(one.structure, one.x)], steps=steps)[0], one, key=lambda each: each.cost)
+    ends, costs = polish_within(problem.variables(one.structure), one.x[None], aim, steps)
+    return Candidate(float(costs[0]), one.structure, ends[0])
+
+
+@lru_cache(maxsize=2)
+def compile_kernels(picture: bool = False) -> None:
+    """Compile what a search calls, so that its time is spent searching; `picture`: for one by the picture."""
     structure = Structure(2, (True, False, False, True, False))
     aim = Objective(
-        np.array([0.1]), np.array([0, 1]), np.zeros((1, 3)), np.ones((1, 3)), True, 0.0, 100.0,
+        np.array([0.1]), np.array([0, 1]), np.ones((1, 3)), np.ones((1, 3)), True, 0.0, 100.0,
         np.array([[0.0, 1.0, 1.0], [0.0, 9.0, 1.0], [0.0, 1e9, 0.0], [0.1, 0.9, 5.0]]), ("",),
     )  # fmt: skip
+    if picture:
+        wanted = canvas(aim.targets, aim.spans, [(1.0, 0.0)], light=1.0, half_frame=(20.0, 20.0), blades=6)
+        aim = replace(aim, picture=wanted)
     problem = Problem(aim, (structure,), Bounds())
     start = problem.variables(structure).random_points(np.random.default_rng(0), 1)[0]
     polish(problem, [(structure, start)], steps=1)

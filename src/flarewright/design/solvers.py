@@ -176,7 +176,7 @@ def _hunted(choice: Choice, genes: Genes, seed: int, limits: Limits) -> Solution
 
 def make_ready(choice: Choice, problem: Problem, measure: Measure = "ours") -> None:
     """Compile what a solver calls, so that its time is spent searching."""
-    compile_kernels()
+    compile_kernels(problem.objective.picture is not None)
     if choice.evolves:
         genes = genes_of(problem, measure)
         start = np.full((1, genes.count), 0.5)

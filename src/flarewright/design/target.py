@@ -12,9 +12,11 @@ from ..errors import ProjectError
 from ..model import Project, Stop
 from ..model.design import Design, GhostWish
 from ..render.prepare import Settled, settle
+from .canvas import Canvas, canvas
 from .glass_list import glass_list
 from .impossible import on_the_line
 from .objective import Objective, own_objective, relative_weights
+from .picture import light_of_ghosts
 from .prescription import Structure, structure_of, structures, surfaces_for, vector_of
 from .search import Problem
 
@@ -55,6 +57,8 @@ def problem_of(project: Project) -> tuple[Problem, Settled]:
     objective = with_wishes(own, design, structure)
     if len(objective.targets) == 0 or objective.wanted == 0:
         raise ProjectError("no ghost is wanted; leave some of the lens' own, or wish for new ones")
+    if design.judge == "picture":
+        objective = replace(objective, picture=_picture(project, objective, settled.lens.iris.blades))
     found = _structures(design, structure, objective)
     changed = bool(design.wishes) and design.own_ghosts
     bounds, glasses = design.bounds, None
@@ -69,6 +73,20 @@ def problem_of(project: Project) -> tuple[Problem, Settled]:
         fixed_media=tuple(None if isinstance(row, Stop) else row.medium for row in settled.lens.rows),
         traced=design.quality == "final",
     ), settled  # fmt: skip
+
+
+def _picture(project: Project, objective: Objective, blades: int) -> Canvas:
+    """Draw the wanted ghosts as the thesis' grey picture shows them, in the frame of the project's camera."""
+    directions = []
+    for light in project.lights:
+        x, y = (tan(radians(angle)) for angle in light.field_deg)
+        directions.append((x / hypot(x, y), y / hypot(x, y)))
+    width, height = project.camera.sensor
+    drawn = np.asarray((objective.weights[:, :2] > 0.0).all(axis=1))
+    return canvas(
+        objective.targets, objective.spans, directions, light=light_of_ghosts(objective.wanted),
+        half_frame=(0.5 * width, 0.5 * height), blades=blades, drawn=drawn,
+    )  # fmt: skip
 
 
 def _structures(design: Design, own: Structure, objective: Objective) -> tuple[Structure, ...]:

@@ -123,7 +123,7 @@ class Solver:
         self._thread.start()
 
     def _search(self, project: Project, problem: Problem, name: str, seconds: float, exposure_stops: float) -> None:
-        compile_kernels()
+        compile_kernels(problem.objective.picture is not None)
         looked = 0.0
 
         def look(state: State) -> None:

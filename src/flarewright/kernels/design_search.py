@@ -144,6 +144,16 @@ def fill_system(
                     r = np.sqrt(extra / abs(radius))
                     _row(system, r, m, -0.5 * r / radius, jacobian[1, g], free, scale)
                     m += 1
+    return fill_wish_rows(
+        q, rows, stop, entrance, wishes, wished, free, scale, work, beam, trail, partial, row, system, m
+    )
+
+
+@inner
+def fill_wish_rows(
+    q, rows, stop, entrance, wishes, wished, free, scale, work, beam, trail, partial, row, system, m
+):  # fmt: skip
+    """Add what is off the wishes and its derivatives from row `m` of a system on; return how many rows it has then."""
     wish_values(q, rows, stop, entrance, work, wishes, beam, wished)
     for wish in range(WISHES):
         if wished[wish] != 0.0:
@@ -285,7 +295,7 @@ def polish_many(
     size, count, lights = starts.shape[1], targets.shape[0], slopes.size
     rows = (size - 1) // 3
     logs = 1 + rows
-    most = _ghosts(stop, rows, mirrors)
+    most = ghosts_of_structure(stop, rows, mirrors)
     work, trail, partial = np.empty((WORK_ROWS, rows)), np.empty(TRAIL * rows), np.zeros((4, rows))
     common, jacobian = np.empty((6, size)), np.empty((3, most, size))
     values, light, light_by = np.empty((most, COLUMNS)), np.zeros(most), np.zeros((most, size))
@@ -390,7 +400,7 @@ def polish_many(
 
 
 @inner
-def _ghosts(stop, rows, mirrors):
+def ghosts_of_structure(stop, rows, mirrors):
     """Count the pairs of mirrors on one side of the stop."""
     front, rear = 0, 0
     for k in range(rows):

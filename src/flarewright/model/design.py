@@ -162,6 +162,9 @@ class Design(Frozen):
         Empty: any index within the bounds. A single name may stand without a list.
     quality : {"draft", "final"}
         draft: ghosts to first order; final: lenses that were found are finished with traced rays.
+    judge : {"ghosts", "picture"}
+        ghosts: places and sizes count; picture: once they are near, the error of a grey picture, each ghost as bright
+        as one over its radius.
     bounds : Bounds
     """
 
@@ -177,6 +180,7 @@ class Design(Frozen):
     entrance: float = Field(100.0, gt=0.0, le=10000.0)
     glasses: Names = ()
     quality: Literal["draft", "final"] = "draft"
+    judge: Literal["ghosts", "picture"] = "ghosts"
     bounds: Bounds = Bounds()
 
     @field_validator("glasses", mode="before")
@@ -190,4 +194,16 @@ class Design(Frozen):
             raise ValueError('fixed_rows need structure = "lens", for only then rows keep their place')
         if not self.own_ghosts and not any(wish.ghost is None for wish in self.wishes):
             raise ValueError("own_ghosts is false and no new ghost is wished for, so there is nothing to aim at")
+        return self
+
+    @model_validator(mode="after")
+    def _a_picture_can_judge(self) -> Design:
+        if self.judge == "picture":
+            if self.signed:
+                raise ValueError('judge = "picture" needs signed = false, for few pictures show which end is up')
+            if self.brightness == "fresnel" or any(wish.action == "ignore" for wish in self.wishes):
+                raise ValueError(
+                    'judge = "picture" draws every ghost, as bright as it is small; leave out brightness = "fresnel" '
+                    "and ghosts to ignore"
+                )
         return self
