@@ -241,11 +241,15 @@ def _pattern(
         # of a cycle per pixel the softness is safely divided out (isotropic to second order), beyond it is not known.
         finest = min(mask.pixels.shape) / span
         trusted = min(CORE_REACH, max(8.0, finest / 8.0))
-        radius = np.minimum(np.hypot(s, s[:, None]), 2.0 * trusted)
-        P /= np.sinc(spacing * radius) ** 2 * np.sinc(2.0 * radius / max(finest, 64.0)) ** 6
+        # one quadrant has all radii
+        radius = np.hypot(s[reach:], s[reach:, None])
+        inside = np.minimum(radius, 2.0 * trusted)
+        sharper = 1.0 / (np.sinc(spacing * inside) ** 2 * np.sinc(2.0 * inside / max(finest, 64.0)) ** 6)
+        mirrored = np.abs(np.arange(-reach, reach + 1))
+        P *= sharper[mirrored[:, None], mirrored]
         wings = _measured_fans(P, s, trusted)
         flux_outside = 2.0 * math.pi * wings.angular.mean() / trusted
-        total = P[np.hypot(s, s[:, None]) <= trusted].sum() / WINDOW**2 + flux_outside
+        total = P[(radius <= trusted)[mirrored[:, None], mirrored]].sum() / WINDOW**2 + flux_outside
         P /= total
         wings = FanWings(wings.angular / total)
     veil: Veil = ()

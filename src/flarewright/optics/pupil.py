@@ -191,7 +191,24 @@ def _noise(rng: np.random.Generator, length: float, reach: float, periodic: bool
 
 def _image(iris: Iris, picture: Picture, span: float, at: Floats, spacing: float) -> Floats:
     """Mean of 3 x 3 bilinear samples: the image may be finer than the grid."""
+    if iris.rotation_deg % 90.0 == 0.0:
+        return _upright(np.rot90(picture.pixels, round(iris.rotation_deg / 90.0)), at / span, spacing / span)
     fine = (at[:, None] + np.array([-1.0, 0.0, 1.0]) * spacing / 3.0).ravel()
     light = transmission(iris, span, fine, fine[:, None], mask=picture.pixels)
     mean: Floats = light.reshape(len(at), 3, len(at), 3).mean(axis=(1, 3))
     return mean
+
+
+def _upright(pixels: NDArray[np.floating], at: Floats, spacing: float) -> Floats:
+    """Sample an image over [-1, 1] squared as `_image` does, one axis after the other."""
+    light = np.pad(np.asarray(pixels, dtype=np.float64), 1)
+    for rising in (-1.0, 1.0):
+        side = light.shape[0] - 2
+        total = np.zeros((len(at), light.shape[1]))
+        for shift in (-1.0, 0.0, 1.0):
+            place = np.clip(0.5 * (rising * (at + shift * spacing / 3.0) + 1.0) * side + 0.5, 0.0, side + 1.0)
+            low = np.minimum(place.astype(np.intp), side)
+            part = ((place - low) / 3.0)[:, None]
+            total += (1.0 / 3.0 - part) * light[low] + part * light[low + 1]
+        light = np.ascontiguousarray(total.T)
+    return light
