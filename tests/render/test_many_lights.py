@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 
 from flarewright.kernels.bundle import measure_bundle
-from flarewright.model import D65, Camera, Iris, Light, Output, Project, Quality
+from flarewright.model import D65, BlackBody, Camera, Dirt, Iris, Light, Lines, Output, Project, Quality
 from flarewright.optics.bundle import trace_bundle, trace_grid
-from flarewright.optics.diffraction import pupil_pattern
+from flarewright.optics.diffraction import Soil, pupil_pattern
 from flarewright.optics.paths import ghost_paths
 from flarewright.optics.spectrum import band_weights
-from flarewright.render import looking
+from flarewright.render import looking, moved_wings
 from flarewright.render.few_colors import gathered_weights
+from flarewright.render.few_spectra import few_spectra
 from flarewright.render.many_stars import Stars, draw_stars
 from flarewright.render.path_color import seen_of
 from flarewright.render.prepare import settle
@@ -105,6 +106,88 @@ def test_stars_laid_together_are_stars_drawn_one_by_one(iris):
     off = np.abs(together - alone) / alone
     assert np.quantile(off, 0.99) < 0.02
     assert np.median(off) < 2e-3
+
+
+@pytest.mark.parametrize(
+    ("iris", "mask", "soil"),
+    [
+        (Iris(blades=6, rounding=0.5, rotation_deg=7.0), None, None),
+        (Iris(blades=6, roughness_um=20.0), None, None),
+        (Iris(), np.kron([[0.0, 1.0], [1.0, 1.0]], np.ones((40, 40))), None),
+        (Iris(blades=7), None, Soil(Dirt(dust_per_mm2=2.0, scratches_per_cm2=20.0))),
+    ],
+    ids=["rounded", "rough", "mask", "dirt"],
+)
+@pytest.mark.parametrize("draft", [False, True])
+def test_whatever_shapes_the_iris_its_stars_are_laid_together(iris, mask, soil, draft):
+    wave = np.arange(380.0, 781.0, 5.0)
+    weights = band_weights(D65(), wave, "rec709")
+    pattern = pupil_pattern(iris, mask, radius_mm=5.0, soil=soil)
+    pixel, size = (0.05, 0.06), (150, 100)
+    # within, on the border, beside, and so far outside that it is drawn by itself
+    centres = np.array([[75.3, 40.8], [0.2, 99.3], [-30.0, 15.5], [111.5, 10.0], [90.25, -120.5]])
+    gains = np.array([[1.0, 1.0, 1.0], [0.5, 0.7, 0.9], [3.0, 3.0, 3.0], [0.1, 0.1, 0.1], [2.0, 1.0, 1.0]])
+    together = draw_stars(Stars(pattern, 8.0, wave, weights, centres, gains), pixel, size, draft=draft, threads=2)
+    alone = np.zeros((size[1], size[0], 3))
+    for (x, y), gain in zip(centres, gains, strict=True):
+        alone += starburst_layer(iris, 8.0, pixel, size, (x, y), wave, weights * gain, pattern=pattern)
+    assert together.sum(axis=(0, 1)) == pytest.approx(alone.sum(axis=(0, 1)), rel=1e-3)
+    # spikes get wider by a fraction of a pixel
+    assert np.abs(together - alone).sum() < (5e-3 if draft else 3e-3) * np.abs(alone).sum()
+    assert np.median(np.abs(together - alone) / np.abs(alone)) < (0.05 if draft else 0.02)
+    # of the light that is far from every centre too
+    far = np.ones(size[::-1], dtype=bool)
+    y, x = np.indices(far.shape) + 0.5
+    for column, row in centres:
+        far &= np.hypot(x - column, y - row) > 25.0
+    assert together[far].sum(axis=0) == pytest.approx(alone[far].sum(axis=0), rel=1e-2)
+    assert np.abs(together - alone)[far].sum() < (0.25 if draft else 0.1) * np.abs(alone[far]).sum()
+
+
+def test_a_sheet_in_parts_is_the_whole_sheet(monkeypatch):
+    wave = np.arange(380.0, 781.0, 20.0)
+    stars = Stars(
+        pupil_pattern(Iris(blades=6, rounding=0.5)), 8.0, wave, band_weights(D65(), wave, "rec709"),
+        np.array([[20.3, 190.8], [70.0, 3.0], [41.0, 300.9]]), np.ones((3, 3)),
+    )  # fmt: skip
+    whole = draw_stars(stars, (0.05, 0.05), (80, 260), draft=False, threads=2)
+    monkeypatch.setattr(moved_wings, "HELD_BYTES", 1)
+    np.testing.assert_allclose(draw_stars(stars, (0.05, 0.05), (80, 260), draft=False, threads=2), whole, rtol=1e-5)
+
+
+def test_few_spectra_stand_for_many():
+    wave = np.arange(380.0, 781.0, 5.0)
+    rng = np.random.default_rng(2)
+    lights = [BlackBody(temperature_k=t) for t in rng.uniform(2000.0, 9000.0, 30)]
+    lights += [Lines(lines=((450.0, 1.0), (620.0, 2.0)))]
+    power = rng.uniform(0.1, 9.0, len(lights))
+    colors = np.array([p * band_weights(light, wave, "rec709") for p, light in zip(power, lights, strict=True)])
+    colors[-1] = 0.0
+    colors[-1, 14], colors[-1, 48] = (0.3, -0.1, 2.0), (1.5, 0.4, 0.01)
+    chosen, gains, fits = few_spectra(colors, 9)
+    assert 2 <= len(chosen) <= 6
+    assert fits.all()
+    made = np.einsum("lkc,kmc->lmc", gains, colors[chosen])
+    assert made.sum(axis=1) == pytest.approx(colors.sum(axis=1), rel=1e-4)
+    assert (np.abs(made - colors).sum(axis=(1, 2)) <= 0.0201 * np.abs(colors).sum(axis=(1, 2))).all()
+    # where too few are allowed, whom they do not fit is told
+    _, _, fits = few_spectra(colors, 1)
+    assert 0 < fits.sum() < len(lights)
+
+
+@pytest.mark.parametrize("mode", ["final", "draft"])
+def test_lights_of_many_spectra_are_the_sum_of_single_ones(mode):
+    rng = np.random.default_rng(5)
+    lights = tuple(
+        light.replace(spectrum=BlackBody(temperature_k=float(t)))
+        for light, t in zip(many(16), rng.uniform(2000.0, 9000.0, 16), strict=True)
+    )
+    lights += (Light(field_deg=(3.0, 2.0), spectrum=Lines(lines=((589.0, 1.0),))),)
+    scene = project(lights, mode).replace(iris=Iris(blades=6, rounding=0.3))
+    together = pictures(render(scene))["starburst"]
+    alone = np.sum([pictures(render(scene.replace(lights=(light,))))["starburst"] for light in lights], axis=0)
+    assert together.sum(axis=(0, 1)) == pytest.approx(alone.sum(axis=(0, 1)), rel=2e-3)
+    assert np.abs(together - alone).sum() < 0.02 * np.abs(alone).sum()
 
 
 def _shots(lights):

@@ -1,7 +1,7 @@
 """Wings of many equal starbursts on one picture: sharp along the spikes and around the centres, coarse elsewhere.
 
 A partition of unity divides each starburst: near its centre and along its spikes it is evaluated pixel by pixel, away
-from both it is so smooth that few samples tell it.
+from both it is so smooth that few samples tell it. Where no closed form tells what is smooth, a drawn one is moved.
 """
 
 from __future__ import annotations
@@ -219,3 +219,76 @@ def add_sharp_wings(
                         share *= far
                         for c in range(3):
                             out[i, j, c] += share * gains[m, c] * tail[c]
+
+
+@compiled
+def add_moved(
+    sheets: NDArray[np.float32], first: int, left: int, rows: int, centres: Floats, gains: Floats,
+    windows: NDArray[np.int64], first_row: int, out: NDArray[np.float32],
+) -> None:  # fmt: skip
+    """Add a drawn starburst, or some rows of it, at many places, interpolated linearly.
+
+    Parameters
+    ----------
+    sheets : (N, N, 3, S, T) float32
+        Irradiance at places 1 / N of a pixel apart from each other, down and across, in each of them pixels apart.
+    first, left : int
+        Pixels from the centre to the middle of the first sheet's first row and column.
+    rows : int
+        They stand for those rows of the picture that begin in one of so many of their rows.
+    centres : (L, 2) float64
+        Columns and rows of the picture; the sheets hold all that each light sees.
+    gains : (L, 3) float64
+        Multiply each starburst's channels.
+    windows : (L, 4) int64
+        As in `add_sharp_wings`.
+    first_row : int
+        Row of the picture at which `out` begins.
+    out : (H, W, 3) float32
+        Added to.
+    """
+    height, width, parts = out.shape[0], out.shape[1], sheets.shape[0]
+    total = np.empty((3, width), np.float32)
+    for i in range(height):
+        row, lit = i + first_row, False
+        for m in range(centres.shape[0]):
+            r, y, lower = _phase(row + 0.5 - centres[m, 1] - first, parts)
+            if r < 0 or r >= rows or r + 1 >= sheets.shape[3]:
+                continue
+            if not lit:
+                total[:, :] = np.float32(0.0)
+                lit = True
+            c, x, right = _phase(0.5 - centres[m, 0] - left, parts)
+            # of the next phase, which may be the first one of the next pixel
+            q, d, below, beside = r, c, y + 1, x + 1
+            if below == parts:
+                q, below = r + 1, np.int64(0)
+            if beside == parts:
+                d, beside = c + 1, np.int64(0)
+            inside = windows[m, 2] <= row < windows[m, 3]
+            hole = min(max(windows[m, 0], 0), width) if inside else np.int64(width)
+            shut = min(max(windows[m, 1], 0), width) if inside else np.int64(width)
+            for k in range(3):
+                gain = gains[m, k]
+                w0, w1 = np.float32(gain * (1.0 - lower) * (1.0 - right)), np.float32(gain * (1.0 - lower) * right)
+                w2, w3 = np.float32(gain * lower * (1.0 - right)), np.float32(gain * lower * right)
+                one, two = sheets[y, x, k, r, c : c + width], sheets[y, beside, k, r, d : d + width]
+                three, four = sheets[below, x, k, q, c : c + width], sheets[below, beside, k, q, d : d + width]
+                sums = total[k]
+                for j in range(hole):
+                    sums[j] += w0 * one[j] + w1 * two[j] + w2 * three[j] + w3 * four[j]
+                for j in range(shut, width):
+                    sums[j] += w0 * one[j] + w1 * two[j] + w2 * three[j] + w3 * four[j]
+        if lit:
+            for j in range(width):
+                for k in range(3):
+                    out[i, j, k] += total[k, j]
+
+
+@inner
+def _phase(at, parts):
+    """Divide a place into whole pixels, whole parts of one, and the rest of a part."""
+    whole = math.floor(at)
+    fine = (at - whole) * parts
+    part = min(math.floor(fine), parts - 1.0)
+    return int(whole), int(part), fine - part

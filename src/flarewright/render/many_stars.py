@@ -1,15 +1,14 @@
 """Starbursts of many lights: one pattern, drawn once finely, and laid around every direct image.
 
 Around each centre a summed-area table of the pattern gives every pixel its flux, wherever within its pixel the centre
-is; beyond, the wings of all lights are added sharply where they are sharp and coarsely where they are smooth
-(`kernels.many_wings`).
+is. Beyond, the wings of round and of straight-bladed irises are added sharply where they are sharp and coarsely where
+they are smooth (`kernels.many_wings`); those of any other are drawn once, with room for every light's view of them, and
+moved about (`render.moved_wings`).
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +16,7 @@ from numpy.typing import NDArray
 
 from ..kernels import many_wings as kernel
 from ..optics.diffraction import BladeWings, FanWings, Pattern, SpikeProfile, spike_profile
+from .moved_wings import BAND, add_moved_wings, each
 from .starburst import NEAR_PIXELS, Painter, painter_of
 
 Floats = NDArray[np.float64]
@@ -31,10 +31,7 @@ COARSE = 4
 SPIKE_PX, DISC_PX = (4.0, 24.0), 24.0
 # where a spike's profile is its tail to this part
 SAME_AS_TAIL = 0.01
-# rows drawn by one task
-BAND = 64
-
-__all__ = ["Stars", "draw_stars", "fits"]
+__all__ = ["Stars", "draw_stars"]
 
 
 @dataclass(frozen=True)
@@ -63,8 +60,8 @@ class Stars:
     gains: Floats
 
 
-def fits(pattern: Pattern) -> bool:
-    """Tell whether a pattern is one that `draw_stars` draws: of a clean iris, round or of smooth, straight blades."""
+def _plain(pattern: Pattern) -> bool:
+    """Tell whether a pattern is of a clean iris, round or of smooth, straight blades."""
     wings = pattern.wings
     plain = wings.half_fan == 0.0 if isinstance(wings, BladeWings) else len(wings.angular) == 1
     return plain and not pattern.veil and pattern.rough_half_fan == 0.0
@@ -95,25 +92,30 @@ def draw_stars(
     painter = painter_of(stars.pattern, stars.f_number, pixel_mm, stars.wavelengths_nm, stars.weights)
     reach = max(NEAR_PIXELS + 1, math.ceil(painter.outer / min(pixel_mm)) + 1)
     windows = _windows(stars.centres_px, reach)
-    shared = _shared(painter, stars, pixel_mm, reach)
+    if _plain(stars.pattern):
+        _add_plain_wings(total, _shared(painter, stars, pixel_mm, reach), windows, pixel_mm, threads)
+    else:
+        add_moved_wings(total, painter, stars.centres_px, stars.gains, windows, pixel_mm, draft=draft, threads=threads)
+    _lay_centres(total, painter, stars, pixel_mm, reach, windows, draft)
+    return total
+
+
+def _add_plain_wings(
+    total: NDArray[np.float32], shared: tuple[Floats, ...], windows: NDArray[np.int64], pixel_mm: tuple[float, float],
+    threads: int | None,
+) -> None:  # fmt: skip
+    """Add the wings of a round or straight-bladed iris."""
+    height, width = total.shape[:2]
     x = (np.arange(width) + 0.5) * pixel_mm[0]
     y = -(np.arange(height) + 0.5) * pixel_mm[1]
-    coarse = _coarse(shared, pixel_mm, size_px, threads)
+    coarse = _coarse(shared, pixel_mm, (width, height), threads)
 
     def band(first: int) -> None:
         rows = slice(first, min(first + BAND, height))
         kernel.add_sharp_wings(*shared, windows, x, y[rows], first, total[rows])
 
-    _each(band, range(0, height, BAND), threads)
-    total += _upsampled(coarse, size_px)
-    _lay_centres(total, painter, stars, pixel_mm, reach, windows, draft)
-    return total
-
-
-def _each(work: Callable[[int], None], items: Iterable[int], threads: int | None) -> None:
-    with ThreadPoolExecutor(threads) as pool:
-        for _ in pool.map(work, items):
-            pass
+    each(band, range(0, height, BAND), threads)
+    total += _upsampled(coarse, (width, height))
 
 
 def _windows(centres_px: Floats, reach: int) -> NDArray[np.int64]:
@@ -166,7 +168,7 @@ def _coarse(
         part = slice(first, min(first + BAND // COARSE, rows))
         kernel.add_coarse_wings(*shared, x, y[part], found[part])
 
-    _each(band, range(0, rows, BAND // COARSE), threads)
+    each(band, range(0, rows, BAND // COARSE), threads)
     return found
 
 

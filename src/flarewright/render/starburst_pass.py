@@ -17,7 +17,8 @@ from ..optics.border import mapped, points
 from ..optics.diffraction import BladeWings, Pattern, Soil, pupil_pattern
 from ..optics.paths import direct_path
 from .direct import PUPIL_SPAN, DirectImage, defocus_mm, traced_pupil, traced_spot
-from .many_stars import Stars, draw_stars, fits
+from .few_spectra import few_spectra
+from .many_stars import Stars, draw_stars
 from .path_color import direct_flux
 from .prepare import Settled
 from .shot import Shot
@@ -35,8 +36,8 @@ SPIRAL_COPIES = 9
 OUT_OF_FOCUS_PX = 1.0
 # so many lights of one look are drawn together
 MANY_LIGHTS = 8
-# one look is one spectrum, but for its strength, to this part of its mean
-SAME_SPECTRUM = 0.05
+# fewer lights than this for each of the spectra that stand for theirs are not worth it
+FEW_SPECTRA = 6
 
 __all__ = ["read_soil", "starburst_of"]
 
@@ -129,7 +130,7 @@ def _alike(
     """Collect lights whose direct images are one pattern at many places; the rest are drawn one by one."""
     if len(lights) < MANY_LIGHTS or scene.look.cats_eye or scene.look.spiral_deg > 0.0:
         return [], lights
-    groups: list[list[tuple[Shot, DirectImage]]] = []
+    groups: dict[tuple[float, ...], list[tuple[Shot, DirectImage]]] = {}
     others = []
     blurred: dict[float, bool] = {}
     for parts in lights:
@@ -141,50 +142,37 @@ def _alike(
         if shot.border is not None or blurred[distance]:
             others.append(parts)
         elif _flux(shot, image) > 0.0:
-            same = (group for group in groups if _one_look(group[0], parts[0]))
-            group = next(same, None)
-            if group is None:
-                groups.append(list(parts))
-            else:
-                group.append(parts[0])
-    few = [group for group in groups if len(group) < MANY_LIGHTS]
-    others += [[pair] for group in few for pair in group]
-    return [group for group in groups if len(group) >= MANY_LIGHTS], others
-
-
-def _one_look(a: tuple[Shot, DirectImage], b: tuple[Shot, DirectImage]) -> bool:
-    """Tell whether two direct images have the same spectrum but for its strength."""
-    if a[0].light.spectrum != b[0].light.spectrum:
-        return False
-    one, other = (image.throughput_mm2 / image.throughput_mm2.mean() for _, image in (a, b))
-    return bool(np.abs(one - other).max() < SAME_SPECTRUM)
+            key = (*_diffracted_wavelengths(shot), *shot.packed.wavelengths_nm)
+            groups.setdefault(key, []).append(parts[0])
+    others += [[pair] for group in groups.values() if len(group) < MANY_LIGHTS for pair in group]
+    return [group for group in groups.values() if len(group) >= MANY_LIGHTS], others
 
 
 def _many_lights(scene: _Scene, group: list[tuple[Shot, DirectImage]], threads: int | None) -> NDArray[np.floating]:
-    """Draw lights of one look together."""
+    """Draw lights of one pattern together: as many times as there are spectra that stand for all of theirs."""
     shot = group[0][0]
     fine_nm = _diffracted_wavelengths(shot)
     (pattern,) = _patterns(scene, shot, np.zeros(1))
-    if pattern is None or not fits(pattern):
-        drawn = [picture for pair in group if (picture := _one_light(scene, [pair], threads)) is not None]
-        together: NDArray[np.floating] = np.sum(drawn, axis=0)
-        return together
+    assert pattern is not None, "only a cat's eye may be shut"
     pixels = shot.to_pixels
     places = np.array([image.position_mm for _, image in group]) * [pixels[2], -pixels[3]] + pixels[:2]
     throughputs = [lit.light.intensity * image.throughput_mm2 for lit, image in group]
     flux = direct_flux(shot, scene.settled.lens, throughputs, fine_nm)
-    mean = flux.mean(axis=0)
-    colors = shot.weights(fine_nm) * (scene.look.intensity * pattern.transmittance)
-    whole, each = mean @ colors, flux @ colors
-    # a channel that the spectrum hardly touches follows the light as a whole
-    dim = np.abs(whole) < 1e-6 * np.abs(whole).max()
-    gains = np.where(dim, (flux.sum(axis=1) / mean.sum())[:, None], each / np.where(dim, 1.0, whole))
-    stars = Stars(
-        pattern, scene.settled.order.f_number * scene.look.size, fine_nm, colors * mean[:, None], places, gains
-    )
+    colors = np.array([lit.weights(fine_nm) for lit, _ in group]) * flux[:, :, None]
+    chosen, gains, fits = few_spectra(colors, max(1, len(group) // FEW_SPECTRA))
+    f_number = scene.settled.order.f_number * scene.look.size
+    strength = scene.look.intensity * pattern.transmittance
     pixel = (1.0 / float(pixels[2]), 1.0 / float(pixels[3]))
     draft = scene.settled.project.quality.mode == "draft"
-    return draw_stars(stars, pixel, shot.size_px, draft=draft, threads=threads)
+    total: NDArray[np.floating] = np.zeros((shot.size_px[1], shot.size_px[0], 3), dtype=np.float32)
+    for k, number in enumerate(chosen):
+        own = Stars(pattern, f_number, fine_nm, colors[number] * strength, places[fits], gains[fits, k])
+        total += draw_stars(own, pixel, shot.size_px, draft=draft, threads=threads)
+    for pair in [pair for pair, good in zip(group, fits, strict=True) if not good]:
+        picture = _one_light(scene, [pair], threads)
+        if picture is not None:
+            total += picture
+    return total
 
 
 def _out_of_focus(settled: Settled, shot: Shot) -> bool:
