@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import get_args
 
 import numpy as np
@@ -79,6 +79,15 @@ class PackedLens:
             return self.shapes
         assert self.faced is not None, "a lens that is not one of revolution is traced towards a light: facing()"
         return self.faced
+
+    @cached_property
+    def typical_reflectance(self) -> NDArray[np.float64]:
+        """Root mean square of R over the wavelengths, shape (K, M): for estimates of a whole path.
+
+        A coating may leave next to nothing at the middle wavelength and much beside it. Two mirrors of one coating make
+        <R^2>, which this gives; of different ones it gives more than <R_1 R_2>, never less (Cauchy and Schwarz).
+        """
+        return np.asarray(np.sqrt(np.mean(self.reflectance**2, axis=0)))
 
     @property
     def first_surface(self) -> int:

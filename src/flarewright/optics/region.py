@@ -28,12 +28,20 @@ SPECK, SMALL_REGION = 16, 64
 
 def tracing_arguments(packed: PackedLens, w: int | list[int], path: LightPath, tilt: float) -> Any:
     """List what every tracing kernel takes first."""
-    geometry = (packed.curvature, packed.form, packed.z_vertex, packed.inv_semi)
-    light = (tilt, packed.nearness)
     if w == list(range(len(packed.wavelengths_nm))):
         # a list would copy them
-        return (path.rows, path.actions, *geometry, packed.n_gap, packed.reflectance, packed.sensor_z, *light)
-    return (path.rows, path.actions, *geometry, packed.n_gap[w], packed.reflectance[w], packed.sensor_z, *light)
+        return _listed(packed, packed.n_gap, packed.reflectance, path, tilt)
+    return _listed(packed, packed.n_gap[w], packed.reflectance[w], path, tilt)
+
+
+def _listed(packed: PackedLens, n_gap: Floats, reflectance: Floats, path: LightPath, tilt: float) -> Any:
+    geometry = (packed.curvature, packed.form, packed.z_vertex, packed.inv_semi)
+    return (path.rows, path.actions, *geometry, n_gap, reflectance, packed.sensor_z, tilt, packed.nearness)
+
+
+def _looking_arguments(packed: PackedLens, w: int, path: LightPath, tilt: float) -> Any:
+    """List the same for the pre-pass: rays run as at one wavelength, and carry what light of all wavelengths does."""
+    return _listed(packed, packed.n_gap[w], packed.typical_reflectance, path, tilt)
 
 
 def front_box(packed: PackedLens, tilt: float) -> Floats:
@@ -146,7 +154,7 @@ def find_region(
         None when nothing passes.
     """
     limits = (path.stop_crossings, iris_radius, view_radius)
-    middle, *others = [(*tracing_arguments(packed, w, path, tilt), *limits) for w in wavelengths_fitted(packed)]
+    middle, *others = [(*_looking_arguments(packed, w, path, tilt), *limits) for w in wavelengths_fitted(packed)]
     box, cells = front_box(packed, tilt), cells_across(packed, PREPASS)
     finest = _finest(packed, tilt)
     if within is not None:
@@ -207,7 +215,7 @@ def measure_region(
         None when nothing passes.
     """
     w, cells = wavelengths_fitted(packed)[0], cells_across(packed, FINER)
-    arguments = (*tracing_arguments(packed, w, path, tilt), path.stop_crossings, iris_radius, view_radius)
+    arguments = (*_looking_arguments(packed, w, path, tilt), path.stop_crossings, iris_radius, view_radius)
     found, sums, _ = _scan(packed, arguments, box, cells, _finest(packed, tilt))
     if found[1] <= found[0] or sums[0] <= 0.0:
         return None
