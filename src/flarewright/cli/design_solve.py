@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
     from ..design.candidate import Outcome
     from ..design.constraints import Breach
     from ..design.genes import Measure
-    from ..design.search import Problem, State
+    from ..design.search import Over, Problem, State
     from ..design.solvers import Choice
     from ..model import Iris, Project
 
@@ -26,6 +27,9 @@ EPILOG = (
     "Examples:\n\nflarewright design solve shot.toml -o found --time 60\n\n"
     "flarewright design resume found --time 600\n\nflarewright render found/lens-1.toml --light 10,5 -o flare.exr"
 )
+
+# part of the time in which lenses are finished with traced rays or glasses
+FINISHING = 0.15
 
 Output = Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="Folder for lenses and report.")]
 Seed = Annotated[int, typer.Option(min=0, help="Begins the random numbers.")]
@@ -124,6 +128,7 @@ def search(
     data : dict
         Facts for JSON.
     """
+    from ..design.hunt import until
     from ..design.impossible import obstacles
     from ..design.report import summary, write_folder
     from ..design.solvers import Limits, chosen, make_ready, solve_with
@@ -139,12 +144,16 @@ def search(
         raise OutputError(f"cannot make the folder {folder}: {(error.strerror or str(error)).lower()}") from None
     solver = chosen("pools") if choice is None else choice
     make_ready(solver, problem, measure)
-    with interruptible() as asked, _telling(solver.unit) as progress:
-        state = solve_with(
-            solver, problem, limits=Limits(time_s, searches, progress, asked), seed=state.seed, measure=measure,
-            threads=threads, state=state,
-        ).state  # fmt: skip
-    found, conflict = _found(state, problem, lenses, name or f"After {settled.lens.name}", settled.iris)
+    # rays and glasses take their time, which is part of it
+    rest, begun = FINISHING * time_s if problem.traced or problem.glasses is not None else 0.0, time.perf_counter()
+    with interruptible() as asked:
+        with _telling(solver.unit) as progress:
+            state = solve_with(
+                solver, problem, limits=Limits(time_s - rest, searches, progress, asked), seed=state.seed,
+                measure=measure, threads=threads, state=state,
+            ).state  # fmt: skip
+        over = until(time_s - (time.perf_counter() - begun), asked)
+        found, conflict = _found(state, problem, lenses, name or f"After {settled.lens.name}", settled.iris, over)
     remarks = write_folder(folder, project, problem, state, found, proven, conflict)
     data = summary(state, found, problem, proven, conflict)
     tell([*(settled.remarks if name is None else ()), *remarks])
@@ -156,16 +165,16 @@ def search(
 
 
 def _found(
-    state: State, problem: Problem, count: int, name: str, iris: Iris | None
+    state: State, problem: Problem, count: int, name: str, iris: Iris | None, over: Over
 ) -> tuple[tuple[Outcome, ...], tuple[Breach, ...]]:
     """Return the best lenses; where none keeps the hard limits the nearest, and what lenses of any ghosts break."""
     from ..design.candidate import nearest_outcomes, outcomes
     from ..design.constraints import without_ghosts
 
-    found = outcomes(state, problem, count=count, name=name, iris=iris)
+    found = outcomes(state, problem, count=count, name=name, iris=iris, over=over)
     if found or not problem.bounds.hard:
         return found, ()
-    nearest = nearest_outcomes(state, problem, count=count, name=name, iris=iris)
+    nearest = nearest_outcomes(state, problem, count=count, name=name, iris=iris, over=over)
     return nearest, without_ghosts(problem, seed=state.seed)
 
 

@@ -21,7 +21,7 @@ from .objective import fitness, fitness_thesis, misfits
 from .prescription import Structure
 from .rims import clear_radii
 from .rounding import held_indices, rounded
-from .search import KEPT, SOLVED, Candidate, Problem, State, finer, finest, merge
+from .search import KEPT, SOLVED, Candidate, Over, Problem, State, finer, finest, merge, never
 
 Floats = NDArray[np.float64]
 
@@ -135,8 +135,8 @@ def lens_of(
     return complete_lens(known.replace(f_number=2.0 * at_one / float(vector[0])))
 
 
-def outcomes(state: State, problem: Problem, *, count: int = 5, name: str = "Designed lens", iris: Iris | None = None
-             ) -> tuple[Outcome, ...]:  # fmt: skip
+def outcomes(state: State, problem: Problem, *, count: int = 5, name: str = "Designed lens", iris: Iris | None = None,
+             over: Over = never) -> tuple[Outcome, ...]:  # fmt: skip
     """Return the best distinct lenses of a search.
 
     Parameters
@@ -146,6 +146,8 @@ def outcomes(state: State, problem: Problem, *, count: int = 5, name: str = "Des
     count : int
     name : str
     iris : Iris, optional
+    over : callable
+        Whether the time is up: then there is one lens at least, and what makes good lenses better is left out.
 
     Returns
     -------
@@ -158,23 +160,23 @@ def outcomes(state: State, problem: Problem, *, count: int = 5, name: str = "Des
         pool = list(merge(pool, run.members, KEPT))
     pool.sort(key=lambda one: one.cost)
     # where the ghosts are met, others that have them too come before those that only come near
-    pool[:1] = alike(problem, pool[0], seed=state.seed) if count > 1 and pool else pool[:1]
+    pool[:1] = alike(problem, pool[0], seed=state.seed, over=over) if count > 1 and pool else pool[:1]
     if problem.traced:
-        pool = _by_tracing(pool, problem)
+        pool = _by_tracing(pool, problem, over)
     # the best lens with any index need not be the best with glasses
     enough = count if problem.glasses is None else 2 * count
     chosen: list[Candidate] = []
     found: list[Outcome] = []
     failures = 0
     for one in pool:
-        if len(found) == enough or failures > MOST_FAILURES:
+        if len(found) == enough or failures > MOST_FAILURES or (found and over()):
             break
         if any(_same(one, other) for other in chosen):
             continue
-        fine = to_the_middle(problem, finest(problem, one, POLISHING_STEPS))
+        fine = to_the_middle(problem, finest(problem, one, POLISHING_STEPS), over)
         if any(_same(fine, other) for other in chosen):
             continue
-        outcome = _outcome(fine, problem, name, iris)
+        outcome = _outcome(fine, problem, name, iris, over)
         if outcome is not None:
             chosen.append(fine)
             found.append(outcome)
@@ -187,27 +189,32 @@ def outcomes(state: State, problem: Problem, *, count: int = 5, name: str = "Des
     )
 
 
-def _by_tracing(pool: list[Candidate], problem: Problem) -> list[Candidate]:
+def _by_tracing(pool: list[Candidate], problem: Problem, over: Over) -> list[Candidate]:
     """Put those first whose traced ghosts are nearest: of lenses alike to first order some are much better."""
     aim = problem.objective
-    judged = pool[: int(np.clip(TRACED / len(aim.targets), 16, 200))]
+    judged: list[tuple[float, int]] = []
 
     def cost(one: Candidate) -> float:
         vector = problem.variables(one.structure).prescription(one.x)
         residuals, _, ghosts = misfits(aim, one.structure, vector)
         return np.inf if residuals is None else traced_misfits(problem, one.structure, vector, ghosts).cost
 
-    return [*sorted(judged, key=cost), *pool[len(judged) :]]
+    for number, one in enumerate(pool[: int(np.clip(TRACED / len(aim.targets), 16, 200))]):
+        if over():
+            break
+        judged.append((cost(one), number))
+    return [*(pool[number] for _, number in sorted(judged)), *pool[len(judged) :]]
 
 
 def nearest_outcomes(
-    state: State, problem: Problem, *, count: int = 5, name: str = "Designed lens", iris: Iris | None = None
-) -> tuple[Outcome, ...]:
+    state: State, problem: Problem, *, count: int = 5, name: str = "Designed lens", iris: Iris | None = None,
+    over: Over = never,
+) -> tuple[Outcome, ...]:  # fmt: skip
     """Return the best lenses of a search none of which keeps its hard constraints.
 
     Parameters
     ----------
-    state, problem, count, name, iris
+    state, problem, count, name, iris, over
         As in `outcomes`.
 
     Returns
@@ -217,7 +224,7 @@ def nearest_outcomes(
     """
     for hard in (tuple(one for one in problem.bounds.hard if one == "edges"), ()):
         loose = replace(problem, bounds=problem.bounds.replace(hard=hard))
-        found = outcomes(state, loose, count=count, name=name, iris=iris)
+        found = outcomes(state, loose, count=count, name=name, iris=iris, over=over)
         if found:
             break
     return tuple(replace(one, breaks=breaches(problem, one.structure, one.vector)) for one in found)
@@ -230,7 +237,7 @@ def _same(one: Candidate, other: Candidate) -> bool:
     return float(np.mean(np.abs(one.x - other.x) / np.repeat(APART, [1 + rows, rows, rows]))) < 1.0
 
 
-def _outcome(one: Candidate, problem: Problem, name: str, iris: Iris | None) -> Outcome | None:
+def _outcome(one: Candidate, problem: Problem, name: str, iris: Iris | None, over: Over) -> Outcome | None:
     aim, known = problem.objective, problem.variables(one.structure)
     media: dict[int, Medium | None] = {row: problem.fixed_media[row] for row in problem.fixed_rows}
     names: dict[int, str] = {}
@@ -238,7 +245,7 @@ def _outcome(one: Candidate, problem: Problem, name: str, iris: Iris | None) -> 
     inside = kept(problem, one)
     if inside is not None and problem.glasses is not None:
         any_index = fitness(aim, one.structure, known.prescription(inside.x))
-        near, numbers = rounded(stiff(problem), inside)
+        near, numbers = rounded(stiff(problem), inside, over)
         known = known.with_indices(held_indices(problem, numbers))
         inside = kept(problem, near, known)
         media = {**{row: problem.glasses.medium(number) for row, number in numbers.items()}, **media}
@@ -251,7 +258,7 @@ def _outcome(one: Candidate, problem: Problem, name: str, iris: Iris | None) -> 
         return None
     traced, lost = None, tuple[str, ...]()
     if problem.traced:
-        done = finish(problem, one.structure, known, inside.x, ghosts)
+        done = finish(problem, one.structure, known, inside.x, ghosts, over)
         vector, residuals = known.prescription(done.x), done.after.off
         traced = done.before.cost, done.after.cost
         lost = tuple(name for name, gone in zip(aim.names, done.after.lost, strict=True) if gone)

@@ -30,6 +30,7 @@ from .colors import (
     reflectances,
     uses,
 )
+from .search import Over, never
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -73,9 +74,9 @@ def solve_colors(
     threads : int, optional
         None: all cores; the result does not depend on it.
     time_limit : float, optional
-        No descent begins later, in seconds; None: all of them are done.
+        Seconds, at which descents are cut off; None: all of them are done.
     cancelled : callable, optional
-        Asked before every descent but the first.
+        Asked in every descent; one that is cut off ends with what it has.
     note : callable, optional
         Gets every setting that is better than those before.
 
@@ -97,7 +98,7 @@ def solve_colors(
         return late or (cancelled is not None and cancelled())
 
     def one_more(number: int, pool: tuple[Coatings, ...]) -> Coatings:
-        return _search(problem, tables, pool, np.random.default_rng([seed, number]), number)
+        return _search(problem, tables, pool, np.random.default_rng([seed, number]), number, over)
 
     found: list[Coatings] = []
     with ThreadPoolExecutor(min(workers, starts)) as threads_pool:
@@ -171,8 +172,9 @@ def _settings(problem: ColorProblem) -> Floats:
 
 
 def _search(
-    problem: ColorProblem, tables: list[_Table], pool: tuple[Coatings, ...], random: np.random.Generator, number: int
-) -> Coatings:
+    problem: ColorProblem, tables: list[_Table], pool: tuple[Coatings, ...], random: np.random.Generator, number: int,
+    over: Over,
+) -> Coatings:  # fmt: skip
     """Descend from a random setting, or from a good one with some coatings drawn anew, and finish."""
     # of three films one in three descents may have all: where fewer do, they are found more easily
     tables = [table.up_to(1 + number % len(table.ends)) for table in tables]
@@ -182,10 +184,12 @@ def _search(
         drawn = random.choice(len(tables), min(int(random.integers(1, 4)), len(tables)), replace=False)
         fresh = np.isin(np.arange(len(tables)), drawn)[:, None]
         values = np.where(fresh, values, kept)
-    return _finish(problem, _descend(problem, tables, values, random))
+    return _finish(problem, _descend(problem, tables, values, random, over), over)
 
 
-def _descend(problem: ColorProblem, tables: list[_Table], values: Floats, random: np.random.Generator) -> Floats:
+def _descend(
+    problem: ColorProblem, tables: list[_Table], values: Floats, random: np.random.Generator, over: Over
+) -> Floats:
     """Choose one coating after the other until none gets better."""
     reflections, passes = uses(problem.structure)
     values, mirrors = values.copy(), log_reflectances(problem, values)
@@ -195,6 +199,8 @@ def _descend(problem: ColorProblem, tables: list[_Table], values: Floats, random
         before = best
         for m in random.permutation(len(tables)):
             reflected, passed = reflections[:, m, None, None], passes[:, m, None, None]
+            if over():
+                return values
             # against what is chosen now
             change = tables[m].logs - mirrors[:, m, None]
             tried = logs[:, None] + reflected * change[0]
@@ -209,7 +215,7 @@ def _descend(problem: ColorProblem, tables: list[_Table], values: Floats, random
     return values
 
 
-def _finish(problem: ColorProblem, values: Floats) -> Coatings:
+def _finish(problem: ColorProblem, values: Floats, over: Over = never) -> Coatings:
     """Least squares from a setting of the tables, inside the bounds; films that are not there stay away."""
     low, high = problem.limits()
     away = np.zeros(values.shape, np.bool_)
@@ -218,6 +224,8 @@ def _finish(problem: ColorProblem, values: Floats) -> Coatings:
     values, damping = values.copy(), 1e-3
     cost, residuals, logs = _costs(problem, values)
     for _ in range(FINISHING_STEPS):
+        if over():
+            break
         J = _jacobian(problem, values, residuals, logs)
         push = (J.T @ residuals.ravel()).reshape(values.shape[1], -1).T
         # at a bound that it would leave a value stays

@@ -13,7 +13,7 @@ from ..kernels.design_search import WISHES, wishes_missed
 from .constraints import breaches, stiff
 from .ghosts import differentiate, evaluate
 from .prescription import Structure
-from .search import Problem
+from .search import Over, Problem, never
 from .traced import traced_ghosts
 from .variables import Variables
 
@@ -85,14 +85,13 @@ def traced_misfits(problem: Problem, structure: Structure, vector: Floats, ghost
     TracedMisfits
     """
     aim = problem.objective
-    at = {pair: g for g, pair in enumerate(structure.pairs)}
     first_order = evaluate(structure, vector[None], aim.entrance)[0]
     off, lost = np.zeros((len(aim.targets), 2)), np.zeros(len(aim.targets), np.bool_)
     for light, slope in enumerate(aim.slopes):
         span = slice(int(aim.spans[light]), int(aim.spans[light + 1]))
         pairs = ghosts[span]
         found = traced_ghosts(structure, vector, float(slope), aim.entrance, pairs)
-        rough = first_order[[at[pair] for pair in pairs]]
+        rough = first_order[structure.numbers(pairs)]
         rough = np.stack([rough[:, columns.PLACE] * slope, rough[:, columns.RADIUS]], axis=1).reshape(-1, 2)
         lost[span] = ~np.isfinite(found).all(axis=1)
         found = np.where(np.isfinite(found), found, rough)
@@ -106,7 +105,9 @@ def traced_misfits(problem: Problem, structure: Structure, vector: Floats, ghost
     return TracedMisfits(off, lost, cost)
 
 
-def finish(problem: Problem, structure: Structure, known: Variables, x: Floats, ghosts: Pairs) -> Finished:
+def finish(
+    problem: Problem, structure: Structure, known: Variables, x: Floats, ghosts: Pairs, over: Over = never
+) -> Finished:  # fmt: skip
     """Bring the traced ghosts of a lens nearer to their targets, inside its bounds.
 
     Parameters
@@ -118,6 +119,8 @@ def finish(problem: Problem, structure: Structure, known: Variables, x: Floats, 
         Search variables that keep the hard constraints.
     ghosts : tuple of (int, int)
         Mirrors of the ghost that stands for each target; that does not change.
+    over : callable
+        Whether the time is up: then the steps end.
 
     Returns
     -------
@@ -149,6 +152,8 @@ def finish(problem: Problem, structure: Structure, known: Variables, x: Floats, 
     anew = ANEW if len(ghosts) * known.free.size <= FEW else 0
     exact = False
     for _ in range(STEPS):
+        if over():
+            break
         cost = float(old @ old)
         tried = _step(known, x, old, J, residuals, damping)
         if tried is not None:
@@ -176,9 +181,8 @@ def _kept(
 def _first_order(problem: Problem, structure: Structure, known: Variables, x: Floats, ghosts: Pairs) -> Floats:
     """Differentiate the weighted misfits to first order, shape (2 N, F)."""
     aim, vector = problem.objective, known.prescription(x)
-    at = {pair: g for g, pair in enumerate(structure.pairs)}
     by = differentiate(structure, vector, aim.entrance)
-    chosen = [at[pair] for pair in ghosts]
+    chosen = structure.numbers(ghosts)
     slopes = np.repeat(aim.slopes, np.diff(aim.spans))
     turned = np.ones(len(chosen)) if aim.signed else np.where(by.values[chosen, columns.RADIUS] < 0.0, -1.0, 1.0)
     both = np.stack([slopes[:, None] * by.place[chosen], turned[:, None] * by.radius[chosen]], axis=1)

@@ -11,7 +11,7 @@ from ..kernels import design_ghosts as columns
 from .ghosts import differentiate, evaluate
 from .objective import Objective, misfits
 from .prescription import Structure
-from .search import FEW, SOLVED, STEPS, Candidate, Problem, polish, solve
+from .search import FEW, SOLVED, STEPS, Candidate, Over, Problem, never, polish, solve
 from .variables import Variables
 
 Floats = NDArray[np.float64]
@@ -39,7 +39,7 @@ def moderation(known: Variables, x: Floats) -> float:
     return float((_off_middle(known, x[known.free]) ** 2).sum())
 
 
-def alike(problem: Problem, solved: Candidate, *, seed: int = 0) -> tuple[Candidate, ...]:
+def alike(problem: Problem, solved: Candidate, *, seed: int = 0, over: Over = never) -> tuple[Candidate, ...]:
     """Find lenses of several structures that have the ghosts of one that meets its targets.
 
     Parameters
@@ -47,6 +47,8 @@ def alike(problem: Problem, solved: Candidate, *, seed: int = 0) -> tuple[Candid
     problem : Problem
     solved : Candidate
     seed : int
+    over : callable
+        Whether the time is up: then what was found so far is all.
 
     Returns
     -------
@@ -61,27 +63,30 @@ def alike(problem: Problem, solved: Candidate, *, seed: int = 0) -> tuple[Candid
     """
     if solved.cost > SOLVED:
         return (solved,)
-    found = [to_the_middle(problem, solved)]
+    found = [to_the_middle(problem, solved, over)]
     if not problem.objective.signed and len(problem.structures) <= FEW:
         signed = replace(problem, objective=_with_signs(problem, solved), begin_with=())
         for structure in problem.structures:
-            if structure == solved.structure:
+            if structure == solved.structure or over():
                 continue
             state = solve(
-                replace(signed, structures=(structure,)), seed=seed, time_limit=None, most_searches=SEARCHES
+                replace(signed, structures=(structure,)), seed=seed, time_limit=None, most_searches=SEARCHES,
+                cancelled=over,
             )  # fmt: skip
             if state.best is not None and state.best.cost <= SOLVED:
-                found.append(to_the_middle(problem, state.best))
+                found.append(to_the_middle(problem, state.best, over))
     return tuple(sorted(found, key=lambda one: moderation(problem.variables(one.structure), one.x)))
 
 
-def to_the_middle(problem: Problem, solved: Candidate) -> Candidate:
+def to_the_middle(problem: Problem, solved: Candidate, over: Over = never) -> Candidate:
     """Move the variables of a lens that meets its targets to the middle of their bounds as far as its ghosts stay.
 
     Parameters
     ----------
     problem : Problem
     solved : Candidate
+    over : callable
+        Whether the time is up: then it stays where it is.
 
     Returns
     -------
@@ -108,6 +113,8 @@ def to_the_middle(problem: Problem, solved: Candidate) -> Candidate:
         return _linearised(problem, structure, known, ghosts, x)
 
     for tight in TIGHTER:
+        if over():
+            return solved
         # the method begins inside the bounds
         begin = np.clip(z, low + 1e-9 * (high - low), high - 1e-9 * (high - low))
 
@@ -130,8 +137,7 @@ def _linearised(
 ) -> tuple[Floats, Floats]:
     """Return the weighted misfits of the ghosts that stand for the targets, and their derivatives: (3 N,), (3 N, F)."""
     aim, vector = problem.objective, known.prescription(x)
-    at = {pair: g for g, pair in enumerate(structure.pairs)}
-    chosen, lights = [at[pair] for pair in ghosts], np.repeat(aim.slopes, np.diff(aim.spans))
+    chosen, lights = structure.numbers(ghosts), np.repeat(aim.slopes, np.diff(aim.spans))
     by = differentiate(structure, vector, aim.entrance)
     place, radius = by.values[chosen, columns.PLACE], by.values[chosen, columns.RADIUS]
     sign = np.where(aim.signed | (radius >= 0.0), 1.0, -1.0)
@@ -153,8 +159,7 @@ def _with_signs(problem: Problem, solved: Candidate) -> Objective:
     aim, structure = problem.objective, solved.structure
     vector = problem.variables(structure).prescription(solved.x)
     _, _, ghosts = misfits(aim, structure, vector)
-    at = {pair: g for g, pair in enumerate(structure.pairs)}
-    radii = evaluate(structure, vector[None], aim.entrance)[0][[at[pair] for pair in ghosts], columns.RADIUS]
+    radii = evaluate(structure, vector[None], aim.entrance)[0][structure.numbers(ghosts), columns.RADIUS]
     targets = aim.targets.copy()
     targets[:, 1] = np.copysign(targets[:, 1], radii)
     return replace(aim, targets=targets, signed=True, picture=None)

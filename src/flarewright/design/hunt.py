@@ -10,7 +10,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from .search import KEPT, SOLVED, Candidate, Progress, State
+from .search import KEPT, SOLVED, Candidate, Over, Progress, State
 
 Floats = NDArray[np.float64]
 
@@ -63,6 +63,35 @@ class Limits:
             return time.process_time() >= end or (asked is not None and asked())
 
         return replace(self, cancelled=over, cpu_s=None)
+
+
+# seconds that may pass after a search, so that it ends with lenses that are worth having
+GRACE_S = 1.0
+
+
+def until(seconds: float, asked: Callable[[], bool], *, clock: Callable[[], float] = time.perf_counter) -> Over:
+    """Return what tells whether the time for finishing lenses is up; it begins to count now.
+
+    Parameters
+    ----------
+    seconds : float
+        At least `GRACE_S` count.
+    asked : callable
+        Whether somebody wants an end. Who wanted that before is given `GRACE_S`; who does later, nothing more.
+    clock : callable
+        Seconds.
+
+    Returns
+    -------
+    callable
+    """
+    begun, hurried = clock(), asked()
+    allowed = GRACE_S if hurried else max(GRACE_S, seconds)
+
+    def over() -> bool:
+        return clock() - begun >= allowed or (asked() and not hurried)
+
+    return over
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -53,6 +54,15 @@ class Structure:
             for i in reversed(half)
             if i < j and self.mirrors[j] and self.mirrors[i]
         )
+
+    @cached_property
+    def number_of(self) -> dict[tuple[int, int], int]:
+        """Where each pair of mirrors stands in `pairs`."""
+        return {pair: g for g, pair in enumerate(self.pairs)}
+
+    def numbers(self, pairs: Iterable[tuple[int, int]]) -> list[int]:
+        """List where some pairs of mirrors stand in `pairs`."""
+        return [self.number_of[pair] for pair in pairs]
 
     @property
     def standing_in_air(self) -> bool:

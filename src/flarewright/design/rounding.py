@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from .glass_list import GlassList
 from .objective import Objective
-from .search import Candidate, Problem, polish_within
+from .search import Candidate, Over, Problem, never, polish_within
 from .variables import Variables
 
 Floats = NDArray[np.float64]
@@ -33,7 +33,7 @@ class _Branch:
     cost: float
 
 
-def rounded(problem: Problem, one: Candidate) -> tuple[Candidate, dict[int, int]]:
+def rounded(problem: Problem, one: Candidate, over: Over = never) -> tuple[Candidate, dict[int, int]]:
     """Give a lens glasses from the problem's list so that its cost grows little.
 
     Parameters
@@ -41,6 +41,8 @@ def rounded(problem: Problem, one: Candidate) -> tuple[Candidate, dict[int, int]
     problem : Problem
         With `glasses`.
     one : Candidate
+    over : callable
+        Whether the time is up: then every gap gets the glass that is nearest.
 
     Returns
     -------
@@ -58,24 +60,26 @@ def rounded(problem: Problem, one: Candidate) -> tuple[Candidate, dict[int, int]
     assert problem.glasses is not None
     known, aim, glasses = problem.variables(one.structure), problem.objective, problem.glasses
     first = _Branch({}, one.x, one.cost)
-    gaps = _hardest_first(known, aim, glasses, first)
+    gaps = _hardest_first(known, aim, glasses, first, over)
     if not gaps:
         return one, {}
     branches = [first]
     width = int(np.clip(SEARCHES // (NEAREST * len(gaps)), 1, WIDEST))
     for gap in gaps:
+        branches = branches[:1] if over() else branches
         tried = [
             _with(known, aim, glasses, branch, gap, number)
             for branch in branches
-            for number in glasses.nearest(_index(known, branch.x, gap), NEAREST)
+            for number in glasses.nearest(_index(known, branch.x, gap), 1 if over() else NEAREST)
         ]
         branches = sorted(tried, key=lambda branch: branch.cost)[:width]
     best = branches[0]
     for _ in range(ROUNDS):
         before = best.cost
         for gap in gaps:
-            best = min([best, *_beside(known, aim, glasses, best, gap)], key=lambda branch: branch.cost)
-        if best.cost > 0.99 * before:
+            if not over():
+                best = min([best, *_beside(known, aim, glasses, best, gap)], key=lambda branch: branch.cost)
+        if best.cost > 0.99 * before or over():
             break
     best = min(best, _polished(known, aim, glasses, best.held, best.x, LAST_STEPS), key=lambda branch: branch.cost)
     return Candidate(best.cost, one.structure, best.x), best.held
@@ -92,7 +96,7 @@ def _index(known: Variables, x: Floats, gap: int) -> float:
     return float(x[1 + 2 * known.structure.rows + gap])
 
 
-def _hardest_first(known: Variables, aim: Objective, glasses: GlassList, start: _Branch) -> list[int]:
+def _hardest_first(known: Variables, aim: Objective, glasses: GlassList, start: _Branch, over: Over) -> list[int]:
     """List the gaps of glass whose index is free, the one that costs most when rounded alone first."""
     fixed = known.high == known.low
     indices = 1 + 2 * known.structure.rows
@@ -101,6 +105,8 @@ def _hardest_first(known: Variables, aim: Objective, glasses: GlassList, start: 
         k for k, glass in enumerate(known.structure.glass)
         if glass and (not fixed[indices + k] or np.any(glasses.n_d == known.low[indices + k]))
     ]  # fmt: skip
+    if over():
+        return gaps
     alone = {
         gap: _with(known, aim, glasses, start, gap, glasses.nearest(_index(known, start.x, gap), 1)[0]).cost
         for gap in gaps

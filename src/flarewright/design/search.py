@@ -163,6 +163,12 @@ class State:
 
 
 Progress = Callable[[State], None]
+Over = Callable[[], bool]
+
+
+def never() -> bool:
+    """Tell that the time is not up."""
+    return False
 
 
 def solve(

@@ -81,7 +81,6 @@ def traced_ghosts(
     """
     rows = structure.rows
     first_order = evaluate(structure, vector[None], entrance)[0]
-    at = {pair: g for g, pair in enumerate(structure.pairs)}
     z = np.concatenate([[0.0], np.cumsum(vector[1:rows])])
     n = np.concatenate([[1.0], vector[1 + 2 * rows :]])
     curvature = np.ascontiguousarray(vector[1 + rows : 1 + 2 * rows])
@@ -91,7 +90,7 @@ def traced_ghosts(
             steps_between(rows, structure.stop, (j, i)), curvature, z, n, float(z[-1] + vector[rows]),
             float(np.arctan(slope)),
         )  # fmt: skip
-        by_stop = first_order[at[j, i], columns.BOUND] == 0.0
+        by_stop = first_order[structure.number_of[j, i], columns.BOUND] == 0.0
         values.append(
             _disc(case, _aimed(case, 0.5 * float(vector[0]) * PATTERN) if by_stop else 0.5 * entrance * PATTERN)
         )

@@ -10,9 +10,10 @@ from typing import Any
 from ..design.candidate import outcomes
 from ..design.color_search import solve_colors
 from ..design.colors import coated, color_problem
+from ..design.hunt import until
 from ..design.impossible import obstacles
 from ..design.report import verdict
-from ..design.search import Problem, State, compile_kernels, solve
+from ..design.search import Over, Problem, State, compile_kernels, solve
 from ..design.target import problem_of
 from ..errors import FlarewrightError
 from ..model import AsLens, Lens, Project
@@ -124,7 +125,7 @@ class Solver:
 
     def _search(self, project: Project, problem: Problem, name: str, seconds: float, exposure_stops: float) -> None:
         compile_kernels(problem.objective.picture is not None)
-        looked = 0.0
+        looked, stop = 0.0, self._stop
 
         def look(state: State) -> None:
             nonlocal looked
@@ -132,11 +133,12 @@ class Solver:
             if now - looked < LOOK_EVERY_S:
                 return
             looked = now
-            self._tell(True, "Searching", state.seconds, self._found(project, problem, state, 1, name, exposure_stops))
+            best = self._found(project, problem, state, 1, name, exposure_stops, stop.is_set)
+            self._tell(True, "Searching", state.seconds, best)
 
-        stop = self._stop
         state = solve(problem, time_limit=seconds, progress=look, cancelled=stop.is_set)
-        found = self._found(project, problem, state, CANDIDATES, name, exposure_stops)
+        over = until(seconds - state.seconds, stop.is_set)
+        found = self._found(project, problem, state, CANDIDATES, name, exposure_stops, over)
         told = f"{len(found)} lenses of {state.searches} tries" if found else "No lens was found; search longer"
         proven = obstacles(problem, project)
         if proven:
@@ -144,9 +146,10 @@ class Solver:
         self._tell(False, told, state.seconds, found)
 
     def _found(
-        self, project: Project, problem: Problem, state: State, count: int, name: str, exposure_stops: float
-    ) -> tuple[Found, ...]:
-        best = outcomes(state, problem, count=count, name=f"After {name}", iris=project.iris)
+        self, project: Project, problem: Problem, state: State, count: int, name: str, exposure_stops: float,
+        over: Over,
+    ) -> tuple[Found, ...]:  # fmt: skip
+        best = outcomes(state, problem, count=count, name=f"After {name}", iris=project.iris, over=over)
         out = []
         for one in best:
             worst = max(abs(float(value)) for value in one.residuals.ravel())

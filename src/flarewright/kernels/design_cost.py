@@ -3,7 +3,7 @@
 import numpy as np
 
 from ._jit import compiled, inner
-from .design_ghosts import PLACE, RADIUS, REACH, SCALE
+from .design_ghosts import PLACE, RADIUS, REACH, light_values
 from .design_match import assign
 from .design_sight import beyond
 
@@ -23,35 +23,6 @@ def light_counts(weights):
         if weights[t, T_LIGHT] > 0.0:
             return True
     return False
-
-
-@inner
-def light_values(q, rows, stop, mirrors, values, light):
-    """Fill the logarithm of each ghost's irradiance, as `brightness_of_ghosts` does."""
-    through = 0.0
-    for k in range(rows):
-        before = 1.0 if k == 0 else q[2 * rows + k]
-        r = (q[1 + 2 * rows + k] - before) / (q[1 + 2 * rows + k] + before)
-        through += np.log(1.0 - r * r)
-    ghost = 0
-    for half in range(2):
-        first, last = (0, stop) if half == 0 else (stop, rows)
-        for j in range(first, last):
-            if not mirrors[j]:
-                continue
-            between = 0.0
-            for i in range(j - 1, first - 1, -1):
-                before = 1.0 if i == 0 else q[2 * rows + i]
-                ri = (q[1 + 2 * rows + i] - before) / (q[1 + 2 * rows + i] + before)
-                if mirrors[i]:
-                    before = 1.0 if j == 0 else q[2 * rows + j]
-                    rj = (q[1 + 2 * rows + j] - before) / (q[1 + 2 * rows + j] + before)
-                    light[ghost] = (
-                        through + 2.0 * between + np.log(max(ri * ri * rj * rj, 1e-300))
-                        - 2.0 * np.log(max(abs(values[ghost, SCALE]), 1e-300))
-                    )  # fmt: skip
-                    ghost += 1
-                between += np.log(1.0 - ri * ri)
 
 
 @compiled

@@ -7,8 +7,8 @@ the search variables in the order of `kernels.design_search`. A gene of an index
 import numpy as np
 
 from ._jit import compiled, inner
-from .design_cost import light_counts, light_values, rematch, total_cost
-from .design_ghosts import COLUMNS, PLACE, RADIUS, REACH_THESIS, WORK_ROWS, list_ghosts
+from .design_cost import light_counts, rematch, total_cost
+from .design_ghosts import COLUMNS, PLACE, RADIUS, REACH_THESIS, WORK_ROWS, light_values, list_ghosts
 from .design_search import WISHES, to_prescription, wish_values
 
 # which fitness

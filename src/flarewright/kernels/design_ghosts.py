@@ -370,8 +370,40 @@ def _rear_ghost(
 
 
 @inner
+def light_values(q, rows, stop, mirrors, values, light):
+    """Fill the logarithm of each ghost's irradiance, log of R_j R_i prod T / SCALE^2: bare surfaces met head on.
+
+    docs/physics.md, "Radiometry": A_in / A_out = 1 / SCALE^2. R = ((n - n') / (n + n'))^2.
+    """
+    through = 0.0
+    for k in range(rows):
+        before = 1.0 if k == 0 else q[2 * rows + k]
+        r = (q[1 + 2 * rows + k] - before) / (q[1 + 2 * rows + k] + before)
+        through += np.log(1.0 - r * r)
+    ghost = 0
+    for half in range(2):
+        first, last = (0, stop) if half == 0 else (stop, rows)
+        for j in range(first, last):
+            if not mirrors[j]:
+                continue
+            between = 0.0
+            for i in range(j - 1, first - 1, -1):
+                before = 1.0 if i == 0 else q[2 * rows + i]
+                ri = (q[1 + 2 * rows + i] - before) / (q[1 + 2 * rows + i] + before)
+                if mirrors[i]:
+                    before = 1.0 if j == 0 else q[2 * rows + j]
+                    rj = (q[1 + 2 * rows + j] - before) / (q[1 + 2 * rows + j] + before)
+                    light[ghost] = (
+                        through + 2.0 * between + np.log(max(ri * ri * rj * rj, 1e-300))
+                        - 2.0 * np.log(max(abs(values[ghost, SCALE]), 1e-300))
+                    )  # fmt: skip
+                    ghost += 1
+                between += np.log(1.0 - ri * ri)
+
+
+@inner
 def brightness_of_ghosts(q, rows, stop, mirrors, values, jacobian, light, by):
-    """Fill the logarithm of each ghost's irradiance and its derivatives: bare surfaces met head on.
+    """Fill the logarithm of each ghost's irradiance (`light_values`) and its derivatives.
 
     Parameters
     ----------
@@ -380,14 +412,11 @@ def brightness_of_ghosts(q, rows, stop, mirrors, values, jacobian, light, by):
     values, jacobian
         What it filled.
     light : ndarray, shape (G,)
-        Filled: log of R_j R_i prod T / SCALE^2.
+        Filled.
     by : ndarray, shape (G, 1 + 3 K)
         Filled.
-
-    Notes
-    -----
-    docs/physics.md, "Radiometry": A_in / A_out = 1 / SCALE^2. R = ((n - n') / (n + n'))^2.
     """
+    light_values(q, rows, stop, mirrors, values, light)
     ghost = 0
     for half in range(2):
         first, last = (0, stop) if half == 0 else (stop, rows)
@@ -398,7 +427,6 @@ def brightness_of_ghosts(q, rows, stop, mirrors, values, jacobian, light, by):
                 if not mirrors[i]:
                     continue
                 scale = values[ghost, SCALE]
-                light[ghost] = -2.0 * np.log(max(abs(scale), 1e-300))
                 for v in range(q.size):
                     by[ghost, v] = -2.0 * jacobian[2, ghost, v] / scale
                 for k in range(rows):
@@ -412,11 +440,9 @@ def brightness_of_ghosts(q, rows, stop, mirrors, values, jacobian, light, by):
                     rn, rb = 2.0 * before / (n + before) ** 2, -2.0 * n / (n + before) ** 2
                     weight = 0.0
                     if k in (j, i):
-                        light[ghost] += np.log(max(R, 1e-300))
                         weight = 2.0 / r if r != 0.0 else 0.0
                     # what lies between the mirrors is passed three times, they themselves once
                     times = 3.0 if i < k < j else 1.0
-                    light[ghost] += times * np.log(1.0 - R)
                     weight -= times * 2.0 * r / (1.0 - R)
                     by[ghost, 1 + 2 * rows + k] += weight * rn
                     if k > 0:

@@ -14,7 +14,6 @@ from .design_cost import (
     TINY,
     hidden_weight,
     light_counts,
-    light_values,
     rematch,
     total_cost,
 )
@@ -31,6 +30,7 @@ from .design_ghosts import (
     brightness_of_ghosts,
     differentiate_ghosts,
     fill_suffix,
+    light_values,
     list_ghosts,
     reduce_rows,
 )
