@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 
 # a lens whose final picture takes less needs no draft in front of it
 SOON_S = 0.35
-# one whose final picture takes more, for it has many wavelengths, is shown traced at few of them first
-LATE_S = 3.0
+# one whose final picture takes more is shown traced at few wavelengths first, without what adds up to nearly nothing
+LATE_S = 1.5
 TELL_S = 0.12
 
 

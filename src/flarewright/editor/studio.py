@@ -29,6 +29,8 @@ WIDEST, HIGHEST = 960, 540
 DRAFT_WAVELENGTHS = 3
 # and those of a first traced picture; coatings tell the colours between them
 SOON_WAVELENGTHS = 3
+# its faintest ghosts are left out that carry together no more than this part of all ghost light
+SOON_CULL = 1e-3
 # gains of a draft's ghosts: their step, the least and the largest
 # (one that a rim hides now may come out as the hand goes on, so it is never dimmed altogether)
 STEP, LEAST, MOST = 2.0**0.25, 2.0**-1.5, 2.0
@@ -92,7 +94,8 @@ def staged(project: Project, grade: Grade, scale: float = 1.0) -> Project:
         # reference quality is for files: it never ends
         quality = own.replace(mode="final") if own.mode != "final" else own
         if grade == "soon":
-            quality = quality.replace(wavelengths=min(quality.wavelengths, SOON_WAVELENGTHS), bridge=True)
+            few = min(quality.wavelengths, SOON_WAVELENGTHS)
+            quality = quality.replace(wavelengths=few, bridge=True, cull=max(quality.cull, SOON_CULL))
     else:
         quality = Quality(mode="draft", wavelengths=DRAFT_WAVELENGTHS, paths=own.paths)
     output = Output(layers="passes", starburst=project.output.starburst)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,6 +47,11 @@ class CoatingCurves:
 
     reflectance: Floats
     log_transmittance: Floats
+
+    @cached_property
+    def log_through(self) -> Floats:
+        """Sum of `log_transmittance` over all rows before each, shape (K + 1, L): a leg between two is a difference."""
+        return np.concatenate([np.zeros((1, len(CURVE_NM))), np.cumsum(self.log_transmittance, axis=0)])
 
 
 def coating_curves(
@@ -126,8 +131,7 @@ def passed(curves: CoatingCurves, paths: Sequence[LightPath], squares: Floats) -
     as at normal incidence.
     """
     mirrors = np.array([path.mirrors for path in paths], dtype=np.intp).reshape(len(paths), -1)
-    # the sum over all rows before each; a leg between two rows is a difference
-    before = np.concatenate([np.zeros((1, len(CURVE_NM))), np.cumsum(curves.log_transmittance, axis=0)])
+    before = curves.log_through
     log = before[[path.rows[-1] + 1 for path in paths]]
     for k, row in enumerate(mirrors.T):
         # light goes forth as far as every other mirror and comes back as far as the one between; neither is passed
