@@ -5,10 +5,12 @@ import pytest
 from judge import judge, probabilities
 
 from flarewright.errors import ProjectError
+from flarewright.kernels.spread_marks import spread_marks
 from flarewright.model import Camera, Light, Lines, Output, Polygon, Project, Quality, Rectangle
 from flarewright.optics.border import closed
 from flarewright.optics.color import luminance_weights
 from flarewright.optics.source import outline, parts
+from flarewright.render.ghosts_draft import spread_light
 from flarewright.render.prepare import settle
 from flarewright.render.render import render
 from flarewright.render.shot import make_opening, make_shots
@@ -221,3 +223,24 @@ def test_a_window_is_spread_like_the_whole():
     a, b = (side // 2 for side in kernel.shape)
     whole = spread(sheet, kernel)[a:-a, b:-b]
     assert np.abs(spread_within(sheet, kernel) - whole).max() < 1e-12
+
+
+@pytest.mark.parametrize("reach", [(3, 5), (12, 4), (1, 70)])
+def test_edges_spread_by_edges_are_the_spread_picture(reach):
+    """Differences meet differences: the same as Fourier transforms make of the whole picture, at its borders too."""
+    rng = np.random.default_rng(8)
+    kernel = np.zeros((2 * reach[0] + 1, 2 * reach[1] + 1))
+    # even, torn into two, its border soft
+    kernel[:, : reach[1]] = 1.0
+    kernel[reach[0] :, -2:] = 0.25
+    kernel /= kernel.sum()
+    sheet = np.zeros((40 + 2 * reach[0], 60 + 2 * reach[1], 3))
+    for _ in range(6):
+        x, y = rng.integers(0, sheet.shape[1]), rng.integers(0, sheet.shape[0])
+        sheet[y : y + rng.integers(3, 30), x : x + rng.integers(3, 90)] += rng.uniform(0.1, 1.0, 3)
+    steps = np.diff(kernel, axis=1, prepend=0.0, append=0.0)
+    rows, columns = np.nonzero(steps)
+    got = np.zeros((40, 60, 3))
+    marks = np.diff(sheet, axis=1, prepend=0.0)
+    spread_marks(marks, rows, columns, steps[rows, columns], np.array(reach), got)
+    np.testing.assert_allclose(spread_light(got), spread_within(sheet, kernel), atol=1e-11)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import threading
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
@@ -26,7 +26,9 @@ from .ghosts_draft import (
     draw_draft,
     draw_draft_by_hand,
     draw_draft_coarsely,
+    mark_spread,
     seen_small,
+    spread_light,
 )
 from .ghosts_final import FinalPass, contrast, detail_of, draw_alone, draw_final
 from .looking import looking
@@ -293,8 +295,7 @@ def _draft(
                 alike.setdefault(key, []).append((shot, path, changed))
         for blurred in alike.values():
             picture += draft_alone([(shot, path) for shot, path, _ in blurred], [art for *_, art in blurred])
-        for spread in _spread_drafts(wide, [paths[k] for k in group], art):
-            picture += spread
+        _add_spread_drafts(wide, [paths[k] for k in group], art, sheets)
         for k in group:
             meter.step(f"ghost {paths[k].name}")
         return list(sheets)
@@ -304,10 +305,12 @@ def _draft(
     return GhostPass(total, layers, len(paths), None, 0, 0.0, 0)
 
 
-def _spread_drafts(
-    shots: Sequence[Shot], paths: Sequence[LightPath], art: Mapping[str, PathArt]
-) -> Iterator[NDArray[np.float64]]:
-    """Draw paraxial ghosts of area lights, those of one spread together."""
+def _add_spread_drafts(
+    shots: Sequence[Shot], paths: Sequence[LightPath], art: Mapping[str, PathArt],
+    sheets: list[NDArray[np.float64] | None],
+) -> None:  # fmt: skip
+    """Add paraxial ghosts of area lights, those of one spread together, to a picture of each resolution."""
+    marked: list[NDArray[np.float64] | None] = [None] * DETAILS
     for shot in shots:
         alike: dict[object, list[tuple[LightPath, PathArt, NDArray[np.float64]]]] = {}
         for path in paths:
@@ -319,9 +322,19 @@ def _spread_drafts(
         for together in alike.values():
             source = together[0][2]
             halved = halvings(source, float("inf"), DETAILS - 1)
-            yield draft_alone(
-                [(shot, path) for path, *_ in together], [changed for _, changed, _ in together], source, halved
-            )
+            ghosts, changes = [(shot, path) for path, *_ in together], [changed for _, changed, _ in together]
+            if changes[0].alone:
+                _add_to(sheets, 0, draft_alone(ghosts, changes, source, halved))
+            else:
+                mark_spread(ghosts, changes, source, halved, marked)
+    for detail, marks in enumerate(marked):
+        if marks is not None:
+            _add_to(sheets, detail, spread_light(marks))
+
+
+def _add_to(sheets: list[NDArray[np.float64] | None], detail: int, light: NDArray[np.float64]) -> None:
+    held = sheets[detail]
+    sheets[detail] = light if held is None else np.add(held, light, out=held)
 
 
 def _rank_draft(shots: Sequence[Shot], paths: Sequence[LightPath], art: Mapping[str, PathArt]) -> list[int]:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from ..kernels.matrix import draw_matrix_ghosts, mirror_squares, path_matrices, weigh_matrix_ghosts
 from ..kernels.raster import sum_rows
+from ..kernels.spread_marks import spread_marks
 from ..optics.color import luminance_weights
 from ..optics.paths import LightPath
 from .art import Frame, PathArt
@@ -26,6 +27,9 @@ from .shot import Shot
 from .spread import shape_kernel, spread_within
 
 Floats = NDArray[np.float64]
+
+# of the largest, what sums of differences may be wrong by
+ROUNDING = 1e-12
 
 
 def draw_draft(shot: Shot, paths: Sequence[LightPath], differences: Floats, colors: Floats | None = None) -> None:
@@ -241,6 +245,47 @@ def draft_alone(
     planes: list[Plane | None] = [None] * DETAILS
     planes[detail] = finish(sheet, first, frames[0], places[0], own)
     return np.asarray(merge(planes, shot.size_px), dtype=np.float64)
+
+
+def mark_spread(
+    ghosts: Sequence[tuple[Shot, LightPath]], art: Sequence[PathArt], source: Floats, halved: int,
+    sheets: list[Floats | None],
+) -> None:  # fmt: skip
+    """Mark paraxial ghosts of an area light that share a spread, and nothing else is done to.
+
+    Parameters
+    ----------
+    ghosts, art, source, halved
+        As in `draft_alone`; none with a ramp or a blur.
+    sheets : list of ndarray or None
+        One a resolution; made where there is none, and added to: `kernels.raster.sum_rows` twice turns them into flux
+        per pixel.
+    """
+    shot = ghosts[0][0]
+    width, height = (-(-side // 2**halved) for side in shot.size_px)
+    kernel = shape_kernel(source, 0.5**halved)
+    my, mx = (side // 2 for side in kernel.shape)
+    marks = np.zeros((height + 2 * my, width + 2 * mx, 3))
+    for (lit, path), each in zip(ghosts, art, strict=True):
+        placed = each.place(shot.to_pixels, _frame(lit, path) if each.framed else None) / 2.0**halved
+        moved = replace(lit, to_pixels=placed + np.array([mx, my, 0.0, 0.0]))
+        draw_draft(moved, [path], marks, draft_colors(lit, [path]) * each.rgb)
+    held = sheets[halved]
+    if held is None:
+        held = sheets[halved] = np.zeros((height, width, 3))
+    steps = np.diff(kernel, axis=1, prepend=0.0, append=0.0)
+    steps[np.abs(steps) < ROUNDING * kernel.max()] = 0.0
+    rows, columns = np.nonzero(steps)
+    spread_marks(marks, rows, columns, steps[rows, columns], np.array([my, mx]), held)
+
+
+def spread_light(sheet: Floats) -> Floats:
+    """Turn a sheet that `mark_spread` marked into flux per pixel, in place."""
+    sum_rows(sheet)
+    sum_rows(sheet)
+    # what the sums' rounding leaves is no light
+    sheet[np.abs(sheet) < ROUNDING * np.abs(sheet).max()] = 0.0
+    return sheet
 
 
 def draft_centre(shot: Shot, path: LightPath) -> Floats:
