@@ -65,7 +65,7 @@ def test_what_is_culled_carries_what_was_allowed(in_full):
 
 
 def test_a_path_is_weighed_by_all_wavelengths():
-    """Root mean squares: of two mirrors with one coating the mean of the product, of different ones never less."""
+    """Power means: of mirrors with one coating the mean of the product, of different ones never less."""
     settled = settle(project("heliar-tronnier"))
     packed = make_shots(settled, make_opening(settled, None))[0].packed
     table, typical = packed.reflectance, packed.typical_reflectance
@@ -76,6 +76,9 @@ def test_a_path_is_weighed_by_all_wavelengths():
         for i in coated:
             mean = (table[:, j, -1] * table[:, i, -1]).mean()
             assert typical[j, -1] * typical[i, -1] >= mean * (1.0 - 1e-12)
+    four = packed.typical_reflectance_of_four[coated, -1]
+    assert four**4 == pytest.approx((table[:, coated, -1] ** 4).mean(axis=0))
+    assert four[:4].prod() >= table[:, coated[:4], -1].prod(axis=1).mean() * (1.0 - 1e-12)
     # the middle wavelength alone says next to nothing
     middle = table[len(table) // 2, coated[0], -1]
     assert middle**2 < 0.01 * typical[coated[0], -1] ** 2

@@ -82,12 +82,17 @@ class PackedLens:
 
     @cached_property
     def typical_reflectance(self) -> NDArray[np.float64]:
-        """Root mean square of R over the wavelengths, shape (K, M): for estimates of a whole path.
+        """Root mean square of R over the wavelengths, shape (K, M): for estimates of a path of two reflections.
 
         A coating may leave next to nothing at the middle wavelength and much beside it. Two mirrors of one coating make
         <R^2>, which this gives; of different ones it gives more than <R_1 R_2>, never less (Cauchy and Schwarz).
         """
         return np.asarray(np.sqrt(np.mean(self.reflectance**2, axis=0)))
+
+    @cached_property
+    def typical_reflectance_of_four(self) -> NDArray[np.float64]:
+        """The same for paths of four reflections: fourth root of the mean of R^4 (Hoelder)."""
+        return np.asarray(np.mean(self.reflectance**4, axis=0) ** 0.25)
 
     @property
     def first_surface(self) -> int:

@@ -41,7 +41,9 @@ def _listed(packed: PackedLens, n_gap: Floats, reflectance: Floats, path: LightP
 
 def _looking_arguments(packed: PackedLens, w: int, path: LightPath, tilt: float) -> Any:
     """List the same for the pre-pass: rays run as at one wavelength, and carry what light of all wavelengths does."""
-    return _listed(packed, packed.n_gap[w], packed.typical_reflectance, path, tilt)
+    two = len(path.mirrors) <= 2
+    typical = packed.typical_reflectance if two else packed.typical_reflectance_of_four
+    return _listed(packed, packed.n_gap[w], typical, path, tilt)
 
 
 def front_box(packed: PackedLens, tilt: float) -> Floats:
