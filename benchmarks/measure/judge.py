@@ -27,6 +27,8 @@ SEEN, SHARP = 3.0, 5.0
 SAME = 0.5
 # a fragment: this part of it lies in the true ghost, which is there as bright as the fragment within this factor
 INSIDE, AS_BRIGHT = 0.7, 2.5
+# two paths whose footprints share this part of what either covers wherever both are seen are one ghost to any camera
+COINCIDE = 0.9
 CLASSES = ("clean", "fold", "cut", "at the edge", "outshone")
 
 
@@ -41,13 +43,20 @@ class FoundGhost:
 
 @dataclass
 class Tally:
-    """What was counted, constellation after constellation."""
+    """What was counted, constellation after constellation, by the class of the true ghost.
+
+    `found` are ghosts of a model, fragments merged, that belong to a true ghost of a class; `good` those of them that
+    are it; `strange` belong to none. `apart` and `met_apart` count true ghosts, coinciding paths as one.
+    """
 
     true: dict[str, int] = field(default_factory=lambda: dict.fromkeys(CLASSES, 0))
     met: dict[str, int] = field(default_factory=lambda: dict.fromkeys(CLASSES, 0))
-    found: int = 0
-    good: int = 0
+    found: dict[str, int] = field(default_factory=lambda: dict.fromkeys(CLASSES, 0))
+    good: dict[str, int] = field(default_factory=lambda: dict.fromkeys(CLASSES, 0))
+    strange: int = 0
     pieces: int = 0
+    apart: int = 0
+    met_apart: int = 0
     centres: dict[str, list[float]] = field(default_factory=lambda: {name: [] for name in CLASSES})
     squares: dict[str, list[tuple[float, float]]] = field(default_factory=dict)
     ssim: list[tuple[float, float]] = field(default_factory=list)
@@ -86,6 +95,7 @@ def judge(model: GhostModel, folder: Path, run_folder: Path, run: MergedRun) -> 
     tally = Tally()
     infos = sorted(run.frames, key=lambda info: info.nominal_deg)
     frames: dict[str, MergedFrame] = {}
+    twins = coinciding(folder)
     for pose in read_poses(folder):
         if not pose["number"] % 2:
             continue
@@ -102,7 +112,7 @@ def judge(model: GhostModel, folder: Path, run_folder: Path, run: MergedRun) -> 
             _judge_picture(picture, total, sigma, pair, pose, far, tally)
         ghosts = read_ghosts(folder, pose["number"])
         if ghosts is not None:
-            _judge_ghosts(ghosts, found_ghosts(model, pose, sigma, far), far, tally)
+            _judge_ghosts(ghosts, found_ghosts(model, pose, sigma, far), far, twins, tally)
     return summary(tally)
 
 
@@ -159,7 +169,41 @@ def found_ghosts(model: GhostModel, pose: dict[str, Any], sigma: NDArray[np.floa
     return found
 
 
-def _judge_ghosts(ghosts: list[TrueGhost], found: list[FoundGhost], far: Mask, tally: Tally) -> None:
+def coinciding(folder: Path) -> dict[str, str]:
+    """Return of every path that coincides with a brighter one that one's name."""
+    least: dict[tuple[str, str], float] = {}
+    for pose in read_poses(folder):
+        ghosts = [ghost for ghost in read_ghosts(folder, pose["number"]) or [] if ghost.snr >= SEEN]
+        for k, one in enumerate(ghosts):
+            for other in ghosts[:k]:
+                pair = one.name, other.name
+                if least.get(pair, 1.0) >= COINCIDE or least.get(pair[::-1], 1.0) >= COINCIDE:
+                    least[pair] = min(least.get(pair, 1.0), _shared(one, other))
+    found: dict[str, str] = {}
+    for (fainter, brighter), shared in least.items():
+        if min(shared, least.get((brighter, fainter), 1.0)) >= COINCIDE and brighter not in found:
+            found.setdefault(fainter, brighter)
+    return found
+
+
+def _shared(a: TrueGhost, b: TrueGhost) -> float:
+    """Return which part of what either covers both cover."""
+    left, top = max(a.window[0], b.window[0]), max(a.window[1], b.window[1])
+    right = min(a.window[0] + a.window[2], b.window[0] + b.window[2])
+    bottom = min(a.window[1] + a.window[3], b.window[1] + b.window[3])
+    if right <= left or bottom <= top:
+        return 0.0
+    parts = [
+        one.mask[top - one.window[1] : bottom - one.window[1], left - one.window[0] : right - one.window[0]]
+        for one in (a, b)
+    ]
+    both = np.count_nonzero(parts[0] & parts[1])
+    return both / (np.count_nonzero(a.mask) + np.count_nonzero(b.mask) - both)
+
+
+def _judge_ghosts(
+    ghosts: list[TrueGhost], found: list[FoundGhost], far: Mask, twins: dict[str, str], tally: Tally
+) -> None:
     masks = [_whole(ghost, far.shape) for ghost in ghosts]
     seen = [
         ghost.snr >= SEEN and bool((mask & far).sum() > 0.5 * mask.sum())
@@ -179,6 +223,7 @@ def _judge_ghosts(ghosts: list[TrueGhost], found: list[FoundGhost], far: Mask, t
         if of is not None:
             groups.setdefault(of, []).append(f)
             free.discard(f)
+    one_of: dict[str, bool] = {}
     for t, ghost in enumerate(ghosts):
         name = class_of(ghost)
         parts = groups.get(t, [])
@@ -186,15 +231,19 @@ def _judge_ghosts(ghosts: list[TrueGhost], found: list[FoundGhost], far: Mask, t
         same = merged is not None and _overlap(masks[t], merged) >= SAME
         tally.pieces += len(parts)
         if parts:
-            tally.found += 1
-            tally.good += same
+            tally.found[name] += 1
+            tally.good[name] += same
         if seen[t]:
             tally.true[name] += 1
             tally.met[name] += same
+            shared = twins.get(ghost.name, ghost.name)
+            one_of[shared] = one_of.get(shared, False) or same
         if same and ghost.snr >= SHARP and merged is not None:
             tally.centres[name].append(float(np.hypot(*np.subtract(_middle(masks[t]), _middle(merged)))))
-    tally.found += len(free)
+    tally.strange += len(free)
     tally.pieces += len(free)
+    tally.apart += len(one_of)
+    tally.met_apart += sum(one_of.values())
 
 
 def _whole(ghost: TrueGhost, shape: tuple[int, ...]) -> Mask:
@@ -245,14 +294,19 @@ def summary(tally: Tally) -> dict[str, Any]:
         return float(10.0 * np.log10(between / model))
 
     true, met = sum(tally.true.values()), sum(tally.met.values())
+    found, good = sum(tally.found.values()) + tally.strange, sum(tally.good.values())
     unfolded = [value for name in CLASSES if name != "fold" for value in tally.centres[name]]
     return {
-        "recall": met / max(true, 1),
-        "precision": tally.good / max(tally.found, 1),
-        "true": true, "found": tally.found, "pieces": tally.pieces,
-        "recall by class": {name: (tally.met[name], tally.true[name]) for name in CLASSES},
+        "recall, clean": tally.met["clean"] / max(tally.true["clean"], 1),
+        "recall, all": met / max(true, 1),
+        "recall, all, coinciding paths as one": tally.met_apart / max(tally.apart, 1),
+        "precision": good / max(found, 1),
+        "true": true, "true, coinciding paths as one": tally.apart, "found": found, "pieces": tally.pieces,
+        "found, of no true ghost": tally.strange,
+        "met of true": {name: (tally.met[name], tally.true[name]) for name in CLASSES},
+        "good of found": {name: (tally.good[name], tally.found[name]) for name in CLASSES},
         "centre px, no fold": spread(unfolded),
-        "centre px by class": {name: spread(tally.centres[name]) for name in CLASSES},
+        "centre px": {name: spread(tally.centres[name]) for name in CLASSES},
         "gain dB": {name: gain(pairs) for name, pairs in tally.squares.items()},
         "gain dB, median angle": {
             name: float(np.median([10.0 * np.log10(b / m) for m, b in pairs])) for name, pairs in tally.squares.items()

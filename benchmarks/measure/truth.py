@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 from dataclasses import dataclass
-from math import pi
 from pathlib import Path
 
 import numpy as np
@@ -28,8 +27,8 @@ Mask = NDArray[np.bool_]
 _RAYS = (48, 96)
 # part of the pupil that must land turned over for a fold
 FOLD = 0.02
-# an accepted pupil that fills less than this of the ellipse with its moments is cut by more than one rim
-CUT = 0.985
+# a rim is one of several that cut a ghost when it stops this part of the rays just outside the open pupil
+CUT = 0.05
 # another ghost's light over a ghost's own, and the part of the ghost where it is exceeded, that make a crossing
 CROSSING_LIGHT, CROSSING_PART = 1.0, 0.5
 # ghosts below this part of green's noise are not kept
@@ -109,7 +108,7 @@ def true_ghosts(setup: Setup, pose: Pose, scale: float, sigma: NDArray[np.float3
 
 
 def _forms(setup: Setup, pose: Pose) -> dict[str, tuple[bool, bool]]:
-    """Tell of every path whether it folds, and whether several rims cut it."""
+    """Tell of every path whether it folds, and whether several rims bound it."""
     settled = settle(project_of(setup, pose, "passes"))
     shot = make_shots(settled, make_opening(settled, None))[0]
     return {path.name: form for path in ghost_paths(settled.lens) if (form := _form(shot, path)) is not None}
@@ -129,12 +128,20 @@ def _form(shot: Shot, path: LightPath) -> tuple[bool, bool] | None:
     passes = (rays[:, ALIVE] > 0.5) & (rays[:, REL] <= 1.0) & (at_stop <= radius)
     if passes.sum() < 30:
         return None
-    # the other half is its mirror image, so across the mirror the moment is about 0
-    spread = np.sqrt(np.mean(px[passes] ** 2) * np.var(py[passes]))
-    area = 2.0 * passes.sum() * (across[1] - across[0]) * (along[1] - along[0])
     grid = _RAYS[::-1]
     x, y, open_ = rays[:, X].reshape(grid), rays[:, Y].reshape(grid), passes.reshape(grid)
     whole = open_[1:, 1:] & open_[1:, :-1] & open_[:-1, 1:] & open_[:-1, :-1]
     turned = np.diff(x, axis=1)[:-1] * np.diff(y, axis=0)[:, :-1] - np.diff(y, axis=1)[:-1] * np.diff(x, axis=0)[:, :-1]
     over = float(np.mean(turned[whole] > 0.0)) if whole.any() else 0.0
-    return min(over, 1.0 - over) > FOLD, bool(area < CUT * 4.0 * pi * spread)
+    # each time that the iris is passed it bounds by itself; glass is what stops the others
+    reach = np.hypot(stops[..., 0], stops[..., 1])
+    stopped_by = np.where(at_stop > radius, np.argmax(reach, axis=1), stops.shape[1])
+    return min(over, 1.0 - over) > FOLD, _bounded_by(open_, stopped_by.reshape(grid)) > 1
+
+
+def _bounded_by(open_: Mask, stopped_by: NDArray[np.int64]) -> int:
+    """Return how many rims stop the rays just outside an open pupil."""
+    padded = np.pad(open_, 1)
+    beside = padded[:-2, 1:-1] | padded[2:, 1:-1] | padded[1:-1, :-2] | padded[1:-1, 2:]
+    count = np.bincount(stopped_by[beside & ~open_])
+    return int(np.count_nonzero(count > CUT * count.sum()))
