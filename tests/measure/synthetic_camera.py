@@ -20,6 +20,7 @@ import shutil
 import tempfile
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, replace
+from functools import cache
 from math import cos, degrees, hypot, radians, sin
 from pathlib import Path
 from typing import Any
@@ -30,11 +31,14 @@ from numpy.typing import NDArray
 import flarewright as fw
 from flarewright.model.capture import FrameInfo, MergedFrame
 from flarewright.optics.color import xyz_to_rgb_matrix
+from flarewright.render.direct import direct_image
+from flarewright.render.prepare import settle
+from flarewright.render.shot import make_opening, make_shots
 
 Floats = NDArray[np.float64]
 Pixels = NDArray[np.float32]
 
-VERSION = 1
+VERSION = 2
 """Raise when the same `Setup` gives other pixels, so that old caches are not taken."""
 
 # the sensor's red, green and blue from X, Y, Z: no weight is negative, so no light gives a negative count
@@ -193,15 +197,39 @@ def truth_of(setup: Setup, pose: Pose, scale: float) -> Truth:
     layers = {layer.name: layer for layer in rendering.layers}
     ghosts = _seen(setup, layers["ghosts"]) * scale
     star = _blurred(_seen(setup, layers["starburst"]) * scale)
-    light = _light_px(setup, rendering)
+    light = _light_px(setup, pose, rendering)
     total = ghosts + star + _haze(setup, light)
     return Truth(total.astype(np.float32), ghosts.astype(np.float32), light)
 
 
-def _light_px(setup: Setup, rendering: fw.Rendering) -> tuple[float, float]:
-    x, y = rendering.summary["lights"][0]["direct_position_mm"]
+def _light_px(setup: Setup, pose: Pose, rendering: fw.Rendering) -> tuple[float, float]:
+    told = rendering.summary["lights"][0]
+    x, y = told["direct_position_mm"] if any(told["direct_throughput_mm2"]) else dark_mm(setup, pose)
     per_mm = setup.size_px[0] / setup.sensor_width_mm
     return setup.axis_px[0] + x * per_mm, setup.axis_px[1] - y * per_mm
+
+
+def dark_mm(setup: Setup, pose: Pose) -> tuple[float, float]:
+    """Return where the light's image would be if the rims let it pass, on the sensor, mm: the lens' law goes on."""
+    focal, bent = _law(replace(setup.steady, roll_deg=0.0))
+    x, y = (np.tan(np.radians(angle)) for angle in pose.field_deg)
+    stretch = focal * (1.0 + bent * (x * x + y * y))
+    return float(stretch * x), float(stretch * y)
+
+
+@cache
+def _law(setup: Setup) -> tuple[float, float]:
+    """Return focal length (mm) and distortion by the direct images that are not dark."""
+    seen = []
+    for pose in poses(setup):
+        settled = settle(project_of(setup, pose, "passes"))
+        image = direct_image(settled.lens, make_shots(settled, make_opening(settled, None))[0])
+        t = abs(float(np.tan(np.radians(pose.constellation_deg))))
+        if image.throughput_mm2.any() and t > 0.0:
+            seen.append((t, t**3, hypot(*image.position_mm)))
+    table = np.array(seen)
+    focal, third = np.linalg.lstsq(table[:, :2], table[:, 2], rcond=None)[0]
+    return float(focal), float(third / focal)
 
 
 def _seen(setup: Setup, layer: fw.Layer) -> Floats:

@@ -4,7 +4,22 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from synthetic_camera import Setup, expose, ghosts_of, ideal_frame, make, poses, scale_of, truth_of
+from synthetic_camera import (
+    Setup,
+    dark_mm,
+    expose,
+    ghosts_of,
+    ideal_frame,
+    make,
+    poses,
+    project_of,
+    scale_of,
+    truth_of,
+)
+
+from flarewright.render.direct import direct_image
+from flarewright.render.prepare import settle
+from flarewright.render.shot import make_opening, make_shots
 
 SMALL = Setup(size_px=(90, 60), angles_deg=(0.0, 6.0, 12.0), sensor_width_mm=36.0, axis_offset_px=(1, -1))
 
@@ -76,3 +91,23 @@ def test_truth_is_the_same_at_two_densities_of_rays():
     assert not np.array_equal(one, other)
     assert np.sqrt(np.mean((one - other) ** 2) / np.mean(other**2)) < 0.01
     assert one.sum() == pytest.approx(other.sum(), rel=2e-3)
+
+
+def test_a_light_that_the_rims_hide_goes_on_where_the_lens_would_image_it():
+    setup = Setup(
+        lens="takumar-50-f1.4", f_number=5.6, angles_deg=tuple(range(2, 30, 3)), size_px=(90, 60), tilt_deg=0.0,
+        axis_offset_px=(1, -1), wander_deg=0.0, pitch_deg=0.0, pitch_wander_deg=0.0,
+    )  # fmt: skip
+    places = []
+    for pose in poses(setup):
+        settled = settle(project_of(setup, pose, "passes"))
+        image = direct_image(settled.lens, make_shots(settled, make_opening(settled, None))[0])
+        places.append((*image.position_mm, *dark_mm(setup, pose), bool(image.throughput_mm2.any())))
+    table = np.array(places)
+    lit = table[:, 4] > 0.0
+    assert lit[:6].all()
+    # the law misses what it was learned from by less than a pixel of 90, and ends beyond all of it
+    assert np.hypot(*(table[lit, :2] - table[lit, 2:4]).T).max() < 36.0 / 90.0
+    assert (np.diff(table[:, 2]) > 0.0).all()
+    # what is dark lies at the ideal place in a rendering, never in the middle
+    assert (table[:, 0] > 0.0).all()

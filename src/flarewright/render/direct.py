@@ -63,13 +63,13 @@ def direct_image(lens: Lens, shot: Shot) -> DirectImage:
     packed, opening = shot.packed, shot.opening
     count = len(packed.wavelengths_nm)
     middle = (count - 1) // 2
+    ideal = -packed.first_order.efl * np.tan(tilt) * axes[1]
+    place, mean = (float(ideal[0]), float(ideal[1])), 0.0
     region = find_region(packed, path, tilt, opening.radius)
     if region is None:
-        ideal = -packed.first_order.efl * np.tan(tilt) * axes[1]
-        return DirectImage(np.zeros(count), (float(ideal[0]), float(ideal[1])), 0.0)
+        return DirectImage(np.zeros(count), place, mean)
     bundle = trace_grid(packed, path, tilt, (opening.radius, opening.inner), region, tolerance=0.25, scale=_SCALE)
     flux = np.zeros(count)
-    place, mean = (0.0, 0.0), 0.0
     for w in range(count):
         data = trace_bundle(packed, w, bundle, tilt)
         sums = measure_bundle(data, bundle.pupil, bundle.triangles, 1, opening.blades, axes, bundle.halves)
