@@ -5,14 +5,15 @@ import pytest
 
 from flarewright.kernels.measure_edges import sum_along_rows, sum_changes_along_rows
 from flarewright.kernels.measure_mesh import draw_ghosts, draw_with_changes, window_of
-from flarewright.kernels.measure_pupil import FIRST_DISC, FIRST_G, FIRST_I
+from flarewright.kernels.measure_pupil import BLADES, FIRST_DISC, FIRST_G, FIRST_I, TURN
+from flarewright.measure.numbers import NUMBERS
 
 SIZE = (240, 140)
 
 
 def ghost(discs: int = 1) -> np.ndarray:
     """Return a ghost with every aberration."""
-    numbers = np.zeros(42)
+    numbers = np.zeros(NUMBERS)
     numbers[:10] = 150.0, 3.0, -4.0, 12.0, 0.0, 1.0, 0.0, 0.3, 0.0, -1.0
     numbers[FIRST_G : FIRST_G + 10] = 40.0, 5.0, 4.0, -3.0, 0.0, 0.0, 0.7, 0.0, 1.5, 0.0
     numbers[FIRST_I : FIRST_I + 4] = 1.0, 0.3, -0.2, 0.1
@@ -33,7 +34,7 @@ def draw(numbers, discs, sigma=0.5, frame=FRAME, size=SIZE):
 
 
 def test_a_disc_is_as_large_and_as_bright_as_it_is():
-    numbers = np.zeros(42)
+    numbers = np.zeros(NUMBERS)
     numbers[0], numbers[FIRST_G], numbers[FIRST_I] = 80.0, 30.0, 900.0
     picture = draw(numbers, 0)
     assert picture.sum() == pytest.approx(900.0 * np.pi, rel=1e-9)
@@ -44,6 +45,35 @@ def test_a_disc_is_as_large_and_as_bright_as_it_is():
     assert np.allclose(picture[away > 31.5], 0.0, atol=1e-12)
     # second moment of a disc: r^2 / 2
     assert (picture * away**2).sum() / picture.sum() == pytest.approx(450.0, rel=2e-3)
+
+
+@pytest.mark.parametrize("roll", [0.0, 0.7, 3.0])
+def test_blades_are_a_polygon_of_the_same_area_that_stands_still_when_the_light_rolls(roll):
+    numbers = np.zeros(NUMBERS)
+    numbers[FIRST_G], numbers[FIRST_I] = 40.0, 1600.0
+    numbers[BLADES], numbers[TURN] = 5.0, 1.1
+    frame = np.array([100.3, 60.7, np.cos(roll), np.sin(roll), 1.0])
+    picture = draw(numbers, 0, frame=frame)
+    assert picture.sum() == pytest.approx(1600.0 * np.pi, rel=1e-9)
+    # a pentagon of area pi, by its sides' distance
+    away = np.sqrt(np.pi / (5.0 * np.tan(np.pi / 5.0)))
+    y, x = np.mgrid[: SIZE[1], : SIZE[0]] + 0.5
+    out = [(x - 100.3) * np.cos(1.1 + 0.4 * np.pi * k) + (60.7 - y) * np.sin(1.1 + 0.4 * np.pi * k) for k in range(5)]
+    inside = 40.0 * away - np.max(out, axis=0)
+    assert np.allclose(picture[inside > 1.0], 1.0, rtol=1e-9)
+    assert np.allclose(picture[inside < -1.0], 0.0, atol=1e-12)
+
+
+def test_blades_are_cut_by_discs():
+    numbers = np.zeros(NUMBERS)
+    numbers[FIRST_G], numbers[FIRST_I], numbers[BLADES] = 40.0, 1.0, 6.0
+    numbers[FIRST_DISC : FIRST_DISC + 3] = 1.2, 0.2, 0.9
+    p = np.linspace(-1.2, 1.2, 2401)
+    xi, eta = np.meshgrid(p, p)
+    sides = [xi * np.cos(np.pi * k / 3.0 - 0.3) + eta * np.sin(np.pi * k / 3.0 - 0.3) for k in range(6)]
+    open_part = np.max(sides, axis=0) <= np.sqrt(np.pi / (6.0 * np.tan(np.pi / 6.0)))
+    open_part &= np.hypot(xi - 0.625, eta) <= 0.9
+    assert draw(numbers, 1).sum() == pytest.approx(open_part.sum() * (p[1] - p[0]) ** 2, rel=2e-3)
 
 
 def test_flux_is_kept_through_folds_and_cuts_are_those_of_the_discs():
@@ -73,7 +103,7 @@ def even(discs: int = 1) -> np.ndarray:
 
 
 def test_joined_cells_are_as_bright_as_the_pupil_is():
-    numbers = np.zeros(42)
+    numbers = np.zeros(NUMBERS)
     numbers[0], numbers[FIRST_G] = 80.0, 30.0
     numbers[FIRST_I : FIRST_I + 3] = 900.0, 200.0, 240.0
     picture = draw(numbers, 0)
@@ -90,7 +120,14 @@ def test_joined_cells_are_as_bright_as_the_pupil_is():
     assert picture.sum() == pytest.approx((900.0 + 100.0) * np.pi, rel=2e-3)
 
 
-@pytest.mark.parametrize("kind", [ghost, even])
+def bladed(discs: int = 1) -> np.ndarray:
+    """Return a ghost with every aberration and seven blades."""
+    numbers = ghost(discs)
+    numbers[BLADES], numbers[TURN] = 7.0, 0.4
+    return numbers
+
+
+@pytest.mark.parametrize("kind", [ghost, even, bladed])
 @pytest.mark.parametrize("discs", [0, 1, 2])
 def test_derivatives_are_those_of_the_picture(discs, kind):
     numbers = kind(discs)
@@ -103,7 +140,7 @@ def test_derivatives_are_those_of_the_picture(discs, kind):
     part = slice(top, top + height), slice(left, left + width)
     assert np.allclose(plane[:, :-1], draw(numbers, discs)[part], atol=1e-13)
     for q, n in enumerate(free):
-        step = np.zeros(42)
+        step = np.zeros(NUMBERS)
         step[n] = 1e-5
         by_difference = (draw(numbers + step, discs) - draw(numbers - step, discs))[part] / 2e-5
         assert np.abs(by_difference - changes[:, :-1, q]).max() < 1e-4 * np.abs(by_difference).max() + 1e-12, n

@@ -6,8 +6,8 @@ from planted_run import GHOSTS, SIZE, views
 
 from flarewright.measure.fit import render
 from flarewright.measure.glow import halo_at, halo_radiance, offsets, star_at, star_radiance
-from flarewright.measure.glow_fit import fit_halo, fit_star, followed, glow, register
-from flarewright.model.ghost_model import Halo, Star
+from flarewright.measure.glow_fit import Registered, fit_halo, fit_star, followed, glow, iris_of, register
+from flarewright.model.ghost_model import Blades, Halo, Star
 
 HALO = Halo(
     radius_px=(2.0, 10.0, 50.0, 600.0), radiance=((3.0, 2.0, 1.0), (1.0, 0.8, 0.5), (0.2, 0.2, 0.2), (0.05, 0.05, 0.05))
@@ -51,6 +51,24 @@ def test_star_has_its_spikes_direction_width_and_law():
         for each in (STAR, found)
     )
     assert np.abs(got / expected - 1.0).max() < 0.4
+
+
+def test_light_along_the_line_of_ghosts_makes_no_star_of_two_spikes():
+    some = shown(star=True)
+    known = register(some, [view.pixels for view in some], 0.5)
+    right, up = known.polar()
+    band = 6.0 * np.exp(-0.5 * (up / np.maximum(0.4 * np.abs(right), 1.0)) ** 2)
+    # as bright as spikes, but wide
+    found = fit_star(Registered((known.picture + band[..., None]).astype(np.float32), known.side))
+    assert found.spikes == 14
+
+
+@pytest.mark.parametrize(
+    ("spikes", "blades"), [(6, 6), (8, 8), (10, 5), (14, 7), (18, 9), (12, 12), (2, None), (40, None)]
+)
+def test_spikes_tell_the_blades(spikes, blades):
+    found = iris_of(STAR.replace(spikes=spikes))
+    assert found == (None if blades is None else Blades(count=blades, first_deg=STAR.first_deg))
 
 
 def test_no_star_where_there_is_none():

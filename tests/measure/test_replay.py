@@ -9,7 +9,7 @@ from flarewright.cli.app import run
 from flarewright.errors import FlarewrightError
 from flarewright.io.exr import read_exr
 from flarewright.io.ghost_model_file import read_ghost_model, write_ghost_model
-from flarewright.measure.numbers import channel_of
+from flarewright.measure.numbers import NUMBERS, channel_of
 from flarewright.measure.placing import brightness, constellation_and_roll
 from flarewright.measure.replay import light_px, replay
 from flarewright.model.ghost_model import AberrationGhost, BezierGhost, GhostModel, Halo, Reference, Star
@@ -20,7 +20,7 @@ def planted() -> GhostModel:
     """Return a model with a ghost of each kind, a halo and a star."""
     channels = []
     for m in range(3):
-        numbers = np.zeros(42)
+        numbers = np.zeros(NUMBERS)
         numbers[:4] = -60.0 - m, 1.0, 0.5, 4.0
         numbers[10:13] = 14.0 + m, 1.0, 0.3
         numbers[20:23] = 900.0 - 200.0 * m, 80.0, 0.0

@@ -15,6 +15,8 @@ from flarewright.measure.find import Candidate
 from flarewright.measure.fit import Fit, Shape
 from flarewright.measure.found import Found
 from flarewright.measure.journal import Journal, journal
+from flarewright.measure.numbers import NUMBERS
+from flarewright.model.ghost_model import Blades
 
 
 def interrupted(path, digest, results) -> int:
@@ -30,10 +32,10 @@ def interrupted(path, digest, results) -> int:
 
 def test_a_journal_gives_back_every_bit(tmp_path):
     rng = np.random.default_rng(1)
-    shape = Shape(rng.normal(size=42), 2)
+    shape = Shape(rng.normal(size=NUMBERS), 2)
     fit = Fit(shape, np.array([0, 3, 10]), rng.normal(size=(3, 3)), 1.0 / 3.0, 7)
     results = [
-        [Candidate(np.float64(0.1), 2.0, 0, 3, np.float64(1e-17))],
+        [Candidate(np.float64(0.1), 2.0, 0, 3, np.float64(1e-17), Blades(count=7, first_deg=0.1 + 0.2))],
         None,
         Found((shape, shape, shape), 0, 5, (fit,) * 3),
         [],

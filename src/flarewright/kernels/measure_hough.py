@@ -1,24 +1,49 @@
-"""Look for ghosts in all constellations at once: circles whose centre runs along the light's line with the field."""
+"""Look for ghosts in all constellations: rims whose centre runs along the light's line in proportion to the field."""
 
 from math import cos, floor, pi, sin, sqrt
 
 import numpy as np
 
 from ._jit import compiled, inner
+from .measure_iris import apothem
 
-_LEAST_SPOTS, _MOST_SPOTS = 12, 40
+
+@compiled
+def outline(blades, turn, spots):
+    """Fill evenly spread points of a rim of area pi, and the normals there, rows counting downwards.
+
+    Parameters
+    ----------
+    blades : int
+        0: a circle.
+    turn : float
+        Direction of a side's normal, radians counterclockwise from the right.
+    spots : ndarray, shape (P, 4), float64
+        Filled: x, y, and the normal's x and y.
+    """
+    for k in range(spots.shape[0]):
+        at = (k + 0.5) / spots.shape[0]
+        away, along, angle = 1.0, 0.0, 2.0 * pi * at
+        if blades > 0:
+            side = floor(at * blades)
+            angle = turn + 2.0 * pi * side / blades
+            away = apothem(blades)
+            along = (2.0 * (at * blades - side) - 1.0) * away * sin(pi / blades) / cos(pi / blades)
+        c, s = cos(angle), sin(angle)
+        spots[k, 0], spots[k, 1] = away * c - along * s, -(away * s + along * c)
+        spots[k, 2], spots[k, 3] = c, -s
 
 
 @inner
-def _edge(tx, ty, cx, cy, radius, cosines, sines, every):
-    """Return the mean inward slope on a circle and the part of it that was seen."""
+def _edge(tx, ty, cx, cy, radius, spots, every):
+    """Return the mean inward slope on a rim and the part of it that was seen."""
     height, width = tx.shape
     total, seen, asked = 0.0, 0, 0
-    for k in range(0, cosines.size, every):
+    for k in range(0, spots.shape[0], every):
         asked += 1
-        x, y = int(floor(cx + radius * cosines[k])), int(floor(cy + radius * sines[k]))
+        x, y = int(floor(cx + radius * spots[k, 0])), int(floor(cy + radius * spots[k, 1]))
         if 0 <= x < width and 0 <= y < height:
-            value = tx[y, x] * cosines[k] + ty[y, x] * sines[k]
+            value = tx[y, x] * spots[k, 2] + ty[y, x] * spots[k, 3]
             if value == value:
                 total -= value
                 seen += 1
@@ -28,8 +53,8 @@ def _edge(tx, ty, cx, cy, radius, cosines, sines, every):
 
 
 @compiled
-def search(slopes_x, slopes_y, sigmas, frames, speeds, sizes, bends, floor_level, sign, scores, runs):
-    """Score circles by how bright their border's inside is against its outside, over the best run of views.
+def search(slopes_x, slopes_y, sigmas, frames, speeds, sizes, rims, floor_level, sign, scores, runs):
+    """Score rims by how bright their border's inside is against its outside, over the best run of views.
 
     Parameters
     ----------
@@ -42,34 +67,30 @@ def search(slopes_x, slopes_y, sigmas, frames, speeds, sizes, bends, floor_level
         Place of the centre over the field, pixels of the model.
     sizes : ndarray, shape (R,)
         Radii, pixels of the model.
-    bends : ndarray, shape (B,)
-        Third order of the centre's place.
+    rims : ndarray, shape (K, P, 4)
+        Kinds of rims, each as `outline` fills it.
     floor_level : float
         Mean slope below which a view counts against.
     sign : float
         1 for bright discs; -1 for dark ones, which no ghost makes.
     scores : ndarray, shape (S, R)
-        Filled: the best over the bends.
+        Filled: the best over the kinds.
     runs : ndarray, shape (S, R, 3), int64
-        Filled: first and last view of the best run, and the bend.
+        Filled: first and last view of the best run, and the kind.
     """
-    spots = _MOST_SPOTS
-    cosines, sines = np.empty(spots), np.empty(spots)
-    for k in range(spots):
-        cosines[k], sines[k] = cos(2.0 * pi * (k + 0.5) / spots), sin(2.0 * pi * (k + 0.5) / spots)
     for s in range(speeds.size):
         for r in range(sizes.size):
             scores[s, r] = 0.0
-            for b in range(bends.size):
+            for b in range(rims.shape[0]):
                 run, start = 0.0, 0
                 for v in range(sigmas.size):
                     scale = frames[v, 4]
-                    away = sigmas[v] * (speeds[s] + bends[b] * sigmas[v] * sigmas[v]) * scale
+                    away = sigmas[v] * speeds[s] * scale
                     radius = sizes[r] * scale
                     every = 2 if radius < 8.0 else 1
                     slope, part = _edge(
                         slopes_x[v], slopes_y[v], frames[v, 0] + frames[v, 2] * away,
-                        frames[v, 1] - frames[v, 3] * away, radius, cosines, sines, every,
+                        frames[v, 1] - frames[v, 3] * away, radius, rims[b], every,
                     )  # fmt: skip
                     if part > 0.0:
                         run += (sign * slope - floor_level) * part

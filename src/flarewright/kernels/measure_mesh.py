@@ -12,11 +12,13 @@ import numpy as np
 from ._jit import compiled, inner
 from .measure_edges import add_edge, add_edge_changes
 from .measure_pupil import (
+    BLADES,
     DISC_NUMBERS,
     FIRST_DISC,
     FIRST_G,
     FIRST_I,
     TERMS,
+    TURN,
     at_field,
     border,
     level,
@@ -38,16 +40,18 @@ _AROUND = 3
 
 
 @inner
-def _mesh(parameters, disc_count, sigma, spokes, rings, with_changes, pupil, pupil_by):
+def _mesh(parameters, disc_count, sigma, frame, spokes, rings, with_changes, pupil, pupil_by):
     """Fill the mesh's pupil points and their derivatives by the discs; False: it is shut."""
+    blades = int(parameters[BLADES])
+    turn = parameters[TURN] - np.arctan2(frame[3], frame[2]) if blades > 0 else 0.0
     discs = np.empty((disc_count + 1, 2))
     rims(parameters, disc_count, sigma, discs)
     edge = np.empty((spokes + 1, 2))
     by = np.empty((spokes + 1, 2, 2 * disc_count + 2))
-    if not border(discs, disc_count + 1, spokes, with_changes, edge, by):
+    if not border(discs, disc_count + 1, spokes, blades, turn, with_changes, edge, by):
         return False
-    # a polygon as large as the disc it stands for
-    swell = sqrt((2.0 * pi / spokes) / sin(2.0 * pi / spokes))
+    # a polygon as large as the disc it stands for; an iris of blades is one
+    swell = sqrt((2.0 * pi / spokes) / sin(2.0 * pi / spokes)) if blades == 0 else 1.0
     for i in range(rings + 1):
         t = swell * i / rings
         for j in range(spokes):
@@ -185,13 +189,13 @@ def _draw_mesh(spots, densities, left, top, width, height, plane):
 
 
 @inner
-def _grain(parameters, disc_count, sigma, scale):
+def _grain(parameters, disc_count, sigma, frame):
     """Return spokes and rings fine enough for a ghost, and how many spokes a cell spans.
 
     0 spokes: nothing is open; a span of 0: there are folds, and every triangle stays alone.
     """
     pupil, none = np.empty((3, 8, 2)), np.empty((0, 0, 0, 0))
-    if not _mesh(parameters, disc_count, sigma, 8, 2, False, pupil, none):
+    if not _mesh(parameters, disc_count, sigma, frame, 8, 2, False, pupil, none):
         return 0, 0, 0
     reach, least, most = 0.0, 1e300, -1e300
     dark, bright = 1e300, 0.0
@@ -206,7 +210,7 @@ def _grain(parameters, disc_count, sigma, scale):
             intensity, _, _ = slopes(parameters, FIRST_I, xi * xi + eta * eta, xi * sigma, sigma * sigma)
             density = max(intensity, 0.0) / max(abs(area), 1e-9)
             dark, bright = min(dark, density), max(bright, density)
-    spokes = min(max(pi * sqrt(reach * scale / (2.0 * _CHORD)), _LEAST_SPOKES), _MOST_SPOKES)
+    spokes = min(max(pi * sqrt(reach * frame[4] / (2.0 * _CHORD)), _LEAST_SPOKES), _MOST_SPOKES)
     # coarse steps: while a ghost is fitted its mesh had better stay the same
     spokes = 16 * int(ceil(spokes / 16.0))
     rings = int(min(max(spokes // 6, _LEAST_RINGS), _MOST_RINGS))
@@ -247,11 +251,11 @@ def draw_ghosts(parameters, disc_counts, visible, sigma, frame, plane):
     for g in range(parameters.shape[0]):
         if visible[g] == 0.0:
             continue
-        spokes, rings, span = _grain(parameters[g], disc_counts[g], sigma, frame[4])
+        spokes, rings, span = _grain(parameters[g], disc_counts[g], sigma, frame)
         if spokes == 0:
             continue
         pupil, spots = np.empty((rings + 1, spokes, 2)), np.empty((rings + 1, spokes, 2))
-        if not _mesh(parameters[g], disc_counts[g], sigma, spokes, rings, False, pupil, none):
+        if not _mesh(parameters[g], disc_counts[g], sigma, frame, spokes, rings, False, pupil, none):
             continue
         _land(parameters[g], pupil, sigma, frame, spots)
         densities = np.empty((rings, spokes, 2))
@@ -281,11 +285,11 @@ def window_of(parameters, disc_count, sigma, frame, width, height):
     left, top, width, height : int
         Of the window; width 0 when it touches none.
     """
-    spokes, rings, _ = _grain(parameters, disc_count, sigma, frame[4])
+    spokes, rings, _ = _grain(parameters, disc_count, sigma, frame)
     if spokes == 0:
         return 0, 0, 0, 0
     pupil, spots = np.empty((rings + 1, spokes, 2)), np.empty((rings + 1, spokes, 2))
-    if not _mesh(parameters, disc_count, sigma, spokes, rings, False, pupil, np.empty((0, 0, 0, 0))):
+    if not _mesh(parameters, disc_count, sigma, frame, spokes, rings, False, pupil, np.empty((0, 0, 0, 0))):
         return 0, 0, 0, 0
     _land(parameters, pupil, sigma, frame, spots)
     x0, y0, x1, y1 = 1e30, 1e30, -1e30, -1e30
@@ -474,12 +478,12 @@ def draw_with_changes(parameters, disc_count, sigma, free, frame, left, top, pla
     differences.
     """
     height, width = plane.shape[0], plane.shape[1] - 1
-    spokes, rings, span = _grain(parameters, disc_count, sigma, frame[4])
+    spokes, rings, span = _grain(parameters, disc_count, sigma, frame)
     if spokes == 0:
         return
     pupil, spots = np.empty((rings + 1, spokes, 2)), np.empty((rings + 1, spokes, 2))
     pupil_by = np.empty((rings + 1, spokes, 2, 2 * disc_count + 2))
-    if not _mesh(parameters, disc_count, sigma, spokes, rings, True, pupil, pupil_by):
+    if not _mesh(parameters, disc_count, sigma, frame, spokes, rings, True, pupil, pupil_by):
         return
     _land(parameters, pupil, sigma, frame, spots)
     spots_by = np.empty((rings + 1, spokes, free.size, 2))

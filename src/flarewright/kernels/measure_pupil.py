@@ -1,8 +1,9 @@
 """The pupil of a measured ghost: a fan of points over the intersection of discs, and where they land on the sensor.
 
 A ghost of a lens of revolution maps a pupil point p and a field s to (x, y) = s f(p.p, p.s, s.s) + p g(p.p, p.s, s.s):
-no other form is symmetric. Its rims are the unit disc and discs whose centres move with s, so that the open part of the
-pupil is convex and mirrored at the line through s. Every point comes with its derivatives by the ghost's parameters.
+no other form is symmetric. Its rims are the unit disc, or an iris of straight blades as large (`measure_iris`), and
+discs whose centres move with s, so that the open part of the pupil is convex; with discs alone it is mirrored at the
+line through s. Every point comes with its derivatives by the ghost's parameters.
 """
 
 from math import cos, pi, sin, sqrt
@@ -10,13 +11,17 @@ from math import cos, pi, sin, sqrt
 import numpy as np
 
 from ._jit import inner
+from .measure_iris import ends, nearest_side, side_and_disc, side_corner
 
 # monomials of u = p.p, v = p.s, w = s.s up to second order: of f, of g and of the intensity
 TERMS = 10
-# parameters: f, g, intensity, then three a disc: centre by s, centre by s (s.s), radius
+# parameters: f, g, intensity, then three a disc: centre by s, centre by s (s.s), radius; last the blades of the iris,
+# 0 for a round one, and the direction of a side's normal in the picture, radians counterclockwise from the right
 FIRST_G, FIRST_I, FIRST_DISC = TERMS, 2 * TERMS, 3 * TERMS
 DISC_NUMBERS = 3
 MOST_DISCS = 4
+BLADES = FIRST_DISC + DISC_NUMBERS * MOST_DISCS
+TURN = BLADES + 1
 
 
 @inner
@@ -60,10 +65,13 @@ def _reach(middle, cosine, sine, centre, radius):
 
 
 @inner
-def _nearest_rim(middle, cosine, sine, discs, count):
-    """Return which disc's rim is met first along a spoke."""
-    best, at = 1e30, 0
-    for k in range(count):
+def _nearest_rim(middle, cosine, sine, discs, count, blades, turn):
+    """Return which rim is met first along a spoke: a disc's number, or -1 - e for side e of the iris."""
+    best, at, first = 1e30, 0, 0
+    if blades > 0:
+        side, best, _ = nearest_side(middle, cosine, sine, blades, turn)
+        at, first = -1 - side, 1
+    for k in range(first, count):
         reach, _, _ = _reach(middle, cosine, sine, discs[k, 0], discs[k, 1])
         if reach < best:
             best, at = reach, k
@@ -110,14 +118,17 @@ def rims(parameters, disc_count, sigma, discs):
 
 
 @inner
-def border(discs, count, spokes, with_changes, points, by):
+def border(discs, count, spokes, blades, turn, with_changes, points, by):
     """Fill the border of the open pupil, spoke by spoke, from the middle of its axis.
 
     Parameters
     ----------
     discs : ndarray, shape (D, 2)
         Centre along s and radius.
-    count, spokes : int
+    count, spokes, blades : int
+        With blades above 0 the iris stands in the first disc's place.
+    turn : float
+        Angle of a side's normal from s, radians.
     with_changes : bool
         Whether to fill `by`.
     points : ndarray, shape (spokes + 1, 2)
@@ -131,7 +142,9 @@ def border(discs, count, spokes, with_changes, points, by):
         False when nothing is open.
     """
     low, high, at_low, at_high = -1e30, 1e30, 0, 0
-    for k in range(count):
+    if blades > 0:
+        low, high = ends(blades, turn)
+    for k in range(1 if blades > 0 else 0, count):
         if discs[k, 1] <= 0.0:
             return False
         if discs[k, 0] - discs[k, 1] > low:
@@ -151,22 +164,40 @@ def border(discs, count, spokes, with_changes, points, by):
     turn_c, turn_s = cos(2.0 * pi / spokes), sin(2.0 * pi / spokes)
     cosine, sine = 1.0, 0.0
     for j in range(spokes):
-        k = _nearest_rim(middle, cosine, sine, discs, count) if count > 1 else 0
+        k = _nearest_rim(middle, cosine, sine, discs, count, blades, turn) if count > 1 or blades > 0 else 0
         active[j] = k
-        reach, by_a, by_r = _reach(middle, cosine, sine, discs[k, 0], discs[k, 1])
+        if k < 0:
+            # what the first disc's numbers change is asked by nobody
+            _, reach, by_a = nearest_side(middle, cosine, sine, blades, turn)
+            k, by_r = 0, 0.0
+        else:
+            reach, by_a, by_r = _reach(middle, cosine, sine, discs[k, 0], discs[k, 1])
         points[j, 0], points[j, 1] = middle + reach * cosine, reach * sine
         for q in range(2 * count if with_changes else 0):
             dm = by[spokes, 0, q]
             dreach = by_a * (dm - (1.0 if q == 2 * k else 0.0)) + (by_r if q == 2 * k + 1 else 0.0)
             by[j, 0, q], by[j, 1, q] = dm + dreach * cosine, dreach * sine
         cosine, sine = cosine * turn_c - sine * turn_s, sine * turn_c + cosine * turn_s
-    if count > 1:
-        _snap(discs, spokes, active, middle, points, by)
+    if count > 1 or blades > 0:
+        _snap(discs, spokes, blades, turn, active, middle, points, by)
     return True
 
 
 @inner
-def _snap(discs, spokes, active, middle, points, by):
+def _meeting(discs, blades, turn, a, b, upper, near_x, near_y, spot, change):
+    """Fill where two rims meet, and its derivatives; tell whether they do."""
+    if a >= 0 and b >= 0:
+        return _corner(discs, a, b, upper, spot, change)
+    if a < 0 and b < 0:
+        return side_corner(blades, turn, -1 - a, -1 - b, spot)
+    side, disc = (-1 - a, b) if a < 0 else (-1 - b, a)
+    return side_and_disc(
+        blades, turn, side, discs[disc, 0], discs[disc, 1], near_x, near_y, spot, change[:, 2 * disc : 2 * disc + 2]
+    )
+
+
+@inner
+def _snap(discs, spokes, blades, turn, active, middle, points, by):
     """Move the nearest spoke onto each corner, where two rims meet: a fan's chord would cut it off."""
     spot, change = np.empty(2), np.empty((2, by.shape[2]))
     for j in range(spokes):
@@ -175,14 +206,15 @@ def _snap(discs, spokes, active, middle, points, by):
             continue
         change[:] = 0.0
         upper = sin(2.0 * pi * (j + 0.5) / spokes) > 0.0
-        if not _corner(discs, active[j], active[after], upper, spot, change):
+        near_x, near_y = 0.5 * (points[j, 0] + points[after, 0]), 0.5 * (points[j, 1] + points[after, 1])
+        if not _meeting(discs, blades, turn, active[j], active[after], upper, near_x, near_y, spot, change):
             continue
         here = np.arctan2(spot[1], spot[0] - middle)
-        turn = here - 2.0 * pi * j / spokes
-        turn -= 2.0 * pi * np.floor(turn / (2.0 * pi))
-        if turn > 2.0 * pi / spokes:
+        away = here - 2.0 * pi * j / spokes
+        away -= 2.0 * pi * np.floor(away / (2.0 * pi))
+        if away > 2.0 * pi / spokes:
             continue
-        at = j if turn < pi / spokes else after
+        at = j if away < pi / spokes else after
         points[at, 0], points[at, 1] = spot[0], spot[1]
         by[at] = change
 

@@ -16,6 +16,7 @@ from ..model.ghost_tracks import GhostTrack, Tracks
 from .curves import Pose
 from .fit import MODEL_ERROR, Fit, Indices, Shape, cost_of, free_numbers, patches_of, refine
 from .found import CHANNELS, Found, alone, by_light, exchange, rest_of
+from .normal import inverse
 from .numbers import NUMBERS, Floats, channel_numbers, channel_of
 from .orders import needed_numbers, parabola
 from .smooth import smooth_curve
@@ -104,7 +105,8 @@ def span_of(ghost: AberrationGhost, track: GhostTrack) -> tuple[float, float]:
 
 
 def _found(ghost: AberrationGhost, span: tuple[float, float], views: Sequence[View]) -> Found:
-    red, green, blue = (Shape(channel_numbers(each), len(each.discs)) for each in (ghost.red, ghost.green, ghost.blue))
+    colours = ghost.red, ghost.green, ghost.blue
+    red, green, blue = (Shape(channel_numbers(each, ghost.blades), len(each.discs)) for each in colours)
     there = [k for k, view in enumerate(views) if span[0] <= view.constellation_deg <= span[1]]
     return Found((red, green, blue), there[0], there[-1])
 
@@ -244,7 +246,7 @@ def held_error(fit: Fit | None) -> Floats:
     """Return each number's standard deviation with all others held: what rounding one of them may cost."""
     out = np.zeros(NUMBERS)
     if fit is not None:
-        known = np.diag(np.linalg.pinv(fit.covariance, hermitian=True))
+        known = np.diag(inverse(fit.covariance))
         out[fit.free] = np.where(known > 0.0, 1.0 / np.sqrt(np.maximum(known, 1e-300)), 0.0)
     return out
 
@@ -269,7 +271,7 @@ def numbers_in(model: GhostModel) -> int:
     for ghost in model.ghosts:
         if isinstance(ghost, AberrationGhost):
             for colour in (ghost.red, ghost.green, ghost.blue):
-                total += int(np.count_nonzero(channel_numbers(colour)))
+                total += int(np.count_nonzero(channel_numbers(colour, None)))
             curves = ghost.curves
             total += sum(
                 len(one.values) for one in (curves.brightness, curves.along_px, curves.size) if one is not None

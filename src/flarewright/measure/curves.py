@@ -36,14 +36,14 @@ def posed(numbers: Floats, sigma: float, pose: Pose) -> Floats:
 
     Parameters
     ----------
-    numbers : ndarray, shape (42,)
+    numbers : ndarray, shape (44,)
     sigma : float
         Length of the field; with the light on the axis nothing shifts along it.
     pose : Pose
 
     Returns
     -------
-    ndarray, shape (42,)
+    ndarray, shape (44,)
     """
     out = numbers.copy()
     if sigma > 0.0:

@@ -1,9 +1,9 @@
-"""Find ghosts without help: circles that run along the light's line, in all constellations at once.
+"""Find ghosts without help: rims that run along the light's line, in all constellations at once.
 
 A ghost of a lens of revolution is mirrored at the line through axis and light, and at small fields its centre runs
 along that line in proportion to the field: in the picture of position over field it is a straight band that meets the
 axis at field 0. So two numbers, speed and size, describe a candidate, and every constellation votes for it with its
-border.
+border: a circle, or the iris' polygon, either way round.
 """
 
 from __future__ import annotations
@@ -15,7 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernels.measure_hough import salient_slopes, search
+from ..kernels.measure_hough import outline, salient_slopes, search
+from ..model.ghost_model import Blades
 from .fit import scaled
 from .numbers import Floats
 from .views import Pixels, View, halved
@@ -24,7 +25,8 @@ from .views import Pixels, View, halved
 SALIENT = 4.0
 # a view whose border is not brighter inside by this much counts against a candidate
 LEVEL = 0.16
-_BENDS = (0.0,)
+# points of a rim that are asked
+_SPOTS = 40
 
 
 @dataclass(frozen=True)
@@ -39,6 +41,8 @@ class Candidate:
         Views in which its border was seen.
     score : float
         Sum of the views' votes.
+    blades : Blades or None
+        Of its rim; None: a circle.
     """
 
     speed: float
@@ -46,6 +50,7 @@ class Candidate:
     first: int
     last: int
     score: float
+    blades: Blades | None = None
 
 
 @dataclass(frozen=True)
@@ -101,6 +106,7 @@ def candidates(
     *,
     sign: float = 1.0,
     most: int = 8,
+    iris: Blades | None = None,
     pool: ThreadPoolExecutor | None = None,
 ) -> list[Candidate]:
     """Return the best candidates, best first, none close to a better one.
@@ -113,8 +119,12 @@ def candidates(
     sign : float
         -1 looks for dark discs: how well those score tells what chance does.
     most : int
+    iris : Blades, optional
+        Rims are looked for that have its form, beside circles.
     pool : executor, optional
     """
+    kinds = rims_of(iris)
+    rims = np.stack([_outline(kind) for kind in kinds])
     fine = 0.004 * width
     speeds = np.concatenate([np.arange(-2.6 * width, -1.0 * width, 2.0 * fine), np.arange(-width, width, fine),
                              np.arange(width, 2.6 * width, 2.0 * fine)])  # fmt: skip
@@ -123,9 +133,7 @@ def candidates(
 
     def one(part: Floats) -> tuple[Floats, NDArray[np.int64]]:
         scores, runs = np.zeros((part.size, sizes.size)), np.zeros((part.size, sizes.size, 3), np.int64)
-        search(
-            slopes.x, slopes.y, slopes.sigmas, slopes.frames, part, sizes, np.array(_BENDS), LEVEL, sign, scores, runs
-        )
+        search(slopes.x, slopes.y, slopes.sigmas, slopes.frames, part, sizes, rims, LEVEL, sign, scores, runs)
         return scores, runs
 
     found = [one(part) for part in parts] if pool is None else list(pool.map(one, parts))
@@ -144,5 +152,19 @@ def candidates(
             for other in best
         ):  # fmt: skip
             continue
-        best.append(Candidate(speed, radius, first, last, float(scores[s, r])))
+        best.append(Candidate(speed, radius, first, last, float(scores[s, r]), kinds[int(runs[s, r, 2])]))
     return best
+
+
+def rims_of(iris: Blades | None) -> list[Blades | None]:
+    """Return the kinds of rims that ghosts may have: round, the iris', and one of odd blades upside down."""
+    if iris is None:
+        return [None]
+    turned = Blades(count=iris.count, first_deg=iris.first_deg + 180.0)
+    return [None, iris, turned] if iris.count % 2 else [None, iris]
+
+
+def _outline(kind: Blades | None) -> Floats:
+    spots = np.empty((_SPOTS, 4))
+    outline(0 if kind is None else kind.count, 0.0 if kind is None else np.radians(kind.first_deg), spots)
+    return spots

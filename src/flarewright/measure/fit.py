@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ..kernels.measure_edges import sum_along_rows, sum_changes_along_rows
 from ..kernels.measure_mesh import draw_ghosts, draw_with_changes, window_of
 from ..kernels.measure_pupil import DISC_NUMBERS, FIRST_DISC, FIRST_G, FIRST_I
+from .normal import inverse, solution
 from .numbers import NUMBERS, Floats
 from .views import View, halved
 
@@ -31,7 +32,7 @@ class Shape:
 
     Attributes
     ----------
-    numbers : ndarray, shape (42,)
+    numbers : ndarray, shape (44,)
         See `kernels.measure_pupil`.
     discs : int
     """
@@ -65,7 +66,7 @@ class Fit:
 
     @property
     def uncertainty(self) -> Floats:
-        """Standard deviation of all 42 numbers; 0 for those that were not fitted."""
+        """Standard deviation of all 44 numbers; 0 for those that were not fitted."""
         deviation = np.zeros(NUMBERS)
         # pixels that the model misses by more than noise make all numbers less certain
         excess = max(1.0, self.cost / max(self.count - self.free.size, 1))
@@ -273,8 +274,8 @@ def refine(
     for _ in range(steps):
         improved = False
         for _retry in range(8):
-            step = np.linalg.solve(matrix + damping * np.diag(np.diag(matrix)), side)
-            trial = stepped(shape, free, np.asarray(step, dtype=np.float64))
+            step = solution(matrix + damping * np.diag(np.diag(matrix)), side)
+            trial = stepped(shape, free, step)
             trial_cost, trial_count, trial_matrix, trial_side = look(trial)
             if trial_cost < cost:
                 improved = True
@@ -288,8 +289,7 @@ def refine(
         # a search needs no more than its model is worth; a measurement ends where noise hides every step
         if gained < (1e-4 if error > 0.0 else 1e-7) * cost:
             break
-    covariance = np.asarray(np.linalg.pinv(matrix, hermitian=True), dtype=np.float64)
-    return Fit(shape, free, covariance, cost, count)
+    return Fit(shape, free, inverse(matrix), cost, count)
 
 
 def stepped(shape: Shape, free: Indices, step: Floats) -> Shape:

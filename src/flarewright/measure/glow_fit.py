@@ -8,9 +8,10 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from ..model.ghost_model import Halo, Rgb3, Star
+from ..model.ghost_model import Blades, Halo, Rgb3, Star
 from .glow import halo_radiance, offsets, star_radiance
 from .numbers import Floats
 from .views import Pixels, View, halved
@@ -24,6 +25,10 @@ _RINGS = 20
 _DIRECTIONS = 1440
 _SPIKY = 1.25
 _MOST_SPIKES = 48
+# spikes are narrower than this, degrees; what is wider along a ring is ghosts
+_SPIKE_DEG = 7.0
+# an iris of more blades is round
+_MOST_BLADES = 20
 # how strong halo and star are is learned from about so many pixels of a view, in so many rounds; the part of them that
 # their laws may miss
 _SAMPLES, _ROUNDS, _GLOW_ERROR = 8000, 12, 0.1
@@ -239,8 +244,10 @@ def _fit_star(known: Registered) -> Star | None:
     if not np.isfinite(between).all() or not between.min() > 0.0:
         return None
     shape = np.nan_to_num(np.nanmedian(ring[..., 1] / between[:, None], axis=0), nan=1.0)
-    # one strong ridge shall not speak for a comb
-    harmonics = np.fft.rfft(np.minimum(shape, 4.0))
+    # neither one strong ridge nor what ghosts leave along the light's line shall speak for a comb
+    half = round(_SPIKE_DEG / 360.0 * _DIRECTIONS)
+    wide = np.median(sliding_window_view(np.pad(shape, half, mode="wrap"), 2 * half + 1), axis=1)
+    harmonics = np.fft.rfft(np.clip(shape - wide, 0.0, 1.0))
     strength = np.abs(harmonics[2 : _MOST_SPIKES + 1])
     # the comb's own number is the lowest of its harmonics
     strong = np.flatnonzero(strength > 0.6 * strength.max()) + 2
@@ -267,6 +274,21 @@ def _fit_star(known: Registered) -> Star | None:
         spikes=spikes, first_deg=float(np.degrees(first)) % (360.0 / spikes),
         width_px=max(float(np.nanmedian(widths)), 0.4), radius_px=radius, radiance=tuple(levels),
     )  # fmt: skip
+
+
+def iris_of(star: Star | None) -> Blades | None:
+    """Return the iris that makes a star: every side makes two spikes at right angles to it; None when none is known.
+
+    Notes
+    -----
+    Of blades of an even number two make the same two spikes. So 2 n spikes may be n odd blades or 2 n; as most irises
+    are made, 10 and more spikes whose half is odd are taken for half as many blades.
+    """
+    if star is None or star.spikes % 2 or star.spikes < 4:
+        return None
+    half = star.spikes // 2
+    count = half if half % 2 and half >= 5 else star.spikes
+    return Blades(count=count, first_deg=star.first_deg) if count <= _MOST_BLADES else None
 
 
 def glow(view: View, known: Registered) -> Pixels:

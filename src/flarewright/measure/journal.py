@@ -20,6 +20,7 @@ import numpy as np
 from .. import __version__
 from ..errors import OutputError
 from ..io.atomic import write_atomically
+from ..model.ghost_model import Blades
 from .find import Candidate
 from .fit import Fit, Shape
 from .found import Found
@@ -27,7 +28,7 @@ from .found import Found
 Made = TypeVar("Made")
 
 # what steps may be made of besides numbers, texts, lists and arrays
-_RECORDS: dict[str, type[Any]] = {one.__name__: one for one in (Candidate, Shape, Fit, Found)}
+_RECORDS: dict[str, type[Any]] = {one.__name__: one for one in (Candidate, Shape, Fit, Found, Blades)}
 
 
 class Journal:
@@ -130,6 +131,8 @@ def _packed(value: Any) -> Any:
     """Turn a result into JSON that gives every number back to the last bit."""
     if is_dataclass(value) and type(value).__name__ in _RECORDS:
         return {"is": type(value).__name__, **{one.name: _packed(getattr(value, one.name)) for one in fields(value)}}
+    if isinstance(value, Blades):
+        return {"is": "Blades", "count": value.count, "first_deg": value.first_deg}
     if isinstance(value, np.ndarray):
         data = base64.b64encode(np.ascontiguousarray(value).tobytes()).decode()
         return {"array": data, "type": value.dtype.str, "shape": list(value.shape)}

@@ -8,22 +8,37 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernels.measure_pupil import DISC_NUMBERS, FIRST_DISC, FIRST_G, FIRST_I, MOST_DISCS
-from ..model.ghost_model import AberrationGhost, BezierGhost, Channel, Disc, Ten
+from ..kernels.measure_pupil import BLADES, DISC_NUMBERS, FIRST_DISC, FIRST_G, FIRST_I, TURN
+from ..model.ghost_model import AberrationGhost, BezierGhost, Blades, Channel, Disc, Ten
 
 Floats = NDArray[np.float64]
 
-NUMBERS = FIRST_DISC + DISC_NUMBERS * MOST_DISCS
+NUMBERS = TURN + 1
 
 
-def channel_numbers(channel: Channel) -> Floats:
-    """Return the numbers of one colour, shape (42,), discs that are not there 0."""
+def channel_numbers(channel: Channel, blades: Blades | None) -> Floats:
+    """Return the numbers of one colour of a ghost, shape (44,), discs and blades that are not there 0."""
     numbers = np.zeros(NUMBERS)
     numbers[:FIRST_G], numbers[FIRST_G:FIRST_I], numbers[FIRST_I:FIRST_DISC] = channel.f, channel.g, channel.intensity
     for k, disc in enumerate(channel.discs):
         at = FIRST_DISC + DISC_NUMBERS * k
         numbers[at : at + DISC_NUMBERS] = *disc.centre, disc.radius
-    return numbers
+    return with_blades(numbers, blades)
+
+
+def with_blades(numbers: Floats, blades: Blades | None) -> Floats:
+    """Return numbers with other blades, or a round rim."""
+    out = numbers.copy()
+    out[BLADES] = 0.0 if blades is None else blades.count
+    out[TURN] = 0.0 if blades is None else np.radians(blades.first_deg)
+    return out
+
+
+def blades_of(numbers: Floats) -> Blades | None:
+    """Return the blades that numbers, shape (44,), tell of."""
+    if not numbers[BLADES]:
+        return None
+    return Blades(count=int(numbers[BLADES]), first_deg=round(float(np.degrees(numbers[TURN])), 6))
 
 
 def channel_of(numbers: Floats, discs: int, uncertainty: Floats | None = None) -> Channel:
@@ -31,10 +46,10 @@ def channel_of(numbers: Floats, discs: int, uncertainty: Floats | None = None) -
 
     Parameters
     ----------
-    numbers : ndarray, shape (42,)
+    numbers : ndarray, shape (44,)
     discs : int
         How many of its discs are there.
-    uncertainty : ndarray, shape (42,), or None
+    uncertainty : ndarray, shape (44,), or None
     """
     end = FIRST_DISC + DISC_NUMBERS * discs
     ten = [cast(Ten, tuple(map(float, numbers[at : at + FIRST_G]))) for at in (0, FIRST_G, FIRST_I)]

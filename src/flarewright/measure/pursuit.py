@@ -12,12 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..kernels.measure_pupil import FIRST_G, FIRST_I
+from ..model.ghost_model import Blades
 from .find import Candidate, candidates, slopes_of
 from .fit import Shape, cost_of, patches_of, presence, render
 from .found import Found, darkened, rest_of
 from .grow import Growth, grow
 from .journal import Journal
-from .numbers import NUMBERS
+from .numbers import NUMBERS, with_blades
 from .settle import touch_up
 from .views import Pixels, View
 
@@ -40,6 +41,7 @@ def beginning(candidate: Candidate, views: Sequence[View], pixels: Sequence[Pixe
     numbers = np.zeros(NUMBERS)
     numbers[0], numbers[FIRST_G] = candidate.speed, candidate.radius
     numbers[FIRST_I] = candidate.radius**2
+    numbers = with_blades(numbers, candidate.blades)
     shape = Shape(numbers)
     seen = []
     for view, picture in zip(views, pixels, strict=True):
@@ -58,6 +60,7 @@ def pursue(
     most: int = 60,
     first: Sequence[Candidate] = (),
     known: Sequence[Found] = (),
+    iris: Blades | None = None,
     pool: ThreadPoolExecutor | None = None,
     tell: Callable[[str], None] = lambda _: None,
     progress: Callable[[float, str], None] = lambda _part, _words: None,
@@ -76,6 +79,8 @@ def pursue(
         Tried before all others.
     known : sequence of Found
         Ghosts that are taken off first and stay as they are.
+    iris : Blades, optional
+        Rims that ghosts may have, beside round ones.
     pool : executor, optional
     tell : callable
         Gets a line for each ghost.
@@ -101,7 +106,7 @@ def pursue(
     steps = journal or Journal()
     fallen = _Fallen(progress)
     while len(found) < most:
-        votes = steps.step(partial(_candidates, shown, rest, masks, 12 + len(refused), pool))
+        votes = steps.step(partial(_candidates, shown, rest, masks, 12 + len(refused), iris, pool))
         trials = [each for each in votes if each.score > SCORE and not any(_same(each, other) for other in refused)]
         fallen(trials[0].score if trials else SCORE, len(found))
         taken = 0
@@ -117,8 +122,9 @@ def pursue(
             found.append(ghost)
             rest = _take_off(ghost, shown, rest)
             numbers = ghost.shapes[1].numbers
+            rim = "round" if trial.blades is None else f"{trial.blades.count} blades"
             tell(
-                f"ghost {len(found)}: speed {numbers[0]:.0f} px, size {abs(numbers[FIRST_G]):.1f} px, votes "
+                f"ghost {len(found)}: speed {numbers[0]:.0f} px, size {abs(numbers[FIRST_G]):.1f} px, {rim}, votes "
                 f"{trial.score:.1f}, views {ghost.first}-{ghost.last}"
             )
         if not trials:
@@ -146,10 +152,11 @@ def _candidates(
     rest: Sequence[Pixels],
     masks: Sequence[NDArray[np.bool_]],
     most: int,
+    iris: Blades | None,
     pool: ThreadPoolExecutor | None,
 ) -> list[Candidate]:
     slopes = slopes_of(_doubted(views, rest), rest, masks, pool=pool)
-    return candidates(slopes, views[0].size_px[0], most=most, pool=pool)
+    return candidates(slopes, views[0].size_px[0], most=most, iris=iris, pool=pool)
 
 
 def _doubted(views: Sequence[View], rest: Sequence[Pixels]) -> list[View]:

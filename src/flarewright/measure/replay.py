@@ -165,7 +165,7 @@ def pack(model: GhostModel) -> Packed:
     counts = np.zeros((3, len(meshes)), np.int64)
     for k, ghost in enumerate(meshes):
         for m, channel in enumerate((ghost.red, ghost.green, ghost.blue)):
-            numbers[m, k], counts[m, k] = channel_numbers(channel), len(channel.discs)
+            numbers[m, k], counts[m, k] = channel_numbers(channel, ghost.blades), len(channel.discs)
     return meshes, numbers, counts, curves
 
 
@@ -195,7 +195,7 @@ def draw_packed(
 
 
 def _posed(meshes: Sequence[AberrationGhost], numbers: Floats, constellation_deg: float, sigma: float) -> Floats:
-    """Return the numbers, shape (3, G, 42), as the ghosts' curves bend them at a constellation."""
+    """Return the numbers, shape (3, G, 44), as the ghosts' curves bend them at a constellation."""
     out = numbers
     for k, ghost in enumerate(meshes):
         if ghost.curves != Curves():

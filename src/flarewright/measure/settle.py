@@ -10,14 +10,18 @@ from functools import partial
 import numpy as np
 
 from ..kernels.measure_pupil import FIRST_DISC, FIRST_I
-from ..model.ghost_model import AberrationGhost
+from ..model.ghost_model import AberrationGhost, Blades
+from .find import rims_of
 from .fit import Fit, Shape, free_numbers, patches_of, presence, refine
 from .found import CHANNELS, Found, alone, by_light, exchange, rest_of
 from .grow import Growth, grow
 from .joint import lit
 from .journal import Journal
-from .numbers import channel_of
+from .numbers import blades_of, channel_of, with_blades
 from .views import Pixels, View
+
+# views by which the best rim is chosen
+_FEW = 8
 
 
 @dataclass(frozen=True)
@@ -44,6 +48,7 @@ def settle(
     views: Sequence[View],
     *,
     how: Settling = Settling(),
+    iris: Blades | None = None,
     pool: ThreadPoolExecutor | None = None,
     tell: Callable[[str], None] = lambda _: None,
     progress: Callable[[float, str], None] = lambda _part, _words: None,
@@ -57,6 +62,8 @@ def settle(
     views : sequence of View
         Glow taken off; what shall not count has infinite variance.
     how : Settling
+    iris : Blades, optional
+        Rims that a ghost may have when it is fitted for the first time, beside a round one.
     pool : executor, optional
     tell : callable
         Gets a line for each round.
@@ -77,7 +84,7 @@ def settle(
         rest = [rest_of(ghosts, views, m) for m in range(CHANNELS)]
         for done, k in enumerate(by_light(ghosts)):
             old = ghosts[k]
-            ghosts[k] = steps.step(partial(_again, old, views, rest, how, pool))
+            ghosts[k] = steps.step(partial(_again, old, views, rest, how, iris, pool))
             for m in range(CHANNELS):
                 exchange(old.shapes[m], ghosts[k].shapes[m], old, views, rest[m])
             progress((turn + (done + 1) / len(ghosts)) / how.rounds, f"ghost {done + 1} of {len(ghosts)}")
@@ -92,6 +99,7 @@ def _again(
     views: Sequence[View],
     rest: list[list[Pixels]],
     how: Settling,
+    iris: Blades | None,
     pool: ThreadPoolExecutor | None,
 ) -> Found:
     """Fit one ghost anew in all colours."""
@@ -100,7 +108,8 @@ def _again(
     for m in (1, 0, 2):
         shown = alone(ghost, m, views, rest[m], how.views)
         if m == 1 and ghost.fits[1] is None:
-            fits[m] = grow(shapes[1], shown, m, most=how.most, pool=pool) or fits[m]
+            start = _rimmed(shapes[1], shown, m, iris, pool)
+            fits[m] = grow(start, shown, m, most=how.most, pool=pool) or fits[m]
         else:
             start = shapes[m] if ghost.fits[m] is not None or m == 1 else _like(shapes[1], shapes[m], shown, m)
             fits[m] = _refined(start, shown, m, fits[1], pool) or fits[m]
@@ -108,6 +117,26 @@ def _again(
         if fit is not None:
             shapes[m] = fit.shape
     return replace(ghost, shapes=(shapes[0], shapes[1], shapes[2]), fits=(fits[0], fits[1], fits[2]))
+
+
+def _rimmed(
+    shape: Shape, shown: Sequence[View], channel: int, iris: Blades | None, pool: ThreadPoolExecutor | None
+) -> Shape:
+    """Return a shape with the rim, round or of blades, that fits best before anything else is freed."""
+    patches = patches_of(shape, shown, channel)
+    if iris is None or not patches:
+        return shape
+    few = patches[:: max(1, len(patches) // _FEW)]
+    free = free_numbers(1, shape.discs, 1)
+    own = blades_of(shape.numbers)
+    others = [kind for kind in rims_of(iris) if kind != own]
+    best, least = shape, np.inf
+    for kind in (own, *others):
+        start = replace(shape, numbers=with_blades(shape.numbers, kind))
+        fit = refine(start, few, free, width=shown[0].size_px[0], steps=4, pool=pool)
+        if fit.cost < least:
+            best, least = fit.shape, fit.cost
+    return best
 
 
 def touch_up(
@@ -194,7 +223,12 @@ def to_model(ghosts: Sequence[Found], views: Sequence[View]) -> tuple[Aberration
         died = angles[last] if ghost.last == last else 0.5 * (angles[ghost.last] + angles[ghost.last + 1])
         out.append(
             AberrationGhost(
-                name=str(number), red=channels[0], green=channels[1], blue=channels[2], visible_deg=(born, died)
+                name=str(number),
+                red=channels[0],
+                green=channels[1],
+                blue=channels[2],
+                blades=blades_of(ghost.shapes[1].numbers),
+                visible_deg=(born, died),
             )
         )
     return tuple(out)

@@ -16,13 +16,13 @@ from ..io.merged import read_frame
 from ..kernels.measure_pupil import FIRST_DISC, FIRST_I
 from ..model.capture import MergedRun
 from ..model.corrections import Corrections, Pointed
-from ..model.ghost_model import AberrationGhost, GhostModel, Halo, Reference, Star
+from ..model.ghost_model import AberrationGhost, Blades, GhostModel, Halo, Reference, Star
 from .find import Candidate
 from .fit import Shape, render
 from .found import Found
 from .fragments import joined
 from .glow import halo_at, offsets, star_at
-from .glow_fit import fit_halo, fit_star, followed, glow, register
+from .glow_fit import fit_halo, fit_star, followed, glow, iris_of, register
 from .joint import lit
 from .journal import Journal
 from .numbers import channel_numbers
@@ -164,12 +164,14 @@ def find_ghosts(
     dim = dimmed(views)
     times = max(0, int(np.ceil(np.log2(run.size_px[0] / SEARCH_WIDTH))))
     small = [coarse(view, times) for view in dim.views]
+    iris = iris_of(dim.star)
     pointed = [_pointed(each, small, 2.0**times, run) for each in (corrections.add if corrections else ())]
     measured = [np.asarray(np.isfinite(view.variance).all(axis=2)) for view in small]
     with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
         found = pursue(
-            small, measured, most=most, first=pointed, pool=pool, tell=tell, progress=progress, journal=journal
-        )
+            small, measured, most=most, first=pointed, iris=iris, pool=pool, tell=tell, progress=progress,
+            journal=journal,
+        )  # fmt: skip
         found = lit(joined(lit(found, small, pool=pool), small, pool=pool, tell=tell), small, pool=pool)
     ghosts = to_model([_sized(ghost, 2.0**times) for ghost in found], views)
     if corrections:
@@ -238,16 +240,20 @@ def fit_ghosts(
     if len(found) < len(rough.ghosts):
         raise FlarewrightError("a Bezier ghost cannot be fitted over all constellations; take it out of the model")
     settling = how or Settling(rounds=1)
+    iris = iris_of(dim.star)
     with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
         parts = iter(_parts(2 * again + 1, progress))
-        settled = settle(found, dim.views, how=settling, pool=pool, tell=tell, progress=next(parts), journal=journal)
+        settled = settle(
+            found, dim.views, how=settling, iris=iris, pool=pool, tell=tell, progress=next(parts), journal=journal
+        )
         for _ in range(again):
             # the quantile held ghosts too; with them known, the glow is better known and leaves more to be found
             dim = _dimmed_anew(dim, views, settled)
-            settled += _more(settled, dim.views, most - len(settled), pool, tell, next(parts), journal)
+            settled += _more(settled, dim.views, most - len(settled), iris, pool, tell, next(parts), journal)
             settled = settle(
-                settled, dim.views, how=settling, pool=pool, tell=tell, progress=next(parts), journal=journal
-            )
+                settled, dim.views, how=settling, iris=iris, pool=pool, tell=tell, progress=next(parts),
+                journal=journal,
+            )  # fmt: skip
     return with_rest(_model(run, to_model(settled, views), _dimmed_anew(dim, views, settled), views), views)
 
 
@@ -312,6 +318,7 @@ def _more(
     known: Sequence[Found],
     views: Sequence[View],
     most: int,
+    iris: Blades | None,
     pool: ThreadPoolExecutor,
     tell: Tell,
     progress: Progress,
@@ -322,8 +329,8 @@ def _more(
     small = [coarse(view, times) for view in views]
     measured = [np.asarray(np.isfinite(view.variance).all(axis=2)) for view in small]
     found = pursue(
-        small, measured, most=max(most, 0), known=[_sized(ghost, 0.5**times) for ghost in known], pool=pool, tell=tell,
-        progress=progress, journal=journal,
+        small, measured, most=max(most, 0), known=[_sized(ghost, 0.5**times) for ghost in known], iris=iris, pool=pool,
+        tell=tell, progress=progress, journal=journal,
     )  # fmt: skip
     return [_sized(ghost, 2.0**times) for ghost in found]
 
@@ -346,7 +353,9 @@ def without(ghosts: Sequence[Found], view: View, number: int) -> Pixels:
 
 def _found(ghost: AberrationGhost, views: Sequence[View]) -> Found:
     """Return a model's ghost as the fitter takes it."""
-    shapes = [Shape(channel_numbers(each), len(each.discs)) for each in (ghost.red, ghost.green, ghost.blue)]
+    shapes = [
+        Shape(channel_numbers(each, ghost.blades), len(each.discs)) for each in (ghost.red, ghost.green, ghost.blue)
+    ]
     there = [
         k for k, view in enumerate(views) if ghost.visible_deg[0] <= view.constellation_deg <= ghost.visible_deg[1]
     ]

@@ -14,6 +14,7 @@ from ..kernels.measure_pupil import FIRST_G, FIRST_I
 from .curves import Pose, posed
 from .fit import MODEL_ERROR, OUTLIER, Shape
 from .found import CHANNELS
+from .normal import inverse, solution
 from .numbers import Floats
 from .views import View
 
@@ -112,7 +113,7 @@ def measure_together(
             off = np.array([_difference(e, p) for e, p in zip(expected, poses, strict=True)]).reshape(-1, PER_GHOST)
             pulled = side.copy()
             pulled[:size] += prior[:size] * off.ravel()
-            step = np.asarray(np.linalg.solve(matrix + np.diag(prior + 1e-12), pulled)[:size], np.float64)
+            step = solution(matrix + np.diag(prior + 1e-12), pulled)[:size]
             trial = [_stepped(*each) for each in zip(poses, step.reshape(-1, PER_GHOST), spread, strict=True)]
             there = _normal(ghosts, trial, view, sure, doubting)
             if there[2] > cost:
@@ -121,7 +122,7 @@ def measure_together(
             poses, (matrix, side, cost, count) = trial, there
             if enough:
                 break
-    whole = np.linalg.pinv(matrix + np.diag(prior + 1e-12), hermitian=True)[:size, :size]
+    whole = inverse(matrix + np.diag(prior + 1e-12))[:size, :size]
     # a view that is missed by more than noise makes all of them less certain
     excess = max(1.0, cost / max(count - size, 1))
     error = np.sqrt(np.maximum(np.diag(whole), 0.0) * excess).reshape(-1, PER_GHOST)

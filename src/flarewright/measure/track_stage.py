@@ -98,8 +98,9 @@ def _checked(model: GhostModel) -> list[AberrationGhost]:
 
 
 def _shapes(ghost: AberrationGhost, factor: float) -> Shapes:
+    colours = ghost.red, ghost.green, ghost.blue
     red, green, blue = (
-        enlarged(Shape(channel_numbers(each), len(each.discs)), factor) for each in (ghost.red, ghost.green, ghost.blue)
+        enlarged(Shape(channel_numbers(each, ghost.blades), len(each.discs)), factor) for each in colours
     )
     return red, green, blue
 

@@ -37,7 +37,7 @@ class Channel(Frozen):
     """One colour of a ghost: where each point p of its pupil lands, and how bright it is.
 
     (x, y) = s f + p g; f, g and the intensity are polynomials of u = p.p, v = p.s, w = s.s with the ten terms
-    1, u, v, w, uu, uv, vv, uw, vw, ww. The pupil is the unit disc cut by `discs`.
+    1, u, v, w, uu, uv, vv, uw, vw, ww. The pupil is the unit disc, or the ghost's `blades`, cut by `discs`.
 
     Attributes
     ----------
@@ -103,6 +103,20 @@ class Curves(Frozen):
     size: Curve | None = None
 
 
+class Blades(Frozen):
+    """A rim of straight sides of one length, an iris' blades; it stands still when the light rolls.
+
+    Attributes
+    ----------
+    count : int
+    first_deg : float
+        Direction in which a side lies from the pupil's middle, counterclockwise from the right in the upright picture.
+    """
+
+    count: int = Field(ge=3, le=36)
+    first_deg: float
+
+
 class AberrationGhost(Frozen):
     """A ghost by its aberrations: one set of numbers for all constellations.
 
@@ -110,6 +124,8 @@ class AberrationGhost(Frozen):
     ----------
     name : str
     red, green, blue : Channel
+    blades : Blades or None
+        In the place of the pupil's unit disc stands a polygon as large.
     visible_deg : tuple of float
         Constellations at which it appears and disappears.
     curves : Curves
@@ -121,6 +137,7 @@ class AberrationGhost(Frozen):
     red: Channel
     green: Channel
     blue: Channel
+    blades: Blades | None = None
     visible_deg: tuple[float, float]
     curves: Curves = Curves()
 
