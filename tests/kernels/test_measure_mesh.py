@@ -33,6 +33,13 @@ def draw(numbers, discs, sigma=0.5, frame=FRAME, size=SIZE):
     return plane[:, :-1]
 
 
+def draw_finely(numbers, discs):
+    plane = np.zeros((SIZE[1], SIZE[0] + 1))
+    draw_with_changes(numbers, discs, 0.5, np.zeros(0, np.int64), FRAME, 0, 0, plane, np.zeros((1, 1, 0)))
+    sum_along_rows(plane)
+    return plane[:, :-1]
+
+
 def test_a_disc_is_as_large_and_as_bright_as_it_is():
     numbers = np.zeros(NUMBERS)
     numbers[0], numbers[FIRST_G], numbers[FIRST_I] = 80.0, 30.0, 900.0
@@ -138,11 +145,15 @@ def test_derivatives_are_those_of_the_picture(discs, kind):
     sum_along_rows(plane)
     sum_changes_along_rows(changes)
     part = slice(top, top + height), slice(left, left + width)
-    assert np.allclose(plane[:, :-1], draw(numbers, discs)[part], atol=1e-13)
+    assert np.allclose(plane[:, :-1], draw_finely(numbers, discs)[part], atol=1e-13)
+    # a replay's cells are larger
+    picture = draw(numbers, discs)[part]
+    assert np.sqrt(np.mean((picture - plane[:, :-1]) ** 2)) < 0.015 * np.sqrt(np.mean(picture**2))
+    assert picture.sum() == pytest.approx(plane[:, :-1].sum(), rel=2e-3)
     for q, n in enumerate(free):
         step = np.zeros(NUMBERS)
         step[n] = 1e-5
-        by_difference = (draw(numbers + step, discs) - draw(numbers - step, discs))[part] / 2e-5
+        by_difference = (draw_finely(numbers + step, discs) - draw_finely(numbers - step, discs))[part] / 2e-5
         assert np.abs(by_difference - changes[:, :-1, q]).max() < 1e-4 * np.abs(by_difference).max() + 1e-12, n
 
 

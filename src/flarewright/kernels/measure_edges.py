@@ -44,6 +44,35 @@ def _piece(row, x0, x1, dy, weight, left, width, plane):
 
 
 @inner
+def _add_inside(x, y0, y1, slope, weight, plane):
+    """Add an edge that nothing cuts off: most are, and most lie in one pixel of each row."""
+    row = int(y0)
+    # light a pixel of length gets where the edge runs across several
+    spread = weight / max(abs(slope), 1e-12)
+    while y0 < y1:
+        end = min(row + 1.0, y1)
+        x_end = x + (end - y0) * slope
+        low, high = min(x, x_end), max(x, x_end)
+        c = int(low)
+        if high <= c + 1.0:
+            light = weight * (end - y0)
+            far = light * (0.5 * (low + high) - c)
+            plane[row, c] += light - far
+            plane[row, c + 1] += far
+        else:
+            while low < high:
+                stop = min(c + 1.0, high)
+                light = spread * (stop - low)
+                far = light * (0.5 * (low + stop) - c)
+                plane[row, c] += light - far
+                plane[row, c + 1] += far
+                low = stop
+                c += 1
+        x, y0 = x_end, end
+        row += 1
+
+
+@inner
 def add_edge(x0, y0, x1, y1, weight, left, top, width, height, plane):
     """Add the light to the right of an edge that runs from (x0, y0) to (x1, y1), as differences along rows.
 
@@ -57,6 +86,9 @@ def add_edge(x0, y0, x1, y1, weight, left, top, width, height, plane):
     if y1 <= 0.0 or y0 >= height:
         return
     slope = (x1 - x0) / (y1 - y0)
+    if y0 >= 0.0 and y1 < height and min(x0, x1) >= left and max(x0, x1) < left + width:
+        _add_inside(x0 - left, y0, y1, slope, weight, plane)
+        return
     if y0 < 0.0:
         x0 -= y0 * slope
         y0 = 0.0

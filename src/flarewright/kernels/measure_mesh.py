@@ -2,7 +2,8 @@
 
 The mesh is a fan of spokes and rings over the open pupil (`kernels.measure_pupil`). A triangle carries the flux of its
 part of the pupil wherever it lands, so folds and caustics need no special care. Far from folds, triangles are joined to
-cells as large as the brightness over the pupil allows: only borders between cells are drawn.
+cells as large as the brightness over the pupil allows: only borders between cells are drawn. A fit draws with smaller
+cells than a replay, so that its pictures hardly jump where the mesh changes.
 """
 
 from math import ceil, floor, pi, sin, sqrt
@@ -33,10 +34,11 @@ _CHORD = 0.05
 _LEAST_SPOKES, _MOST_SPOKES = 16, 208
 _LEAST_RINGS, _MOST_RINGS = 3, 16
 # without folds: areas on the sensor that differ by no more than this factor, the part of the brightness that may change
-# from one ring of cells to the next, how many rings there may be, and cells around for each ring
+# from one cell to the next, outwards and around, how many edges a ring has at
+# least, and how many rings of cells there may be
 _EVEN, _STEP = 4.0, 0.05
+_ROUND, _AROUND = 16, 16
 _RINGS = (2, 3, 4, 6, 8, 12, 16)
-_AROUND = 3
 
 
 @inner
@@ -142,6 +144,58 @@ def _join(spots, span, densities):
 
 
 @inner
+def _cells(parameters, sigma, pupil, spots, span, densities):
+    """Fill what `_densities` and `_join` would: the light of a cell's part of the pupil over its area on the sensor."""
+    rings, spokes = densities.shape[0], densities.shape[1]
+    light, wedge = np.empty(6), np.empty(spokes)
+    at_field(parameters, FIRST_I, sigma * sigma, light)
+    x0, y0 = pupil[0, 0, 0], pupil[0, 0, 1]
+    for j in range(spokes):
+        k = j + 1 if j + 1 < spokes else 0
+        wedge[j] = _area(x0, y0, pupil[rings, j, 0], pupil[rings, j, 1], pupil[rings, k, 0], pupil[rings, k, 1])
+    for i in range(rings):
+        wide = _span_of(i, span, spokes, rings)
+        # parts of a wedge that the two triangles between rings are
+        outer, inner_part = (i + 1.0) / (rings * rings), float(i) / (rings * rings)
+        for first in range(0, spokes, wide):
+            flux, area = 0.0, 0.0
+            for j in range(first, first + wide):
+                k = j + 1 if j + 1 < spokes else 0
+                one, other = _cell_areas(spots, i, j, spokes)
+                ax, ay, bx, by = pupil[i, j, 0], pupil[i, j, 1], pupil[i + 1, j, 0], pupil[i + 1, j, 1]
+                cx, cy = pupil[i + 1, k, 0], pupil[i + 1, k, 1]
+                x, y = (ax + bx + cx) / 3.0, (ay + by + cy) / 3.0
+                flux += max(level(light, x * x + y * y, x * sigma), 0.0) * outer * wedge[j]
+                area += one
+                if i > 0:
+                    x, y = (ax + cx + pupil[i, k, 0]) / 3.0, (ay + cy + pupil[i, k, 1]) / 3.0
+                    flux += max(level(light, x * x + y * y, x * sigma), 0.0) * inner_part * wedge[j]
+                    area += other
+            density = -flux / area
+            for j in range(first, first + wide):
+                densities[i, j, 0], densities[i, j, 1] = density, density if i > 0 else 0.0
+
+
+@inner
+def _span_of(i, span, spokes, rings):
+    """Return how many spokes a cell of ring i spans: inside, where spokes are closer, more than at the rim."""
+    wide = max(span, 1)
+    for times in range(2, rings // (i + 1) + 1 if span > 0 else 2):
+        if spokes % (span * times) == 0:
+            wide = span * times
+    return wide
+
+
+@inner
+def _chord_of(span, spokes):
+    """Return how many spokes an edge between two rings of cells spans: as many as a cell, but a ring stays round."""
+    chord = max(span, 1)
+    while chord > 1 and (spokes < _ROUND * chord or span % chord):
+        chord -= 1
+    return chord
+
+
+@inner
 def _cell_light(spots, span, densities, i, first):
     """Return the light and the signed area of a cell of `span` spokes that begins at one of them."""
     light, area = 0.0, 0.0
@@ -169,28 +223,35 @@ def _cell_areas(spots, i, j, spokes):
 
 
 @inner
-def _draw_mesh(spots, densities, left, top, width, height, plane):
-    """Draw every edge once, with the step in density across it."""
+def _draw_mesh(spots, densities, span, fine, left, top, width, height, plane):
+    """Draw every edge once, with the step in density across it; unless fine, one between rings spans several spokes."""
     rings, spokes = densities.shape[0], densities.shape[1]
     for i in range(rings):
-        for j in range(spokes):
-            k = j + 1 if j + 1 < spokes else 0
+        wide = max(span, 1) if fine else _span_of(i, span, spokes, rings)
+        for j in range(0, spokes, wide):
             before = j - 1 if j > 0 else spokes - 1
             ax, ay = spots[i, j, 0], spots[i, j, 1]
             bx, by = spots[i + 1, j, 0], spots[i + 1, j, 1]
-            cx, cy = spots[i + 1, k, 0], spots[i + 1, k, 1]
             other = densities[i, before, 1] if i > 0 else densities[i, before, 0]
             add_edge(ax, ay, bx, by, densities[i, j, 0] - other, left, top, width, height, plane)
-            outer = densities[i + 1, j, 1] if i + 1 < rings else 0.0
-            add_edge(bx, by, cx, cy, densities[i, j, 0] - outer, left, top, width, height, plane)
-            if i > 0:
+            if i > 0 and span == 0:
+                k = j + 1 if j + 1 < spokes else 0
+                cx, cy = spots[i + 1, k, 0], spots[i + 1, k, 1]
                 step = densities[i, j, 1] - densities[i, j, 0]
                 add_edge(ax, ay, cx, cy, step, left, top, width, height, plane)
+        chord = _chord_of(span, spokes) if i + 1 < rings and not fine else 1
+        for j in range(0, spokes, chord):
+            k = j + chord if j + chord < spokes else 0
+            outer = densities[i + 1, j, 1] if i + 1 < rings else 0.0
+            add_edge(
+                spots[i + 1, j, 0], spots[i + 1, j, 1], spots[i + 1, k, 0], spots[i + 1, k, 1],
+                densities[i, j, 0] - outer, left, top, width, height, plane,
+            )  # fmt: skip
 
 
 @inner
-def _grain(parameters, disc_count, sigma, frame):
-    """Return spokes and rings fine enough for a ghost, and how many spokes a cell spans.
+def _grain(parameters, disc_count, sigma, frame, fine):
+    """Return spokes and rings fine enough for a ghost, and how many spokes a cell of the outermost ring spans.
 
     0 spokes: nothing is open; a span of 0: there are folds, and every triangle stays alone.
     """
@@ -198,7 +259,9 @@ def _grain(parameters, disc_count, sigma, frame):
     if not _mesh(parameters, disc_count, sigma, frame, 8, 2, False, pupil, none):
         return 0, 0, 0
     reach, least, most = 0.0, 1e300, -1e300
-    dark, bright = 1e300, 0.0
+    dark, bright, outwards = 1e300, 0.0, 0.0
+    rim_dark, rim_bright = 1e300, 0.0
+    seen = np.empty((3, 8))
     x0, y0, _, _, _, _ = place(parameters, pupil[0, 0, 0], pupil[0, 0, 1], sigma)
     for i in range(3):
         for j in range(8 if i > 0 else 1):
@@ -210,19 +273,27 @@ def _grain(parameters, disc_count, sigma, frame):
             intensity, _, _ = slopes(parameters, FIRST_I, xi * xi + eta * eta, xi * sigma, sigma * sigma)
             density = max(intensity, 0.0) / max(abs(area), 1e-9)
             dark, bright = min(dark, density), max(bright, density)
+            seen[i, j] = density
+            if i == 2:
+                rim_dark, rim_bright = min(rim_dark, density), max(rim_bright, density)
+                outwards = max(outwards, abs(seen[1, j] - seen[0, 0]) + abs(density - seen[1, j]))
     spokes = min(max(pi * sqrt(reach * frame[4] / (2.0 * _CHORD)), _LEAST_SPOKES), _MOST_SPOKES)
     # coarse steps: while a ghost is fitted its mesh had better stay the same
     spokes = 16 * int(ceil(spokes / 16.0))
     rings = int(min(max(spokes // 6, _LEAST_RINGS), _MOST_RINGS))
     if not (least * most > 0.0 and max(abs(least), abs(most)) < _EVEN * min(abs(least), abs(most))):
         return spokes, rings, 0
-    wanted = (bright - dark) / (_STEP * max(0.5 * (bright + dark), 1e-300))
+    step = _STEP * max(0.5 * (bright + dark), 1e-300)
+    if fine:
+        outwards = bright - dark
     few = rings
     for trial in _RINGS:
-        if trial >= wanted:
+        if trial * step >= outwards:
             few = min(trial, rings)
             break
-    span = max(spokes // max(_AROUND * few, 16), 1)
+    # from the brightest to the darkest place and back, steepest midway
+    around = 3.0 * few if fine else pi * (rim_bright - rim_dark) / step
+    span = max(int(spokes / max(around, float(_AROUND) if fine else 1.0)), 1)
     while spokes % span:
         span -= 1
     return spokes, few, span
@@ -230,7 +301,7 @@ def _grain(parameters, disc_count, sigma, frame):
 
 @compiled
 def draw_ghosts(parameters, disc_counts, visible, sigma, frame, plane):
-    """Draw ghosts of one channel on one plane.
+    """Draw ghosts of one channel on one plane, as a replay needs them.
 
     Parameters
     ----------
@@ -251,7 +322,7 @@ def draw_ghosts(parameters, disc_counts, visible, sigma, frame, plane):
     for g in range(parameters.shape[0]):
         if visible[g] == 0.0:
             continue
-        spokes, rings, span = _grain(parameters[g], disc_counts[g], sigma, frame)
+        spokes, rings, span = _grain(parameters[g], disc_counts[g], sigma, frame, False)
         if spokes == 0:
             continue
         pupil, spots = np.empty((rings + 1, spokes, 2)), np.empty((rings + 1, spokes, 2))
@@ -259,12 +330,13 @@ def draw_ghosts(parameters, disc_counts, visible, sigma, frame, plane):
             continue
         _land(parameters[g], pupil, sigma, frame, spots)
         densities = np.empty((rings, spokes, 2))
-        _densities(parameters[g], sigma, pupil, spots, densities)
         if span > 0:
-            _join(spots, span, densities)
+            _cells(parameters[g], sigma, pupil, spots, span, densities)
+        else:
+            _densities(parameters[g], sigma, pupil, spots, densities)
         # the model's irradiance is per pixel of the model: a finer picture keeps it
         densities *= visible[g] * frame[4] * frame[4]
-        _draw_mesh(spots, densities, 0, 0, width, height, plane)
+        _draw_mesh(spots, densities, span, False, 0, 0, width, height, plane)
 
 
 @compiled
@@ -285,7 +357,7 @@ def window_of(parameters, disc_count, sigma, frame, width, height):
     left, top, width, height : int
         Of the window; width 0 when it touches none.
     """
-    spokes, rings, _ = _grain(parameters, disc_count, sigma, frame)
+    spokes, rings, _ = _grain(parameters, disc_count, sigma, frame, True)
     if spokes == 0:
         return 0, 0, 0, 0
     pupil, spots = np.empty((rings + 1, spokes, 2)), np.empty((rings + 1, spokes, 2))
@@ -478,7 +550,7 @@ def draw_with_changes(parameters, disc_count, sigma, free, frame, left, top, pla
     differences.
     """
     height, width = plane.shape[0], plane.shape[1] - 1
-    spokes, rings, span = _grain(parameters, disc_count, sigma, frame)
+    spokes, rings, span = _grain(parameters, disc_count, sigma, frame, True)
     if spokes == 0:
         return
     pupil, spots = np.empty((rings + 1, spokes, 2)), np.empty((rings + 1, spokes, 2))
@@ -506,5 +578,5 @@ def draw_with_changes(parameters, disc_count, sigma, free, frame, left, top, pla
     # the model's irradiance is per pixel of the model, whatever the picture's scale
     densities *= frame[4] * frame[4]
     changes *= frame[4] * frame[4]
-    _draw_mesh(spots, densities, left, top, width, height, plane)
+    _draw_mesh(spots, densities, span, True, left, top, width, height, plane)
     _draw_changes(spots, spots_by, densities, changes, span, left, top, width, height, out)

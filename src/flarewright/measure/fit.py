@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..kernels.measure_edges import sum_along_rows, sum_changes_along_rows
-from ..kernels.measure_mesh import draw_ghosts, draw_with_changes, window_of
+from ..kernels.measure_mesh import draw_with_changes, window_of
 from ..kernels.measure_pupil import DISC_NUMBERS, FIRST_DISC, FIRST_G, FIRST_I
 from .normal import inverse, solution
 from .numbers import NUMBERS, Floats
@@ -24,6 +24,7 @@ AREA = 7000
 MODEL_ERROR = 0.03
 # standard deviations beyond which a pixel counts less and less
 OUTLIER = 4.0
+_NONE = np.zeros(0, np.int64)
 
 
 @dataclass(frozen=True)
@@ -108,9 +109,9 @@ def render(shape: Shape, view: View, scale: float = 1.0) -> Floats:
     """Draw a shape into a picture of a view's size, shape (H, W)."""
     width, height = view.size_px
     plane = np.zeros((height, width + 1))
-    draw_ghosts(shape.numbers[None], np.array([shape.discs]), np.array([scale]), view.sigma, view.frame, plane)
+    draw_with_changes(shape.numbers, shape.discs, view.sigma, _NONE, view.frame, 0, 0, plane, np.zeros((1, 1, 0)))
     sum_along_rows(plane)
-    return plane[:, :width]
+    return scale * plane[:, :width]
 
 
 def scaled(frame: Floats, times: int) -> Floats:
