@@ -1,5 +1,7 @@
 """Halo and star by what stays beside the light while the camera turns."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from planted_run import GHOSTS, SIZE, views
@@ -112,3 +114,12 @@ def test_halo_star_and_veil_are_followed_over_the_constellations():
         assert abs(float(np.mean(off))) < 0.01
         assert float(np.sqrt(np.mean(off**2))) < 0.04
     assert np.array([part for _, part in star.strength])[1:-1] == pytest.approx(0.8 * fading[1:-1], abs=0.06)
+
+
+def test_a_star_far_beyond_the_picture_has_no_strength():
+    star = STAR.replace(radius_px=(2.0, 100.0), radiance=((40.0, 40.0, 30.0), (1e-25, 1e-25, 1e-25)))
+    some = [replace(view, light_px=(SIZE[0] + 95.0, 79.5)) for view in shown(star=False)]
+    known = [np.ones(view.variance.shape[:2], bool) for view in some]
+    halo, found = followed(some, [view.pixels for view in some], known, HALO, star)
+    assert all(strength == 0.0 for _, strength in found.strength)
+    assert all(0.0 <= strength < 10.0 for _, strength in halo.strength)

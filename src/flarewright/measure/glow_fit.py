@@ -32,6 +32,8 @@ _MOST_BLADES = 20
 # how strong halo and star are is learned from about so many pixels of a view, in so many rounds; the part of them that
 # their laws may miss
 _SAMPLES, _ROUNDS, _GLOW_ERROR = 8000, 12, 0.1
+# part of the noise that halo or star must reach somewhere for their strength to be asked
+_SEEN = 0.1
 
 
 @dataclass(frozen=True)
@@ -193,7 +195,8 @@ def followed(
 def _strengths(basis: Floats, seen: Floats, variance: Floats) -> Floats:
     """Return factors at least 0 by weighted least squares, outliers counting less."""
     scale = basis.max(axis=0, initial=0.0)
-    free = scale > 0.0
+    # what noise hides at its full strength tells none: beyond the picture's border it may be next to nothing
+    free = scale > _SEEN * np.sqrt(np.median(variance)) if variance.size else scale < 0.0
     parts = np.where(free, 1.0, 0.0) * (np.arange(scale.size) < 2)
     for _ in range(_ROUNDS):
         model = basis @ parts
