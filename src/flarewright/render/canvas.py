@@ -91,7 +91,9 @@ def blank(size_px: tuple[int, int]) -> Canvas:
     return Canvas(size_px, [None] * DETAILS)
 
 
-def to_layer(name: str, pixels: Plane, pixel_area: float, about: dict[str, str | float]) -> Layer:
+def to_layer(
+    name: str, pixels: Plane, pixel_area: float, about: dict[str, str | float], *, reuse: bool = False
+) -> Layer:
     """Crop a picture of flux to what is not black and turn it into irradiance.
 
     Parameters
@@ -102,6 +104,8 @@ def to_layer(name: str, pixels: Plane, pixel_area: float, about: dict[str, str |
     pixel_area : float
         mm^2.
     about : dict
+    reuse : bool
+        Nobody else holds the pixels, so their memory may become the layer's.
 
     Returns
     -------
@@ -111,7 +115,10 @@ def to_layer(name: str, pixels: Plane, pixel_area: float, about: dict[str, str |
     x0, y0, x1, y1 = lit_window(pixels)
     if x1 <= x0:
         return Layer(name, np.zeros((1, 1, 3), dtype=np.float32), (0, 0, 1, 1), about)
-    irradiance = np.empty((y1 - y0, x1 - x0, 3), dtype=np.float32)
+    shape = (y1 - y0, x1 - x0, 3)
+    irradiance = np.empty(shape, dtype=np.float32)
+    if reuse and pixels.shape == shape:
+        irradiance = pixels.astype(np.float32, copy=False)
     np.multiply(pixels[y0:y1, x0:x1], 1.0 / pixel_area, out=irradiance, casting="same_kind")
     return Layer(name, irradiance, (x0, y0, x1 - x0, y1 - y0), about)
 

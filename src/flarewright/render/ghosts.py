@@ -460,7 +460,7 @@ def _collect(
     for planes in pool.map(lambda job: job(), jobs):
         totals = _added(totals, planes)
     total = merge(totals, shot.size_px)
-    return to_layer("ghosts", total, pixel_area, {}), tuple(layers)
+    return to_layer("ghosts", total, pixel_area, {}, reuse=True), tuple(layers)
 
 
 def _added(totals: Sequence[Plane | None], planes: Sequence[Plane | None]) -> list[Plane | None]:
