@@ -10,7 +10,8 @@ import numpy as np
 
 from flarewright.design.benchmark import task_of
 from flarewright.design.ghosts import differentiate, evaluate
-from flarewright.design.search import batch_size, polish
+from flarewright.design.polish import polish
+from flarewright.design.search import batch_size
 from flarewright.design.trials import CASES, Trial
 
 

@@ -4,7 +4,7 @@ import numpy as np
 
 from flarewright.design.objective import own_objective
 from flarewright.design.prescription import structure_of, structures, vector_of
-from flarewright.design.search import Problem
+from flarewright.design.problem import Problem
 from flarewright.model.design import Bounds
 from flarewright.render.prepare import load_lens
 

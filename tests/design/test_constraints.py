@@ -12,10 +12,12 @@ from planted import planted
 from flarewright.design.candidate import outcomes
 from flarewright.design.constraints import EDGE_TOLERANCE, TOLERANCE, breaches, kept
 from flarewright.design.objective import wishes_of
+from flarewright.design.polish import polish_within
 from flarewright.design.prescription import structure_of, vector_of
+from flarewright.design.problem import Candidate
 from flarewright.design.rims import beam_heights, clear_radii
 from flarewright.design.scratch import random_wishes, scratch_project
-from flarewright.design.search import Candidate, polish_within, solve
+from flarewright.design.search import solve
 from flarewright.design.target import problem_of
 from flarewright.kernels import design_edges as edges
 from flarewright.kernels._jit import for_python

@@ -12,7 +12,8 @@ from flarewright.design.color_search import solve_colors
 from flarewright.design.colors import color_problem
 from flarewright.design.glass_list import glass_list
 from flarewright.design.hunt import GRACE_S, until
-from flarewright.design.search import SOLVED, solve
+from flarewright.design.problem import SOLVED
+from flarewright.design.search import solve
 from flarewright.model import Light, Project
 
 

@@ -13,8 +13,10 @@ from flarewright.design.benchmark import task_of
 from flarewright.design.covariance import folded
 from flarewright.design.genes import genes_of
 from flarewright.design.objective import fitness_thesis, own_objective
+from flarewright.design.polish import polish
 from flarewright.design.prescription import Structure, structures
-from flarewright.design.search import Problem, State, polish
+from flarewright.design.problem import Problem
+from flarewright.design.search import State
 from flarewright.design.solvers import NAMES, Limits, chosen, solve_with
 from flarewright.design.trials import Trial
 from flarewright.errors import ProjectError

@@ -7,7 +7,8 @@ import pytest
 from planted import planted
 
 from flarewright.design.freedom import alike, moderation, to_the_middle
-from flarewright.design.search import SOLVED, Candidate, polish
+from flarewright.design.polish import polish
+from flarewright.design.problem import SOLVED, Candidate
 
 
 def free_planted(*, signed):

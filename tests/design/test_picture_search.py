@@ -11,8 +11,10 @@ from flarewright.design.candidate import outcomes
 from flarewright.design.canvas import canvas
 from flarewright.design.ghosts import evaluate
 from flarewright.design.picture import disc_picture, light_of_ghosts
+from flarewright.design.polish import finer, finest, polish, polish_within
+from flarewright.design.problem import Candidate
 from flarewright.design.scratch import random_wishes, scratch_project
-from flarewright.design.search import Candidate, State, finer, finest, polish, polish_within, solve
+from flarewright.design.search import State, solve
 from flarewright.design.target import problem_of
 from flarewright.kernels import design_picture as kernel
 from flarewright.kernels._jit import for_python

@@ -10,8 +10,10 @@ from planted import planted
 from flarewright.design.candidate import outcomes
 from flarewright.design.glass_list import glass_list
 from flarewright.design.objective import own_objective
+from flarewright.design.polish import polish, polish_within
+from flarewright.design.problem import Candidate
 from flarewright.design.rounding import held_indices, rounded
-from flarewright.design.search import Candidate, polish, polish_within, solve
+from flarewright.design.search import solve
 from flarewright.design.target import problem_of
 from flarewright.errors import GlassError, ProjectError
 from flarewright.io.glass_catalogue import by_name

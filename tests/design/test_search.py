@@ -10,8 +10,9 @@ from planted import planted
 
 from flarewright.design.candidate import outcomes
 from flarewright.design.ghosts import evaluate
+from flarewright.design.polish import polish, polish_within
 from flarewright.design.prescription import Structure, glass_patterns, structures, surfaces_for
-from flarewright.design.search import State, advance, neighbour, polish, polish_within, propose, solve
+from flarewright.design.search import State, advance, neighbour, propose, solve
 from flarewright.design.store import read_state, write_state
 from flarewright.design.target import problem_of
 from flarewright.errors import FlarewrightError, ProjectError

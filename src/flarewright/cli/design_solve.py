@@ -19,7 +19,8 @@ if TYPE_CHECKING:
     from ..design.candidate import Outcome
     from ..design.constraints import Breach
     from ..design.genes import Measure
-    from ..design.search import Over, Problem, State
+    from ..design.problem import Over, Problem
+    from ..design.search import State
     from ..design.solvers import Choice
     from ..model import Iris, Project
 

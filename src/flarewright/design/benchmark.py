@@ -15,9 +15,10 @@ from .genes import Measure
 from .hunt import Limits, Solution
 from .objective import diagonal_slope, fitness, fitness_thesis, own_objective
 from .picture import GAIN, OWN_STOP, grey_picture, psnr, psnr_with_gain, ssim
+from .polish import STEPS, finer, finest
 from .prescription import Structure, structure_of, structures, vector_of
+from .problem import Candidate, Problem
 from .scratch import random_wishes, scratch_project, wanted_picture
-from .search import STEPS, Candidate, Problem, finer, finest
 from .solvers import Choice, chosen, make_ready, solve_with
 from .target import problem_of
 from .trials import CASES, Trial

@@ -18,10 +18,12 @@ from .constraints import Breach, breaches, kept, stiff
 from .finish import finish, traced_misfits
 from .freedom import alike, to_the_middle
 from .objective import fitness, fitness_thesis, misfits
+from .polish import finer, finest, merge
 from .prescription import Structure
+from .problem import SOLVED, Candidate, Over, Problem, never
 from .rims import clear_radii
 from .rounding import held_indices, rounded
-from .search import KEPT, SOLVED, Candidate, Over, Problem, State, finer, finest, merge, never
+from .search import KEPT, State
 
 Floats = NDArray[np.float64]
 

@@ -30,7 +30,7 @@ from .colors import (
     reflectances,
     uses,
 )
-from .search import Over, never
+from .problem import Over, never
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]

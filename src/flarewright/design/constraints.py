@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..kernels.design_search import WISHES, wishes_missed
+from .polish import polish_within
 from .prescription import Structure
-from .search import Candidate, Problem, polish_within
+from .problem import Candidate, Problem
 from .variables import Variables
 
 Floats = NDArray[np.float64]

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from .candidate import Outcome
 from .identify import Identification, identify
-from .search import Problem
+from .problem import Problem
 
 Floats = NDArray[np.float64]
 

@@ -13,7 +13,7 @@ from ..kernels.design_search import WISHES, wishes_missed
 from .constraints import breaches, stiff
 from .ghosts import differentiate, evaluate
 from .prescription import Structure
-from .search import Over, Problem, never
+from .problem import Over, Problem, never
 from .traced import traced_ghosts
 from .variables import Variables
 

@@ -10,8 +10,10 @@ from numpy.typing import NDArray
 from ..kernels import design_ghosts as columns
 from .ghosts import differentiate, evaluate
 from .objective import Objective, misfits
+from .polish import STEPS, polish
 from .prescription import Structure
-from .search import FEW, SOLVED, STEPS, Candidate, Over, Problem, never, polish, solve
+from .problem import SOLVED, Candidate, Over, Problem, never
+from .search import FEW, solve
 from .variables import Variables
 
 Floats = NDArray[np.float64]
@@ -54,7 +56,7 @@ def alike(problem: Problem, solved: Candidate, *, seed: int = 0, over: Over = ne
     -------
     tuple of Candidate
         One a structure, the most moderate first; other structures only where they are few and the targets have no
-        signs. The candidate alone when its cost is above `search.SOLVED`.
+        signs. The candidate alone when its cost is above `problem.SOLVED`.
 
     Notes
     -----
@@ -91,7 +93,7 @@ def to_the_middle(problem: Problem, solved: Candidate, over: Over = never) -> Ca
     Returns
     -------
     Candidate
-        The same where its cost is above `search.SOLVED`, or where nothing is gained.
+        The same where its cost is above `problem.SOLVED`, or where nothing is gained.
 
     Notes
     -----

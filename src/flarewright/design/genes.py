@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ..errors import ProjectError
 from ..kernels import design_fitness as kernel
 from .prescription import Structure
-from .search import Candidate, Problem
+from .problem import Candidate, Problem
 
 Floats = NDArray[np.float64]
 Measure = Literal["ours", "algorithm1"]

@@ -10,7 +10,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from .search import KEPT, SOLVED, Candidate, Over, Progress, State
+from .problem import SOLVED, Candidate, Over
+from .search import KEPT, Progress, State
 
 Floats = NDArray[np.float64]
 

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from ..errors import ProjectError
 from ..model import Project
 from ..model.design import GhostWish
+from .problem import Problem
 from .reach import broken_limits, least_distances
-from .search import Problem
 
 Floats = NDArray[np.float64]
 

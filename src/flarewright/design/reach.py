@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .search import Problem
+from .problem import Problem
 
 Floats = NDArray[np.float64]
 

@@ -24,7 +24,8 @@ from .ghosts import evaluate
 from .impossible import Obstacle
 from .objective import seen
 from .picture import disc_picture, png_bytes
-from .search import Problem, State
+from .problem import Problem
+from .search import State
 from .store import write_state
 
 Floats = NDArray[np.float64]

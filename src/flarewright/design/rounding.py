@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from .glass_list import GlassList
 from .objective import Objective
-from .search import Candidate, Over, Problem, never, polish_within
+from .polish import polish_within
+from .problem import Candidate, Over, Problem, never
 from .variables import Variables
 
 Floats = NDArray[np.float64]

@@ -15,21 +15,15 @@ import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from functools import lru_cache, partial
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import ProjectError
-from ..kernels.design_picture import polish_by_picture
-from ..kernels.design_search import polish_many
-from ..model import Medium
-from ..model.design import Bounds
-from .canvas import canvas
-from .glass_list import GlassList
-from .objective import Objective
+from .polish import merge, polish
 from .prescription import Structure
-from .variables import Variables, variables
+from .problem import SOLVED, Candidate, Problem
+from .variables import Variables
 
 Floats = NDArray[np.float64]
 
@@ -39,85 +33,12 @@ ACTIVE = 4
 POOL = 40
 # of which so many are drawn before it proposes from them
 FIRST = 160
-# what a local search may take, and the cost at which it is done
-STEPS = 60
-ENOUGH = 1e-18
-# a cost at which the wanted ghosts are met
-SOLVED = 1e-14
 # more structures than this are not gone through one by one
 FEW = 24
 # one run in so many begins with them
 HEIRS = 3
 # best lenses remembered of runs that ended
 KEPT = 60
-
-
-@dataclass(frozen=True)
-class Problem:
-    """What a solver needs to know.
-
-    Attributes
-    ----------
-    objective : Objective
-    structures : tuple of Structure
-        All of the same number of rows.
-    bounds : Bounds
-    stop_diameter : float or None
-        When it is known, mm.
-    fixed : ndarray, shape (1 + 3 K,), or None
-        Prescription whose `fixed_rows` are kept.
-    fixed_rows : tuple of int
-    begin_with : tuple of (Structure, ndarray)
-        Prescriptions that join the first run.
-    glasses : GlassList or None
-        Every lens is made of these; the bounds of n_d are theirs.
-    fixed_media : tuple of Medium or None
-        Behind each row of the prescription whose `fixed_rows` are kept.
-    traced : bool
-        Lenses that were found are finished with traced rays.
-    """
-
-    objective: Objective
-    structures: tuple[Structure, ...]
-    bounds: Bounds
-    stop_diameter: float | None = None
-    fixed: Floats | None = None
-    fixed_rows: tuple[int, ...] = ()
-    begin_with: tuple[tuple[Structure, Floats], ...] = ()
-    glasses: GlassList | None = None
-    fixed_media: tuple[Medium | None, ...] = ()
-    traced: bool = False
-
-    def check(self) -> None:
-        """Refuse what no solver can begin with.
-
-        Raises
-        ------
-        ProjectError
-            When no structure has enough ghosts, or nothing is free to change.
-        """
-        if not self.structures:
-            raise ProjectError(
-                f"no lens of that many surfaces has {self.objective.wanted} ghosts; ask for fewer, or give more "
-                "surfaces"
-            )
-        if self.variables(self.structures[0]).free.size == 0:
-            raise ProjectError("every row is fixed, so there is nothing to search; leave some rows free")
-
-    def variables(self, structure: Structure) -> Variables:
-        """Return the variables of a structure."""
-        return variables(
-            structure, self.bounds, stop_diameter=self.stop_diameter, fixed=self.fixed, fixed_rows=self.fixed_rows
-        )
-
-
-@dataclass(frozen=True)
-class Candidate:
-    """A local minimum: cost, structure and search variables."""
-
-    cost: float
-    structure: Structure
-    x: Floats
 
 
 @dataclass(frozen=True)
@@ -163,12 +84,6 @@ class State:
 
 
 Progress = Callable[[State], None]
-Over = Callable[[], bool]
-
-
-def never() -> bool:
-    """Tell that the time is not up."""
-    return False
 
 
 def solve(
@@ -384,148 +299,3 @@ def neighbour(structure: Structure, random: np.random.Generator) -> Structure:
         if turned.standing_in_air and len(turned.pairs) == len(structure.pairs):
             return turned
     return structure
-
-
-def polish(
-    problem: Problem, starts: Sequence[tuple[Structure, Floats]], *, objective: Objective | None = None,
-    steps: int = STEPS, worth: float = np.inf,
-) -> list[Candidate]:  # fmt: skip
-    """Run a local search from each of several points.
-
-    Parameters
-    ----------
-    problem : Problem
-    starts : sequence of (Structure, ndarray)
-    objective : Objective, optional
-        None: the problem's.
-    steps : int
-    worth : float
-        Where the picture counts: a lens that costs more before its picture is polished stays as it is.
-
-    Returns
-    -------
-    list of Candidate
-        In the same order; inside the bounds whatever the points were. Where the picture counts, places and sizes are
-        polished first, for a picture does not feel a ghost that is far off; one that meets them all is kept so.
-    """
-    aim = problem.objective if objective is None else objective
-    groups: dict[Structure, list[int]] = {}
-    for k, (structure, _) in enumerate(starts):
-        groups.setdefault(structure, []).append(k)
-    found: dict[int, Candidate] = {}
-    for structure, which in groups.items():
-        known = problem.variables(structure)
-        points = np.array([starts[k][1] for k in which])
-        ends, costs = polish_within(known, points, replace(aim, picture=None), steps)
-        near = np.flatnonzero((costs > SOLVED) & np.isfinite(costs))
-        if aim.picture is not None and near.size:
-            ends[near], costs[near] = polish_within(known, ends[near], aim, steps // 2, worth=worth)
-        found.update((k, Candidate(float(costs[m]), structure, ends[m])) for m, k in enumerate(which))
-    return [found[k] for k in range(len(starts))]
-
-
-def polish_within(
-    known: Variables, points: Floats, aim: Objective, steps: int = STEPS, *, worth: float = np.inf
-) -> tuple[Floats, Floats]:
-    """Run a local search from each of several points of one structure, by the picture where that counts.
-
-    Parameters
-    ----------
-    known : Variables
-        Variables whose bounds are equal stay there.
-    points : ndarray, shape (B, 1 + 3 K)
-    aim : Objective
-    steps : int
-        0: only the cost is wanted.
-    worth : float
-        Where the picture counts: a point that costs more stays where it is.
-
-    Returns
-    -------
-    ends : ndarray, shape (B, 1 + 3 K)
-    costs : ndarray, shape (B,)
-    """
-    structure = known.structure
-    ends, costs = np.empty_like(points), np.empty(len(points))
-    picture = aim.picture
-    if picture is not None:
-        polish_by_picture(
-            points, structure.stop, structure.mirrors, aim.entrance, known.low, known.high, known.free, known.longest,
-            aim.slopes, aim.wishes, picture.light, picture.unit, picture.edges, picture.rows, picture.limits,
-            picture.start, picture.pixel, picture.wanted, steps, worth, ends, costs,
-        )  # fmt: skip
-        return ends, costs
-    matches = np.empty((len(points), len(aim.targets)), np.int64)
-    polish_many(
-        points, structure.stop, structure.mirrors, aim.entrance, known.low, known.high, known.free, known.longest,
-        aim.slopes, aim.spans, aim.targets, aim.weights, aim.signed, aim.extra * aim.extra_part, aim.wishes, steps,
-        4, ENOUGH, ends, costs, matches,
-    )  # fmt: skip
-    return ends, costs
-
-
-def merge(members: Sequence[Candidate], found: Sequence[Candidate], most: int) -> tuple[Candidate, ...]:
-    """Add minima to a pool, best first; one that is there already, or no lens, is left out.
-
-    Parameters
-    ----------
-    members, found : sequence of Candidate
-    most : int
-
-    Returns
-    -------
-    tuple of Candidate
-    """
-    out = list(members)
-    for one in found:
-        # the same cost to seven digits is the same minimum
-        if np.isfinite(one.cost) and not any(abs(one.cost - other.cost) < 1e-7 * other.cost for other in out):
-            out.append(one)
-    out.sort(key=lambda one: one.cost)
-    return tuple(out[:most])
-
-
-def finer(problem: Problem) -> Problem:
-    """Return the problem for the last steps: with a finer picture, where the picture counts."""
-    picture = problem.objective.picture
-    if picture is None or picture.fine is None:
-        return problem
-    return replace(problem, objective=replace(problem.objective, picture=picture.fine))
-
-
-def finest(problem: Problem, one: Candidate, steps: int) -> Candidate:
-    """Polish a lens a last time.
-
-    Parameters
-    ----------
-    problem : Problem
-        `finer` than that of the search.
-    one : Candidate
-    steps : int
-
-    Returns
-    -------
-    Candidate
-        Its cost is that of the finer picture, where the picture counts.
-    """
-    aim = problem.objective
-    if aim.picture is None or one.cost <= SOLVED:
-        return min(polish(problem, [(one.structure, one.x)], steps=steps)[0], one, key=lambda each: each.cost)
-    ends, costs = polish_within(problem.variables(one.structure), one.x[None], aim, steps)
-    return Candidate(float(costs[0]), one.structure, ends[0])
-
-
-@lru_cache(maxsize=2)
-def compile_kernels(picture: bool = False) -> None:
-    """Compile what a search calls, so that its time is spent searching; `picture`: for one by the picture."""
-    structure = Structure(2, (True, False, False, True, False))
-    aim = Objective(
-        np.array([0.1]), np.array([0, 1]), np.ones((1, 3)), np.ones((1, 3)), True, 0.0, 100.0,
-        np.array([[0.0, 1.0, 1.0], [0.0, 9.0, 1.0], [0.0, 1e9, 0.0], [0.1, 0.9, 5.0]]), ("",),
-    )  # fmt: skip
-    if picture:
-        wanted = canvas(aim.targets, aim.spans, [(1.0, 0.0)], light=1.0, half_frame=(20.0, 20.0), blades=6)
-        aim = replace(aim, picture=wanted)
-    problem = Problem(aim, (structure,), Bounds())
-    start = problem.variables(structure).random_points(np.random.default_rng(0), 1)[0]
-    polish(problem, [(structure, start)], steps=1)

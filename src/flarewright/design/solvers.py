@@ -12,7 +12,9 @@ from .covariance import adapt, imported_cmaes
 from .evolution import ALGORITHMS, Settling, evolve, imported_pygmo
 from .genes import Genes, Measure, genes_of
 from .hunt import Find, Hunt, Limits, Solution, Step
-from .search import KEPT, Candidate, Problem, State, compile_kernels, merge, solve
+from .polish import compile_kernels, merge
+from .problem import Candidate, Problem
+from .search import KEPT, State, solve
 
 OURS, CMAES = "pools", "cmaes"
 NAMES = (OURS, *ALGORITHMS, CMAES)

@@ -11,7 +11,8 @@ import numpy as np
 from ..errors import ProjectError
 from ..io.atomic import write_atomically
 from .prescription import Structure
-from .search import Candidate, Run, State
+from .problem import Candidate
+from .search import Run, State
 
 VERSION = 1
 

@@ -18,7 +18,7 @@ from .impossible import on_the_line
 from .objective import Objective, own_objective, relative_weights
 from .picture import light_of_ghosts
 from .prescription import Structure, structure_of, structures, surfaces_for, vector_of
-from .search import Problem
+from .problem import Problem
 
 Floats = NDArray[np.float64]
 

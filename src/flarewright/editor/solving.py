@@ -12,8 +12,10 @@ from ..design.color_search import solve_colors
 from ..design.colors import coated, color_problem
 from ..design.hunt import until
 from ..design.impossible import obstacles
+from ..design.polish import compile_kernels
+from ..design.problem import Over, Problem
 from ..design.report import verdict
-from ..design.search import Over, Problem, State, compile_kernels, solve
+from ..design.search import State, solve
 from ..design.target import problem_of
 from ..errors import FlarewrightError
 from ..model import AsLens, Lens, Project

@@ -386,8 +386,10 @@ def _bridges(
         passing = (short[:, ALIVE] * long[:, ALIVE] > 0.0) & (np.minimum(short[:, REL], long[:, REL]) <= 1.0)
         for column in range(STOP_X, short.shape[1], 2):
             passing &= short[:, column] ** 2 + short[:, column + 1] ** 2 <= iris_radius**2
-        seen = passing & (short[:, X] ** 2 + short[:, Y] ** 2 <= view_radius**2)
-        shift = ((long[:, X] - short[:, X]) ** 2 + (long[:, Y] - short[:, Y]) ** 2)[seen]
+        # what a ray that ended holds may be infinite, so only of those that pass is anything computed
+        here, there = short[passing][:, [X, Y]], long[passing][:, [X, Y]]
+        seen = (here**2).sum(axis=1) <= view_radius**2
+        shift = ((there - here) ** 2).sum(axis=1)[seen]
         # the few nodes that fly farthest carry hardly any light
         far = int(SHIFT_QUANTILE * (shift.size - 1))
         wide = sqrt(np.partition(shift, far)[far]) * scale if shift.size else 0.0
@@ -397,6 +399,8 @@ def _bridges(
 
 def _between(short: Floats, long: Floats, part: float) -> Floats:
     """Interpolate a bundle between two wavelengths; a ray lives where both live."""
-    data = (1.0 - part) * short + part * long
+    # what a ray that ended holds may be infinite, on either side
+    with np.errstate(invalid="ignore"):
+        data = (1.0 - part) * short + part * long
     data[:, ALIVE] = np.minimum(short[:, ALIVE], long[:, ALIVE])
     return data
