@@ -49,6 +49,11 @@ def test_the_stop_moves_and_keeps_its_size():
         (["move-stop", "heliar-tronnier", "-o", "a.toml", "--row", "5"], "cannot become the stop"),
         (["move-stop", "heliar-tronnier", "-o", "a.toml", "--row", "1"], "glass is in front"),
         (["move-stop", "heliar-tronnier", "-o", "a.toml", "--row", "99"], "cannot become the stop"),
+        (["move-stop", "nikon-28-75", "-o", "a.toml", "--row", "24"], "f-numbers go from 0.3 to 256"),
+        (
+            ["resize", "heliar-tronnier", "-o", "a.toml", "--ghost", "8-6", "--height", "0.2", "--fstop", "200"],
+            "f-numbers go from 0.3 to 256",
+        ),
     ],
 )
 def test_mistakes_are_told(words, told, tmp_path, monkeypatch, capsys):

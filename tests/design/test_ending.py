@@ -70,14 +70,14 @@ def test_traced_rays_stop_bending_a_lens(searched, monkeypatch):
     problem, state = searched
     problem = replace(problem, traced=True)
     flag = Flag(0)
-    late = counted(monkeypatch, finish, "_step", flag)
+    late = counted(monkeypatch, finish, "damped_step", flag)
     judged = counted(monkeypatch, candidate, "traced_misfits", flag)
     (found,) = outcomes(state, problem, count=3, over=flag)
     assert late == judged == []
     assert found.fitness_traced[0] == found.fitness_traced[1]
     # a little later: the step under way ends, and no other begins
     flag = Flag(finish.STEPS)
-    late = counted(monkeypatch, finish, "_step", flag)
+    late = counted(monkeypatch, finish, "damped_step", flag)
     outcomes(state, problem, count=3, over=flag)
     assert len(late) <= 1
 

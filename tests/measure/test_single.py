@@ -49,6 +49,21 @@ def test_what_is_hidden_is_not_looked_for():
     assert len(places) >= 2
 
 
+def test_a_hidden_light_on_the_line_is_no_dark_disc():
+    """Its mask has an edge, and that of a bright light a steep one: it must not set what chance can do."""
+    light, radius = 110.0, 26.0
+    ghosts = ((-80.0, 40.0, (0.3, 0.4, 0.6)), (30.0, 20.0, (0.4, 0.4, 0.4)))
+    glare = ((light, radius + 2.0, (50.0, 50.0, 50.0)),)
+    x, y = np.arange(SIZE[0]) + 0.5 - AXIS[0], np.arange(SIZE[1]) + 0.5 - AXIS[1]
+    hidden = np.hypot(x[None, :] - light, y[:, None]) < radius + 8.0
+    # haze that the mask cuts off
+    shown = picture(ghosts + glare, toward_deg=0.0) + np.float32(0.3)
+    found = spots_of_picture(shown, AXIS, 0.0, hidden=hidden)
+    for place, size, _ in ghosts:
+        assert any(abs(one.place_px - place) < 1.0 and abs(one.radius_px - size) < 1.0 for one in found)
+    assert all(abs(one.place_px - light) > 5.0 for one in found)
+
+
 def model(*ghosts):
     return GhostModel(
         size_px=(600, 400), axis_px=(300.0, 200.0), focal_px=800.0, largest_deg=20.0, constellation_deg=(0.0, 20.0),

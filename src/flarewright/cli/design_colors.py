@@ -15,13 +15,13 @@ if TYPE_CHECKING:
     from ..design.colors import Coatings, ColorProblem, Floats
 
 EPILOG = (
-    'Example, in the project:\n\n[[design.wishes]]\n\nghost = "4-1"\n\ncolor = [1.0, 0.4, 0.1]\n\n'
+    'Example, in the project:\n\n\\[\\[design.wishes]]\n\nghost = "4-1"\n\ncolor = [1.0, 0.4, 0.1]\n\n'
     "Then: flarewright design colors shot.toml -o coated.toml --films free"
 )
 
 
 def colors(
-    project: Annotated[Path, typer.Argument(metavar="PROJECT", help="A project file with a [design].")],
+    project: Annotated[Path, typer.Argument(metavar="PROJECT", help="A project file with a \\[design].")],
     output: Annotated[Path, typer.Option("-o", "--output", metavar="LENS.toml", help="The coated lens.")],
     films: Annotated[
         str,

@@ -46,7 +46,7 @@ Json = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
 
 
 def solve(
-    project: Annotated[Path, typer.Argument(metavar="PROJECT", help="A project file with a [design].")],
+    project: Annotated[Path, typer.Argument(metavar="PROJECT", help="A project file with a \\[design].")],
     output: Output,
     time_s: Time = 60.0,
     seed: Seed = 0,
@@ -57,9 +57,9 @@ def solve(
     fitness: Fitness = "ours",
     as_json: Json = False,
 ) -> None:
-    """Search lenses whose ghosts land where the project wants them.
+    r"""Search lenses whose ghosts land where the project wants them.
 
-    Without a [design] in the project: other lenses with the same ghosts as its own.
+    Without a \[design] in the project: other lenses with the same ghosts as its own.
     """
     check_time(time_s)
     measure = check_fitness(fitness)

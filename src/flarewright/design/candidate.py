@@ -12,12 +12,12 @@ from ..errors import FlarewrightError
 from ..io.glass_catalogue import nearest
 from ..io.media import complete as complete_media
 from ..model import Iris, Lens, Medium, Stop, Surface
-from ..optics.paraxial import first_order
 from ..render.prepare import complete_lens
 from .constraints import Breach, breaches, kept, stiff
 from .finish import finish, traced_misfits
 from .freedom import alike, to_the_middle
 from .objective import fitness, fitness_thesis, misfits
+from .opening import opened_to
 from .polish import finer, finest, merge
 from .prescription import Structure
 from .problem import SOLVED, Candidate, Over, Problem, never
@@ -132,9 +132,7 @@ def lens_of(
         sensor_distance=float(vector[count]), iris=iris or Iris(), rows=tuple(rows),
     )  # fmt: skip
     known, _ = complete_media(rough)
-    # at f/1 the stop has this semi-diameter; the f-number that gives the wanted one follows
-    at_one = first_order(known).stop_semi_diameter
-    return complete_lens(known.replace(f_number=2.0 * at_one / float(vector[0])))
+    return complete_lens(opened_to(known, float(vector[0])))
 
 
 def outcomes(state: State, problem: Problem, *, count: int = 5, name: str = "Designed lens", iris: Iris | None = None,

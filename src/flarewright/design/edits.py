@@ -14,6 +14,7 @@ from ..model import Lens, Stop, Surface
 from ..optics.paraxial import first_order
 from ..render.prepare import complete_lens
 from .ghosts import evaluate
+from .opening import opened_to
 from .prescription import structure_of, vector_of
 
 Floats = NDArray[np.float64]
@@ -79,7 +80,7 @@ def resize_ghost(
     ProjectError
         When the lens has no such ghost, or no curvature of that row makes it so large.
     LensError
-        When the lens makes no image any more.
+        When the lens makes no image any more, or would have an f-number that no lens file can hold.
     """
     structure = structure_of(lens)
     if ghost not in structure.pairs:
@@ -115,8 +116,7 @@ def resize_ghost(
     rows[row] = surface.replace(curvature=curvature)
     bent = lens.replace(rows=tuple(rows), sensor_distance=order.sensor_distance)
     # the same opening of the stop gives another f-number when the lens in front of it has changed
-    at_one = first_order(bent.replace(f_number=1.0)).stop_semi_diameter
-    bent = complete_lens(bent.replace(f_number=2.0 * at_one / float(vector[0])))
+    bent = complete_lens(opened_to(bent, float(vector[0])))
     kept = [columns.PLACE, columns.RADIUS]
     return Resized(bent, row, structure.pairs, before[:, kept], after[:, kept])
 
@@ -173,7 +173,7 @@ def move_stop(lens: Lens, row: int) -> Lens:
     ProjectError
         When the row is the stop, there is no such row, or glass is in front of it.
     LensError
-        When the lens makes no image any more.
+        When the lens makes no image any more, or would have an f-number that no lens file can hold.
     """
     old = lens.stop_row
     if not 0 <= row < len(lens.rows) or row == old:
@@ -196,5 +196,4 @@ def move_stop(lens: Lens, row: int) -> Lens:
         moved = lens.replace(rows=tuple(rows), coating_presets=presets, elements=(), f_number=1.0)
     except ValueError as error:
         raise LensError(f"with its stop at row {row} {lens.name} is no lens any more: no glass is left") from error
-    at_one = first_order(moved).stop_semi_diameter
-    return complete_lens(moved.replace(f_number=2.0 * at_one / diameter))
+    return complete_lens(opened_to(moved, diameter))

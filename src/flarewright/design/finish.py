@@ -12,6 +12,7 @@ from ..kernels import design_ghosts as columns
 from ..kernels.design_search import WISHES, wishes_missed
 from .constraints import breaches, stiff
 from .ghosts import differentiate, evaluate
+from .least_squares import damped_step
 from .prescription import Structure
 from .problem import Over, Problem, never
 from .traced import traced_ghosts
@@ -20,7 +21,7 @@ from .variables import Variables
 Floats = NDArray[np.float64]
 Pairs = tuple[tuple[int, int], ...]
 
-STEPS, TRIES = 60, 12
+STEPS = 60
 # what a ghost costs that is lost: as much as one that misses by its own radius
 LOST = 1.0
 # derivatives by differences where so many ghosts times variables are not too much work, and how often at most
@@ -155,7 +156,7 @@ def finish(
         if over():
             break
         cost = float(old @ old)
-        tried = _step(known, x, old, J, residuals, damping)
+        tried = damped_step(known, x, old, J, residuals, damping)
         if tried is not None:
             moved = (tried[0] - x)[known.free]
             J = J + np.outer(tried[1] - old - J @ moved, moved) / max(float(moved @ moved), 1e-300)
@@ -203,27 +204,6 @@ def _by_differences(known: Variables, x: Floats, residuals: Callable[[Floats], F
         ahead[k] += way
         J[:, v] = (residuals(ahead) - old) / way
     return J
-
-
-def _step(
-    known: Variables, x: Floats, old: Floats, J: Floats, residuals: Callable[[Floats], Floats], damping: float
-) -> tuple[Floats, Floats, float] | None:
-    """Take one step that makes the sum of squares less; None when there is none."""
-    free, J = known.free, J.copy()
-    push, cost = J.T @ old, float(old @ old)
-    held = ((x[free] <= known.low[free]) & (push > 0.0)) | ((x[free] >= known.high[free]) & (push < 0.0))
-    J[:, held] = 0.0
-    normal, push = J.T @ J, J.T @ old
-    for _ in range(TRIES):
-        scaled = normal + damping * np.diag(np.maximum(np.diag(normal), 1e-9 * normal.max() + 1e-300))
-        step = np.clip(-np.linalg.solve(scaled, push), -known.longest, known.longest)
-        tried = x.copy()
-        tried[free] = np.clip(x[free] + step, known.low[free], known.high[free])
-        new = residuals(tried)
-        if float(new @ new) < cost:
-            return tried, new, max(0.2 * damping, 1e-9)
-        damping *= 6.0
-    return None
 
 
 def _inside(problem: Problem, structure: Structure, known: Variables, begin: Floats, end: Floats) -> Floats:

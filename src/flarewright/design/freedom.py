@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from ..kernels import design_ghosts as columns
 from .ghosts import differentiate, evaluate
+from .least_squares import damped_step
 from .objective import Objective, misfits
 from .polish import STEPS, polish
 from .prescription import Structure
@@ -20,8 +21,8 @@ Floats = NDArray[np.float64]
 
 # what a misfit weighs against a variable at its bound, squared inversely, round after round
 TIGHTER = (1e-1, 1e-2, 1e-3, 1e-4)
-# most evaluations of a round
-MOST = 200
+# most steps of a round, and the part of its sum that a step must gain for another one
+MOST, LEAST_GAIN = 200, 1e-8
 # local searches for the same ghosts in another structure
 SEARCHES = 5000
 
@@ -101,35 +102,32 @@ def to_the_middle(problem: Problem, solved: Candidate, over: Over = never) -> Ca
     """
     if solved.cost > SOLVED:
         return solved
-    from scipy.optimize import least_squares  # type: ignore[import-untyped]
-
     known, structure = problem.variables(solved.structure), solved.structure
     _, _, ghosts = misfits(problem.objective, structure, known.prescription(solved.x))
     free = known.free
-    low, high = known.low[free], known.high[free]
-    slopes, z = np.diag(2.0 / (high - low)), solved.x[free]
-
-    def at(z: Floats) -> tuple[Floats, Floats]:
-        x = solved.x.copy()
-        x[free] = z
-        return _linearised(problem, structure, known, ghosts, x)
-
+    slopes = np.diag(2.0 / (known.high[free] - known.low[free]))
+    x = solved.x
     for tight in TIGHTER:
-        if over():
-            return solved
-        # the method begins inside the bounds
-        begin = np.clip(z, low + 1e-9 * (high - low), high - 1e-9 * (high - low))
 
-        def residuals(z: Floats, tight: float = tight) -> Floats:
-            return np.concatenate([at(z)[0] / tight, _off_middle(known, z)])
+        def both(x: Floats, tight: float = tight) -> tuple[Floats, Floats]:
+            missed, by = _linearised(problem, structure, known, ghosts, x)
+            return np.concatenate([missed / tight, _off_middle(known, x[free])]), np.concatenate([by / tight, slopes])
 
-        def jacobian(z: Floats, tight: float = tight) -> Floats:
-            return np.concatenate([at(z)[1] / tight, slopes])
+        def residuals(x: Floats) -> Floats:
+            return both(x)[0]
 
-        z = least_squares(residuals, begin, jacobian, bounds=(low, high), max_nfev=MOST).x
-    moved = solved.x.copy()
-    moved[free] = z
-    done = polish(problem, [(structure, moved)], steps=4 * STEPS)[0]
+        damping = 1e-3
+        for _ in range(MOST):
+            if over():
+                return solved
+            old, by = both(x)
+            step = damped_step(known, x, old, by, residuals, damping)
+            if step is None:
+                break
+            x, new, damping = step
+            if float(new @ new) > (1.0 - LEAST_GAIN) * float(old @ old):
+                break
+    done = polish(problem, [(structure, x)], steps=4 * STEPS)[0]
     better = done.cost <= SOLVED and moderation(known, done.x) < moderation(known, solved.x)
     return done if better else solved
 

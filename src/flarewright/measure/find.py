@@ -124,7 +124,7 @@ def candidates(
     pool : executor, optional
     """
     kinds = rims_of(iris)
-    rims = np.stack([_outline(kind) for kind in kinds])
+    rims = np.stack([rim_outline(kind) for kind in kinds])
     fine = 0.004 * width
     speeds = np.concatenate([np.arange(-2.6 * width, -1.0 * width, 2.0 * fine), np.arange(-width, width, fine),
                              np.arange(width, 2.6 * width, 2.0 * fine)])  # fmt: skip
@@ -164,7 +164,8 @@ def rims_of(iris: Blades | None) -> list[Blades | None]:
     return [None, iris, turned] if iris.count % 2 else [None, iris]
 
 
-def _outline(kind: Blades | None) -> Floats:
+def rim_outline(kind: Blades | None) -> Floats:
+    """Return the border along which `kernels.measure_hough.search` votes, shape (P, 4): a circle or a polygon."""
     spots = np.empty((_SPOTS, 4))
     outline(0 if kind is None else kind.count, 0.0 if kind is None else np.radians(kind.first_deg), spots)
     return spots

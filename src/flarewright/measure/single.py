@@ -7,6 +7,7 @@ One constellation cannot tell a ghost from another bright disc, so what is found
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from math import ceil
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +16,7 @@ from ..errors import FlarewrightError
 from ..kernels.measure_hough import search
 from ..model.ghost_model import AberrationGhost, GhostModel
 from .curves import pose_at
-from .find import LEVEL, Slopes, candidates, slopes_of
+from .find import LEVEL, Slopes, candidates, rim_outline, slopes_of
 from .numbers import Floats, bezier_numbers, field, frame, visible
 from .views import Pixels, View
 
@@ -90,10 +91,11 @@ def spots_of_picture(
     view = View(
         0.0, 1.0, frame(axis_px, toward_deg, 0.0, 1.0), axis_px, pixels, np.repeat(variance[..., None], 3, axis=2)
     )
-    slopes = slopes_of([view], [grey], [np.isfinite(variance)])
+    seen = np.isfinite(variance)
+    slopes = _beside(slopes_of([view], [grey], [seen]), seen)
     # so much noise that no slope is shortened: these are steepest at the very border
     even = np.full_like(view.variance, max(float(grey.max()), noise) ** 2)
-    steep = slopes_of([replace(view, variance=even)], [grey], [np.isfinite(variance)])
+    steep = _beside(slopes_of([replace(view, variance=even)], [grey], [seen]), seen)
     chance = max((one.score for one in candidates(slopes, width, sign=-1.0, most=1)), default=0.0)
     enough = max(ENOUGH, ABOVE_CHANCE * chance)
     found: list[Spot] = []
@@ -108,6 +110,19 @@ def spots_of_picture(
     return tuple(one for one in found if sum(one.rgb) > 3.0 * BODY * noise)
 
 
+def _beside(slopes: Slopes, seen: NDArray[np.bool_]) -> Slopes:
+    """Return the slopes without those next to what is hidden: its edge would pass for a dark circle's border."""
+    if seen.all():
+        return slopes
+    reach = ceil(0.5 * SMOOTHED)
+    hidden = np.pad(~seen[::2, ::2], reach)
+    windows = np.lib.stride_tricks.sliding_window_view(hidden, (2 * reach + 1, 2 * reach + 1))
+    near = np.asarray(windows.any(axis=(2, 3)))[: slopes.x.shape[1], : slopes.x.shape[2]]
+    x, y = slopes.x.copy(), slopes.y.copy()
+    x[0][near], y[0][near] = np.nan, np.nan
+    return Slopes(x, y, slopes.sigmas, slopes.frames)
+
+
 def _noise(grey: Pixels) -> float:
     """Return the standard deviation of a pixel, from what differs between neighbours."""
     across = np.diff(grey, axis=1)
@@ -117,11 +132,12 @@ def _noise(grey: Pixels) -> float:
 
 def _sharper(steep: Slopes, place: float, radius: float, step: float) -> tuple[float, float]:
     """Return the place and radius nearby whose border is steepest."""
+    circle = rim_outline(None)[None]
     for finer in (0.5, 0.125, 0.03):
         moves = finer * step * np.arange(-4, 5)
         speeds, sizes = place + moves, np.maximum(radius + moves, 1.0)
         scores, runs = np.zeros((9, 9)), np.zeros((9, 9, 3), np.int64)
-        search(steep.x, steep.y, steep.sigmas, steep.frames, speeds, sizes, np.array([0.0]), 0.0, 1.0, scores, runs)
+        search(steep.x, steep.y, steep.sigmas, steep.frames, speeds, sizes, circle, 0.0, 1.0, scores, runs)
         s, r = np.unravel_index(int(np.argmax(scores)), scores.shape)
         if scores[s, r] > 0.0:
             place, radius = float(speeds[s]), float(sizes[r])

@@ -14,6 +14,8 @@ from .iris import Iris
 from .scatter import Scatter
 
 SCHEMA_VERSION = 1
+# f-numbers lie above the first and reach as far as the second
+LEAST_F_NUMBER, LARGEST_F_NUMBER = 0.3, 256.0
 
 # A4 to A20
 MOST_TERMS = 9
@@ -139,7 +141,7 @@ class Position(Frozen):
     gaps: tuple[tuple[int, Annotated[float, Field(ge=-1000.0, le=10000.0)]], ...] = Field(min_length=1)
     focal_length: float | None = Field(None, gt=0.0)
     focus_distance: float | None = Field(None, gt=0.0)
-    f_number: float | None = Field(None, gt=0.3, le=256.0)
+    f_number: float | None = Field(None, gt=LEAST_F_NUMBER, le=LARGEST_F_NUMBER)
     field_deg: float | None = Field(None, gt=0.0, lt=90.0)
 
 
@@ -180,7 +182,7 @@ class Lens(Frozen):
     source: str = ""
     notes: str = ""
     stated_focal_length: float | None = Field(None, gt=0.0)
-    f_number: float = Field(gt=0.3, le=256.0)
+    f_number: float = Field(gt=LEAST_F_NUMBER, le=LARGEST_F_NUMBER)
     field_deg: float | None = Field(None, gt=0.0, lt=90.0)
     sensor_distance: float | None = Field(None, gt=0.0)
     focus_distance: float | None = Field(None, gt=0.0)
