@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from flarewright.cli.app import run
-from flarewright.design.edits import move_stop, resize_ghost
+from flarewright.design.edits import move_stop, resize_all, resize_ghost
 from flarewright.design.ghosts import placed_ghosts
 from flarewright.errors import ProjectError
 from flarewright.io.lens_file import read_lens
@@ -30,6 +30,20 @@ def test_a_ghost_gets_its_size_by_one_radius(mirror, row, height):
     assert first_order(done.lens).stop_semi_diameter == pytest.approx(first_order(LENS).stop_semi_diameter)
 
 
+@pytest.mark.parametrize(("by", "height"), [("stop", 0.5), ("entrance", 0.3)])
+def test_one_opening_resizes_all_that_it_bounds(by, height):
+    """Stop down far, and the stop bounds all ghosts; close the front far, and it bounds most of them."""
+    done = resize_all(LENS, height, by=by, f_number=11.0 if by == "stop" else None)
+    radii = np.abs(done.after[:, 1] / done.before[:, 1])
+    assert (radii <= 1.0 + 1e-12).all()
+    assert radii.min() >= height - 1e-12
+    assert np.isclose(radii, height).sum() >= (len(radii) if by == "stop" else 4)
+    # the lens itself tells the same
+    now = placed_ghosts(done.lens)
+    assert np.allclose([[one.place, one.radius] for one in now], done.after, rtol=1e-9)
+    assert first_order(done.lens).efl == pytest.approx(first_order(LENS).efl)
+
+
 def test_the_stop_moves_and_keeps_its_size():
     moved = move_stop(LENS, 3)
     assert isinstance(moved.rows[3], Stop)
@@ -46,6 +60,10 @@ def test_the_stop_moves_and_keeps_its_size():
         (["resize", "heliar-tronnier", "-o", "a.toml", "--ghost", "4-1", "--height", "0"], "no size"),
         (["resize", "heliar-tronnier", "-o", "a.toml", "--ghost", "4-1", "--height", "2", "--mirror", "x"], "first or"),
         (["resize", "heliar-tronnier", "-o", "a.exr", "--ghost", "4-1", "--height", "2"], "must be named"),
+        (["resize", "heliar-tronnier", "-o", "a.toml", "--height", "2"], "--ghost J-I for one"),
+        (["resize", "heliar-tronnier", "-o", "a.toml", "--all", "x", "--height", "2"], "stop or entrance"),
+        (["resize", "heliar-tronnier", "-o", "a.toml", "--all", "entrance", "--height", "9"], "wider than that"),
+        (["resize", "heliar-tronnier", "-o", "a.toml", "--all", "stop", "--height", "0.001"], "f-numbers go from"),
         (["move-stop", "heliar-tronnier", "-o", "a.toml", "--row", "5"], "cannot become the stop"),
         (["move-stop", "heliar-tronnier", "-o", "a.toml", "--row", "1"], "glass is in front"),
         (["move-stop", "heliar-tronnier", "-o", "a.toml", "--row", "99"], "cannot become the stop"),

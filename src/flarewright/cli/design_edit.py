@@ -17,31 +17,41 @@ Output = Annotated[Path, typer.Option("-o", "--output", metavar="LENS.toml", hel
 def resize(
     lens: Lens,
     output: Output,
-    ghost: Annotated[str, typer.Option(metavar="J-I", help="Which ghost.")],
-    height: Annotated[float, typer.Option(help="Multiplies its size.")],
+    height: Annotated[float, typer.Option(help="Multiplies its size, or the diameter of --all.")],
+    ghost: Annotated[str | None, typer.Option(metavar="J-I", help="Which ghost.")] = None,
+    every: Annotated[
+        str | None, typer.Option("--all", metavar="WHERE", help="Instead, all that the stop or the entrance bounds.")
+    ] = None,
     mirror: Annotated[str, typer.Option(help="Which of its two mirrors is bent: first (J) or second (I).")] = "first",
     fstop: Annotated[float | None, typer.Option(help="f-number; wide open when left out.")] = None,
 ) -> None:
-    """Resize one ghost by the radius of one of its mirrors, and show what happens to the others."""
+    """Resize one ghost by the radius of one of its mirrors, or all by an opening, and show what happens to them."""
     check_place(output, ".toml")
     if mirror not in ("first", "second"):
         raise ProjectError(f"--mirror {mirror!r} is unknown; choose first or second")
+    if every not in (None, "stop", "entrance"):
+        raise ProjectError(f"--all {every!r} is unknown; choose stop or entrance")
+    if (ghost is None) == (every is None):
+        raise ProjectError("what is to be resized? Give --ghost J-I for one, or --all stop or --all entrance for all")
     if not 0.0 < height < 1000.0:
         raise ProjectError(f"--height {height:g} is no size; give a number above 0 and below 1000")
-    first, _, second = ghost.partition("-")
+    first, _, second = (ghost or "0-0").partition("-")
     if not (first.isdecimal() and second.isdecimal()):
         raise ProjectError(f"--ghost {ghost!r} is no ghost; write its mirrors as 4-1")
     f_number = chosen_fstop(fstop)
     from rich.table import Table
 
-    from ..design.edits import resize_ghost
+    from ..design.edits import resize_all, resize_ghost
     from ..io.lens_writer import write_lens
     from ..render.prepare import load_lens
 
     which: Literal["first", "second"] = "second" if mirror == "second" else "first"
-    done = resize_ghost(load_lens(lens), (int(first), int(second)), height, mirror=which, f_number=f_number)
+    if every is None:
+        done = resize_ghost(load_lens(lens), (int(first), int(second)), height, mirror=which, f_number=f_number)
+    else:
+        done = resize_all(load_lens(lens), height, by="stop" if every == "stop" else "entrance", f_number=f_number)
     write_lens(done.lens, output)
-    tell([f"wrote {output}: row {done.row} is bent"])
+    tell([f"wrote {output}: row {done.row} is {'bent' if every is None else 'opened'}"])
     out = Table(title="Place in mm per unit slope of the light, radius in mm", caption="Negative radius: upside down.")
     for column in ("ghost", "place", "now", "radius", "now", "times"):
         out.add_column(column, justify="right", no_wrap=True)

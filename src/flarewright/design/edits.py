@@ -34,7 +34,7 @@ class Resized:
     ----------
     lens : Lens
     row : int
-        The mirror that was bent.
+        The mirror that was bent, or the row that was opened.
     ghosts : tuple of (int, int)
     before, after : ndarray, shape (G, 2)
         Place (mm per unit slope of the light) and signed radius (mm).
@@ -119,6 +119,65 @@ def resize_ghost(
     bent = complete_lens(opened_to(bent, float(vector[0])))
     kept = [columns.PLACE, columns.RADIUS]
     return Resized(bent, row, structure.pairs, before[:, kept], after[:, kept])
+
+
+def resize_all(
+    lens: Lens, height: float, *, by: Literal["stop", "entrance"] = "stop", f_number: float | None = None
+) -> Resized:
+    """Resize all ghosts that one opening bounds: those of the stop, or those of the entrance.
+
+    Parameters
+    ----------
+    lens : Lens
+        Complete.
+    height : float
+        Multiplies the stop's diameter, or that of the first surface.
+    by : {"stop", "entrance"}
+    f_number : float, optional
+        None: wide open.
+
+    Returns
+    -------
+    Resized
+        Ghosts that the other opening bounds stay as they are, or are bounded by this one now.
+
+    Raises
+    ------
+    ProjectError
+        When the stop is the first row, or the first surface would be wider than it is a sphere.
+    LensError
+        When no lens file can hold the f-number.
+
+    Notes
+    -----
+    Van Acoleyen 2025, section 5.3.1.
+    """
+    structure, order = structure_of(lens), first_order(lens, f_number)
+    vector = vector_of(lens, 2.0 * order.stop_semi_diameter, order.sensor_distance)
+    front = lens.rows[0]
+    if by == "entrance" and not isinstance(front, Surface):
+        raise ProjectError(
+            f"the stop is the first row of {lens.name}, so nothing else bounds what enters; resize by stop"
+        )
+    entrance = 2.0 * (getattr(front, "semi_diameter", None) or order.entrance_pupil_diameter)
+    before = evaluate(structure, vector[None], entrance)[0]
+    if by == "stop":
+        row, vector[0] = lens.stop_row, height * vector[0]
+        changed = opened_to(lens, float(vector[0]))
+    else:
+        assert isinstance(front, Surface)
+        row, entrance = 0, height * entrance
+        if abs(front.curvature) * 0.5 * entrance > STEEPEST:
+            raise ProjectError(
+                f"row 0 of {lens.name} is a sphere of radius {1.0 / abs(front.curvature):.4g} mm, and {height:g} times "
+                "its opening is wider than that; take less"
+            )
+        changed = lens.replace(rows=(front.replace(semi_diameter=0.5 * entrance), *lens.rows[1:]))
+        if f_number is not None:
+            changed = changed.replace(f_number=f_number)
+    after = evaluate(structure, vector[None], entrance)[0]
+    kept = [columns.PLACE, columns.RADIUS]
+    return Resized(complete_lens(changed), row, structure.pairs, before[:, kept], after[:, kept])
 
 
 def _nearest_root(function: object, start: float, largest: float) -> float | None:
