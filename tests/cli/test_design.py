@@ -80,11 +80,14 @@ def test_identify_finds_the_rank_that_trials_found(capsys):
     told = json.loads(capsys.readouterr().out)
     assert (told["rank"], told["unknowns"]) == (17, 23)
     assert len(told["remedies"]) == 6
+    assert told["rank_with_brightness"] == 23
     assert run([*words, "--brightness", "--stop-known", "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
     assert (told["rank"], told["unknowns"], told["free"]) == (22, 22, [])
     assert run(words) == 0
-    assert "fix 17 of 23" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert "fix 17 of 23" in said
+    assert "how bright the ghosts are (bare glass): 23 of 23" in said
 
 
 def test_scratch_and_colors_write_lenses(folder, capsys):

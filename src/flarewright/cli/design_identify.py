@@ -42,14 +42,16 @@ def identify(
     order = first_order(known, f_number)
     structure = structure_of(known)
     vector = vector_of(known, 2.0 * order.stop_semi_diameter, order.sensor_distance)
-    found = analyse(
-        structure, vector, np.array(slopes), entrance=entrance, brightness=brightness, stop_known=stop_known
+    found, brighter = (
+        analyse(structure, vector, np.array(slopes), entrance=entrance, brightness=told, stop_known=stop_known)
+        for told in (brightness, True)
     )
     tell(remarks)
     if as_json:
         print_json({
             "rank": found.rank, "unknowns": found.unknowns, "fixed": list(found.fixed), "free": list(found.free),
             "remedies": list(found.remedies), "singular_values": found.singular_values.tolist(),
+            "rank_with_brightness": brighter.rank,
         })  # fmt: skip
         return
     print(f"{known.name}: {len(structure.pairs)} ghosts fix {found.rank} of {found.unknowns} numbers")
@@ -59,3 +61,5 @@ def identify(
     print(f"fixed: {', '.join(found.fixed) or 'no single one'}")
     print(f"free to change together: {', '.join(found.free)}")
     print(f"to fix the rest, measure: {', '.join(found.remedies)}")
+    if brighter.rank > found.rank:
+        print(f"or measure how bright the ghosts are (bare glass): {brighter.rank} of {found.unknowns} numbers then")
