@@ -127,8 +127,13 @@ def chosen_fstop(f_number: float | None) -> float | None:
     FlarewrightError
         When it is no possible f-number.
     """
-    if f_number is not None and not 0.3 < f_number <= 256.0:
-        raise FlarewrightError(f"--fstop {f_number:g} is no f-number of a lens; choose one between 0.3 and 256")
+    from ..model.lens import LARGEST_F_NUMBER, LEAST_F_NUMBER
+
+    if f_number is not None and not LEAST_F_NUMBER < f_number <= LARGEST_F_NUMBER:
+        raise FlarewrightError(
+            f"--fstop {f_number:g} is no f-number of a lens; choose one between {LEAST_F_NUMBER:g} and "
+            f"{LARGEST_F_NUMBER:g}"
+        )
     return f_number
 
 

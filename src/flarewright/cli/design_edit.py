@@ -35,9 +35,7 @@ def resize(
         raise ProjectError("what is to be resized? Give --ghost J-I for one, or --all stop or --all entrance for all")
     if not 0.0 < height < 1000.0:
         raise ProjectError(f"--height {height:g} is no size; give a number above 0 and below 1000")
-    first, _, second = (ghost or "0-0").partition("-")
-    if not (first.isdecimal() and second.isdecimal()):
-        raise ProjectError(f"--ghost {ghost!r} is no ghost; write its mirrors as 4-1")
+    pair = None if ghost is None else _mirrors(ghost)
     f_number = chosen_fstop(fstop)
     from rich.table import Table
 
@@ -46,12 +44,12 @@ def resize(
     from ..render.prepare import load_lens
 
     which: Literal["first", "second"] = "second" if mirror == "second" else "first"
-    if every is None:
-        done = resize_ghost(load_lens(lens), (int(first), int(second)), height, mirror=which, f_number=f_number)
+    if pair is not None:
+        done = resize_ghost(load_lens(lens), pair, height, mirror=which, f_number=f_number)
     else:
         done = resize_all(load_lens(lens), height, by="stop" if every == "stop" else "entrance", f_number=f_number)
     write_lens(done.lens, output)
-    tell([f"wrote {output}: row {done.row} is {'bent' if every is None else 'opened'}"])
+    tell([f"wrote {output}: row {done.row} is {'opened' if pair is None else 'bent'}"])
     out = Table(title="Place in mm per unit slope of the light, radius in mm", caption="Negative radius: upside down.")
     for column in ("ghost", "place", "now", "radius", "now", "times"):
         out.add_column(column, justify="right", no_wrap=True)
@@ -60,6 +58,13 @@ def resize(
         cells = (f"{place:.2f}", f"{place_now:.2f}", f"{radius:.3f}", f"{radius_now:.3f}", f"{times:.3f}")
         out.add_row(f"{j}-{i}", *cells)
     console().print(out)
+
+
+def _mirrors(ghost: str) -> tuple[int, int]:
+    first, _, second = ghost.partition("-")
+    if not (first.isdecimal() and second.isdecimal()):
+        raise ProjectError(f"--ghost {ghost!r} is no ghost; write its mirrors as 4-1")
+    return int(first), int(second)
 
 
 def move_stop(

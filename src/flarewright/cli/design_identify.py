@@ -33,6 +33,7 @@ def identify(
     f_number = chosen_fstop(fstop)
     import numpy as np
 
+    from ..design.identify import Identification
     from ..design.identify import identify as analyse
     from ..design.prescription import structure_of, vector_of
     from ..render.prepare import first_order, load_lens
@@ -42,10 +43,12 @@ def identify(
     order = first_order(known, f_number)
     structure = structure_of(known)
     vector = vector_of(known, 2.0 * order.stop_semi_diameter, order.sensor_distance)
-    found, brighter = (
-        analyse(structure, vector, np.array(slopes), entrance=entrance, brightness=told, stop_known=stop_known)
-        for told in (brightness, True)
-    )
+
+    def analysed(told: bool) -> Identification:
+        return analyse(structure, vector, np.array(slopes), entrance=entrance, brightness=told, stop_known=stop_known)
+
+    found = analysed(brightness)
+    brighter = found if brightness else analysed(True)
     tell(remarks)
     if as_json:
         print_json({

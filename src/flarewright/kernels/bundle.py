@@ -15,6 +15,7 @@ from .clip import (
     clip_triangle,
     cut_to_rectangle,
     polygon_area,
+    slope_over,
 )
 from .mask import even_value, fill_through_mask, mask_texture, masked_point
 from .raster import add_to_pixel, fill_polygon, plane_size, splat_line
@@ -360,8 +361,7 @@ def _plane_through(corner, mean, unit, drawn):
     x2, y2 = corner[2, 0] - corner[0, 0], corner[2, 1] - corner[0, 1]
     d0, d1, d2 = corner[0, 2] * ratio, corner[1, 2] * ratio, corner[2, 2] * ratio
     inverse = 1.0 / (x1 * y2 - x2 * y1)
-    gx = ((d1 - d0) * y2 - (d2 - d0) * y1) * inverse
-    gy = ((d2 - d0) * x1 - (d1 - d0) * x2) * inverse
+    gx, gy = slope_over(x1, y1, x2, y2, inverse, d1 - d0, d2 - d0)
     base = d0 - gx * corner[0, 0] - gy * corner[0, 1]
     return base, gx, gy, min(min(d0, d1), d2), max(max(d0, d1), d2)
 

@@ -2,12 +2,21 @@
 
 import numpy as np
 
-from ._jit import inner
+from ._jit import inlined, inner
 from .trace import REL, STOP_X, WEIGHT, X, Y
 
 # columns of a polygon's vertex; then u, v for each crossing of the stop
 PX, PY, PREL, PP, PQ, PW, PSTOP = 0, 1, 2, 3, 4, 5, 6
 MAX_VERTICES = 256
+
+
+@inlined
+def slope_over(x1, y1, x2, y2, inverse, rise1, rise2):
+    """Return the gradient of what is linear over a triangle, from its rise along two sides (x1, y1) and (x2, y2).
+
+    `inverse` is 1 / (x1 y2 - x2 y1).
+    """
+    return (rise1 * y2 - rise2 * y1) * inverse, (rise2 * x1 - rise1 * x2) * inverse
 
 
 @inner

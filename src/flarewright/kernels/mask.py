@@ -10,7 +10,7 @@ from math import floor, log2
 import numpy as np
 
 from ._jit import inner
-from .clip import PSTOP, cut_to_rectangle
+from .clip import PSTOP, cut_to_rectangle, slope_over
 from .pattern import (
     AT_X,
     AT_Y,
@@ -124,8 +124,7 @@ def place_mask(polygon, count, crossings, corner, stops, mask, texture):
         covered = 0.0
         for q in range(2):
             d0, d1, d2 = stops[c, 0, q], stops[c, 1, q], stops[c, 2, q]
-            gx = ((d1 - d0) * y2 - (d2 - d0) * y1) * inverse
-            gy = ((d2 - d0) * x1 - (d1 - d0) * x2) * inverse
+            gx, gy = slope_over(x1, y1, x2, y2, inverse, d1 - d0, d2 - d0)
             places[c, 3 * q] = d0 - gx * corner[0, 0] - gy * corner[0, 1]
             places[c, 3 * q + 1], places[c, 3 * q + 2] = gx, gy
             # a pixel covers no more than the polygon itself does

@@ -145,16 +145,22 @@ def _fill_woven(flat, blocks, row, depth, xl0, xl1, xr0, xr1, start, gx, density
         add_colored(flat, np.uint64((row * blocks + block) * _FLOATS), light, begin, red, green, blue)
 
 
-@inner
-def _mark_strip(flat, width, row, depth, xl0, xl1, xr0, xr1, density, rgb):
-    """Add a strip of even density to a picture of differences along its rows: only the pixels at its edges change."""
+@inlined
+def _strip(width, xl0, xl1, xr0, xr1):
+    """Return a strip's first pixel and how many there are, and from that pixel its edges and where none is cut."""
     la, lb = min(xl0, xl1), max(xl0, xl1)
     ra, rb = min(xr0, xr1), max(xr0, xr1)
     first = int(la)
     count = min(int(rb) + 1, width) - first
     la, lb, ra, rb = la - first, lb - first, ra - first, rb - first
     l_inverse, r_inverse = 0.5 / max(lb - la, 1e-9), 0.5 / max(rb - ra, 1e-9)
-    whole, rest = int(lb) + 1, int(ra)
+    return first, count, la, lb, ra, rb, l_inverse, r_inverse, int(lb) + 1, int(ra)
+
+
+@inner
+def _mark_strip(flat, width, row, depth, xl0, xl1, xr0, xr1, density, rgb):
+    """Add a strip of even density to a picture of differences along its rows: only the pixels at its edges change."""
+    first, count, la, lb, ra, rb, l_inverse, r_inverse, whole, rest = _strip(width, xl0, xl1, xr0, xr1)
     if rest < whole:
         whole, rest = count, count
     before = 0.0
@@ -179,13 +185,7 @@ def _mark_strip(flat, width, row, depth, xl0, xl1, xr0, xr1, density, rgb):
 @inner
 def _mark_woven(flat, width, row, depth, xl0, xl1, xr0, xr1, density, rgb, light):
     """Add a strip as `_mark_strip` does, multiplied by `light`."""
-    la, lb = min(xl0, xl1), max(xl0, xl1)
-    ra, rb = min(xr0, xr1), max(xr0, xr1)
-    first = int(la)
-    count = min(int(rb) + 1, width) - first
-    la, lb, ra, rb = la - first, lb - first, ra - first, rb - first
-    l_inverse, r_inverse = 0.5 / max(lb - la, 1e-9), 0.5 / max(rb - ra, 1e-9)
-    whole, rest = int(lb) + 1, int(ra)
+    first, count, la, lb, ra, rb, l_inverse, r_inverse, whole, rest = _strip(width, xl0, xl1, xr0, xr1)
     before = 0.0
     for c in range(count + 1):
         here = 0.0

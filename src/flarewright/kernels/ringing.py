@@ -14,7 +14,7 @@ from .bundle import (
     _splat_polygon,
     _triangle_flux,
 )
-from .clip import MAX_VERTICES, PP, PQ, PSTOP, PX, PY, clip_triangle, cut_to_rectangle, polygon_area
+from .clip import MAX_VERTICES, PP, PQ, PSTOP, PX, PY, clip_triangle, cut_to_rectangle, polygon_area, slope_over
 from .pattern import (
     ANYWHERE,
     DEEP,
@@ -207,8 +207,7 @@ def _places_over_triangle(corner, stops, table, corners, places):
         places[k, WAY] = place_in_pattern(table, corners, k, stops[k], 3)
         for q in range(2):
             d0, d1, d2 = stops[k, 0, q], stops[k, 1, q], stops[k, 2, q]
-            gx = ((d1 - d0) * y2 - (d2 - d0) * y1) * inverse
-            gy = ((d2 - d0) * x1 - (d1 - d0) * x2) * inverse
+            gx, gy = slope_over(x1, y1, x2, y2, inverse, d1 - d0, d2 - d0)
             places[k, 3 * q] = d0 - gx * corner[0, 0] - gy * corner[0, 1]
             places[k, 3 * q + 1], places[k, 3 * q + 2] = gx, gy
             places[k, 6 + 2 * q], places[k, 7 + 2 * q] = min(d0, d1, d2), max(d0, d1, d2)

@@ -92,10 +92,12 @@ def spots_of_picture(
         0.0, 1.0, frame(axis_px, toward_deg, 0.0, 1.0), axis_px, pixels, np.repeat(variance[..., None], 3, axis=2)
     )
     seen = np.isfinite(variance)
-    slopes = _beside(slopes_of([view], [grey], [seen]), seen)
+    slopes = slopes_of([view], [grey], [seen])
+    near = _beside(seen, slopes.x.shape[1:])
+    slopes = _cleared(slopes, near)
     # so much noise that no slope is shortened: these are steepest at the very border
     even = np.full_like(view.variance, max(float(grey.max()), noise) ** 2)
-    steep = _beside(slopes_of([replace(view, variance=even)], [grey], [seen]), seen)
+    steep = _cleared(slopes_of([replace(view, variance=even)], [grey], [seen]), near)
     chance = max((one.score for one in candidates(slopes, width, sign=-1.0, most=1)), default=0.0)
     enough = max(ENOUGH, ABOVE_CHANCE * chance)
     found: list[Spot] = []
@@ -110,16 +112,20 @@ def spots_of_picture(
     return tuple(one for one in found if sum(one.rgb) > 3.0 * BODY * noise)
 
 
-def _beside(slopes: Slopes, seen: NDArray[np.bool_]) -> Slopes:
-    """Return the slopes without those next to what is hidden: its edge would pass for a dark circle's border."""
+def _beside(seen: NDArray[np.bool_], shape: tuple[int, ...]) -> NDArray[np.bool_]:
+    """Mark the slopes next to what is hidden: its edge would pass for a dark circle's border."""
     if seen.all():
-        return slopes
+        return np.zeros(shape, np.bool_)
     reach = ceil(0.5 * SMOOTHED)
     hidden = np.pad(~seen[::2, ::2], reach)
     windows = np.lib.stride_tricks.sliding_window_view(hidden, (2 * reach + 1, 2 * reach + 1))
-    near = np.asarray(windows.any(axis=(2, 3)))[: slopes.x.shape[1], : slopes.x.shape[2]]
+    return np.asarray(windows.any(axis=(2, 3)))[: shape[0], : shape[1]]
+
+
+def _cleared(slopes: Slopes, gone: NDArray[np.bool_]) -> Slopes:
+    """Return the slopes of one picture without some."""
     x, y = slopes.x.copy(), slopes.y.copy()
-    x[0][near], y[0][near] = np.nan, np.nan
+    x[0][gone], y[0][gone] = np.nan, np.nan
     return Slopes(x, y, slopes.sigmas, slopes.frames)
 
 
@@ -155,10 +161,7 @@ def _distances(view: View, place: float, scale: float = 1.0) -> Floats:
 def _without(slopes: Slopes, view: View, place: float, radius: float) -> Slopes:
     """Return the slopes with a ghost's border taken out."""
     away = np.abs(_distances(view, place, 0.5) - radius)[: slopes.x.shape[1], : slopes.x.shape[2]]
-    gone = away < BORDER * radius + SMOOTHED
-    x, y = slopes.x.copy(), slopes.y.copy()
-    x[0][gone], y[0][gone] = np.nan, np.nan
-    return Slopes(x, y, slopes.sigmas, slopes.frames)
+    return _cleared(slopes, away < BORDER * radius + SMOOTHED)
 
 
 def _spot(name: str, view: View, place: float, radius: float, score: float) -> Spot:

@@ -14,7 +14,7 @@ from .design import Design
 from .holdout import Holdout
 from .imperfection import Imperfection
 from .iris import Iris
-from .lens import Lens
+from .lens import LARGEST_F_NUMBER, LEAST_F_NUMBER, Lens
 from .light import Light
 from .plate import Plate
 from .scatter import Scatter
@@ -164,7 +164,7 @@ class Project(Frozen):
 
     schema_version: Literal[1] = 1
     lens: str | Lens
-    f_number: float | None = Field(None, gt=0.3, le=256.0)
+    f_number: float | None = Field(None, gt=LEAST_F_NUMBER, le=LARGEST_F_NUMBER)
     iris: Iris | None = None
     coating: CoatingChoice = AsLens()
     lights: tuple[Light, ...] = Field(min_length=1)
