@@ -9,18 +9,19 @@ from pathlib import Path
 
 import pytest
 
+from flarewright.cli.app import run
 from flarewright.io.exr import read_exr
-from flarewright.kernels import first_run
+from flarewright.kernels import first_run, helpers
 from flarewright.kernels.first_run import ROOTS, compile_together, divided
 
 # a command, and what it compiled, loaded and was asked for
 WATCHED = """
 import json, sys
 from flarewright.cli.app import run
-from flarewright.kernels import first_run
-first_run.cores = lambda: int(sys.argv[1])
+from flarewright.kernels import first_run, helpers
+helpers.cores = lambda: int(sys.argv[1])
 import flarewright.render.first_run as plan
-plan.cores = first_run.cores
+plan.cores = helpers.cores
 code = run(sys.argv[2:])
 found = {}
 for name in first_run.ROOTS:
@@ -58,10 +59,12 @@ def test_a_cold_command_writes_what_a_warm_one_writes(tmp_path):
         assert one.name == other.name
         assert one.pixels.tobytes() == other.pixels.tobytes()
     assert remarks.replace("cold.exr", "warm.exr") == same_remarks
-    # the helper's share was loaded, and this process compiled its own
-    mine, helpers = divided([name for name in roots if roots[name]["called"]], 2)
-    assert {name for name in roots if roots[name]["compiled"]} == set(mine)
-    assert {name for name in again if again[name]["called"]} == {*mine, *helpers}
+    # the helper's share was loaded, this process compiled its own, and nobody anything else
+    called = {name for name in roots if roots[name]["called"]}
+    assert {name for name in roots if roots[name]["compiled"]} == called - {"mesh", "nodes", "prepass"}
+    assert {name for name in again if again[name]["called"]} == called
+    kernels = {path.name.split("-")[0] for path in (tmp_path / "cache").rglob("*.nbi")}
+    assert kernels == {ROOTS[name][0] for name in called}
 
 
 @pytest.mark.parametrize(
@@ -89,22 +92,22 @@ SOME = ["double", "pixels"]
 
 TOGETHER = """
 import sys
-from flarewright.kernels import first_run
+from flarewright.kernels import first_run, helpers
 # two small roots are worth a helper only where it costs nothing
 first_run._START = 0.0
 if sys.argv[1] == "no interpreter":
     sys.executable = ""
 elif sys.argv[1] == "failing":
-    first_run._start = lambda share: first_run.subprocess.Popen(
+    helpers.start = lambda share: helpers.subprocess.Popen(
         [sys.executable, "-c", "raise SystemExit(3)"], stdin=-1, stdout=-3, stderr=-3)
 elif sys.argv[1] == "hanging":
-    first_run.PATIENCE_S = 0.5
-    first_run._start = lambda share: first_run.subprocess.Popen(
+    helpers.PATIENCE_S = 0.5
+    helpers.start = lambda share: helpers.subprocess.Popen(
         [sys.executable, "-c", "import time; time.sleep(600)"], stdin=-1, stdout=-3, stderr=-3)
 elif sys.argv[1] == "not allowed":
     def refuse(*arguments, **options):
         raise PermissionError("no processes here")
-    first_run.subprocess.Popen = refuse
+    helpers.subprocess.Popen = refuse
 first_run.compile_together(["double", "pixels"], 2)
 print([len(first_run.kernel(name).signatures) for name in ("double", "pixels")], first_run.absent(["pixels", "double"]))
 """
@@ -131,7 +134,7 @@ def test_without_its_helper_a_command_goes_on_alone(how, tmp_path):
 
 def test_a_helper_ends_with_the_command(tmp_path, monkeypatch):
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
-    helper = first_run._start(["mesh"])
+    helper = helpers.start(["mesh"])
     time.sleep(1.0)
     assert helper.poll() is None
     # what the system does when a process ends, however it ends
@@ -143,7 +146,7 @@ def test_nobody_helps_where_nothing_is_compiled(monkeypatch):
     def start(share):
         raise AssertionError("a process was started")
 
-    monkeypatch.setattr(first_run, "_start", start)
+    monkeypatch.setattr(helpers, "start", start)
     # one process, a helper itself, a cache that holds all
     compile_together(SOME, 1)
     monkeypatch.setattr(first_run, "absent", lambda names: [])
@@ -151,6 +154,80 @@ def test_nobody_helps_where_nothing_is_compiled(monkeypatch):
     monkeypatch.setattr(first_run, "absent", list)
     monkeypatch.setenv("FLAREWRIGHT_HELPER", "1")
     compile_together(SOME, 2)
+
+
+AHEAD = """
+import sys
+from pathlib import Path
+from flarewright.kernels import first_run, helpers
+helpers.cores = lambda: 2
+helpers._TRACING = (("pixels",),)
+with helpers.head_start():
+    (helper,) = helpers.ahead()
+    first_run.compile_together(["double", "pixels"], int(sys.argv[1]))
+    print([len(first_run.kernel(name).signatures) for name in ("double", "pixels")], first_run.absent(["pixels"]))
+print(helpers.ahead(), helper.process.poll() is not None)
+index = Path(sys.argv[2])
+index.parent.mkdir()
+index.touch()
+with helpers.head_start():
+    print(helpers.ahead())
+"""
+# what Numba leaves of a compiled pre-pass
+INDEX = f"kernels/prepass.find_box-57.py{sys.version_info.major}{sys.version_info.minor}.nbi"
+
+
+@pytest.mark.parametrize("processes", ["1", "2"])
+def test_a_head_start_is_made_use_of(processes, tmp_path):
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
+    done = subprocess.run(
+        [sys.executable, "-c", AHEAD, processes, str(tmp_path / INDEX)],
+        capture_output=True, text=True, check=True, timeout=60, env=environment,
+    )  # fmt: skip
+    # and a second time nobody begins before the command knows better
+    assert done.stdout.splitlines() == ["[1, 0] []", "() True", "()"]
+
+
+def test_a_head_start_needs_a_cold_cache_that_can_be_told(tmp_path, monkeypatch):
+    monkeypatch.delenv("NUMBA_DISABLE_JIT", raising=False)
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    assert helpers._surely_cold()
+    held = tmp_path / INDEX
+    held.parent.mkdir()
+    held.touch()
+    assert not helpers._surely_cold()
+    # of older sources
+    os.utime(held, (0, 0))
+    assert helpers._surely_cold()
+    monkeypatch.setenv("NUMBA_DISABLE_JIT", "1")
+    assert not helpers._surely_cold()
+    monkeypatch.delenv("NUMBA_DISABLE_JIT")
+    # Numba caches somewhere else, which only Numba knows
+    monkeypatch.delenv("NUMBA_CACHE_DIR")
+    monkeypatch.setattr(os, "access", lambda path, mode: False)
+    assert not helpers._surely_cold()
+
+
+@pytest.mark.parametrize(
+    "words", [["render", "--help"], ["lenses"], ["ghosts", "-h"], ["render", "no-such-lens", "--threads", "1"], []]
+)
+def test_commands_that_trace_nothing_start_nobody(words, monkeypatch, capsys):
+    def begin():
+        raise AssertionError("a process was started")
+
+    monkeypatch.setattr("flarewright.cli.app.head_start", begin)
+    assert run(words) in (0, 2)
+
+
+def test_a_mistake_is_told_at_once_and_leaves_no_helper(tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    monkeypatch.setattr(helpers, "cores", lambda: 2)
+    begun = []
+    start = helpers.start
+    monkeypatch.setattr(helpers, "start", lambda share: begun.append(start(share)) or begun[-1])
+    assert run(["render", "no-such-lens", "--light", "1,2", "-o", str(tmp_path / "a.exr")]) == 2
+    assert "no-such-lens" in capsys.readouterr().err
+    assert [process.poll() is None for process in begun] == [False]
 
 
 def test_python_without_a_compiler_has_nothing_absent(tmp_path):

@@ -6,12 +6,14 @@ import gc
 import os
 import sys
 from collections.abc import Sequence
+from contextlib import nullcontext
 from typing import Annotated, Any
 
 import typer
 
 from .. import __version__
 from ..errors import FlarewrightError
+from ..kernels.helpers import head_start
 from . import (
     coating_list,
     coating_plot,
@@ -147,13 +149,19 @@ def run(arguments: Sequence[str]) -> int:
     if words in ([], ["lens"], ["coating"], ["project"], ["scene"], ["design"], ["measure"]):
         words.append("--help")
     try:
-        code = _call(words)
+        with head_start() if _traces(words) else nullcontext():
+            code = _call(words)
         sys.stdout.flush()
         return code
     except BrokenPipeError:
         # Whoever read our output went away (`| head`); the interpreter's last flush must not complain again.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
+
+
+def _traces(words: Sequence[str]) -> bool:
+    """Tell whether a command is one that traces rays, on as many cores as there are."""
+    return words[0] in ("render", "ghosts") and not {"-h", "--help", "--threads"} & set(words)
 
 
 def _call(words: list[str]) -> int:

@@ -58,7 +58,9 @@ def node_densities(data, pupil, triangles):
     -----
     Hullin 2011, section 4.3, "Smooth shading".
     """
-    flux, area = np.zeros(pupil.shape[0]), np.zeros(pupil.shape[0])
+    flux, area = np.empty(pupil.shape[0]), np.empty(pupil.shape[0])
+    for k in range(flux.size):
+        flux[k], area[k] = 0.0, 0.0
     for t in range(triangles.shape[0]):
         a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
         if data[a, ALIVE] * data[b, ALIVE] * data[c, ALIVE] == 0.0:
@@ -372,7 +374,8 @@ def _splat_polygon(polygon, count, flux, rgb, plane):
     best, a, b = -1.0, 0, 0
     for k in range(count):
         for m in range(k + 1, count):
-            length = (polygon[k, PX] - polygon[m, PX]) ** 2 + (polygon[k, PY] - polygon[m, PY]) ** 2
+            dx, dy = polygon[k, PX] - polygon[m, PX], polygon[k, PY] - polygon[m, PY]
+            length = dx * dx + dy * dy
             if length > best:
                 best, a, b = length, k, m
     splat_line(polygon[a, PX], polygon[a, PY], polygon[b, PX], polygon[b, PY], flux, rgb, plane)
@@ -400,7 +403,9 @@ def measure_bundle(data, pupil, triangles, crossings, blades, axes, halves):
     columns = PSTOP + 2 * crossings
     polygon, other = np.empty((MAX_VERTICES, columns)), np.empty((MAX_VERTICES, columns))
     values = np.empty(MAX_VERTICES)
-    sums = np.zeros(8)
+    sums = np.empty(8)
+    for m in range(6):
+        sums[m] = 0.0
     sums[6], sums[7] = np.inf, -np.inf
     for t in range(triangles.shape[0]):
         triangle = triangles[t]

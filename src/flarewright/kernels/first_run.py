@@ -8,10 +8,6 @@ the helpers: a root that is not in the cache when it is first called is compiled
 from __future__ import annotations
 
 import gc
-import os
-import subprocess
-import sys
-import threading
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from importlib import import_module
@@ -19,10 +15,7 @@ from typing import Any
 
 from numba.core.sigutils import normalize_signature
 
-# a helper that takes longer than this is given up, and the command compiles alone
-PATIENCE_S = 120.0
-# set for helpers, which start none themselves
-_MARK = "FLAREWRIGHT_HELPER"
+from .helpers import ahead, helping, is_helper
 
 _GEOMETRY = "i8[::1], i8[::1], f8[::1], f8[::1], f8[::1], f8[::1]"
 _BUNDLE = "f8[:,::1], f8[:,::1], i8[:,::1]"
@@ -76,6 +69,7 @@ ROOTS = {
     ),
     "fan wings": ("resample.blend_fan_wings", f"{_WINGS}, f8[::1], f8, f8, f4[:,:,::1]", 0.5),
     "pixels": ("collect.collect", "f4[:,:,:,::1], f4[:,:,::1]", 0.1),
+    "nodes": ("trace.trace_nodes", f"{_GEOMETRY}, f8[::1], f8[:,::1], f8, f8, f8, f8[::1], f8[::1], f8[:,::1]", 1.6),
     "hits": (
         "trace.trace_hits",
         "i8[::1], i8[::1], f8[::1], f8[::1], f8[::1], f8[::1], f8, f8, f8, f8[::1], f8[::1], f8[:,:,::1]",
@@ -97,7 +91,8 @@ ROOTS = {
 }
 # roots that take only so long after another one in the same process, whose inner kernels they share
 KIN = {
-    "prepass": ("mesh", 2.5),
+    "prepass": ("mesh", 2.2),
+    "nodes": ("mesh", 0.6),
     "measure": ("draw", 0.6),
     "densities": ("draw", 0.2),
     "ghosts' light": ("matrices", 0.6),
@@ -120,14 +115,18 @@ def compile_together(names: Sequence[str], processes: int) -> None:
     processes : int
         Largest number of processes, this one included.
     """
-    shares = divided(absent(names), processes)
-    if len(shares) < 2 or _MARK in os.environ:
+    if is_helper():
         return
-    with _helpers(shares[1:]) as helpers:
-        compile_roots(shares[0])
-        for helper in helpers:
-            with suppress(subprocess.TimeoutExpired):
-                helper.wait(PATIENCE_S)
+    missing = absent(names)
+    begun = [helper for helper in ahead() if set(helper.names) & set(missing)]
+    others = {name for helper in begun for name in helper.names}
+    shares = divided([name for name in missing if name not in others], max(processes - len(begun), 1))
+    if len(shares) + len(begun) < 2:
+        return
+    with helping(shares[1:]) as helpers:
+        compile_roots(shares[0] if shares else ())
+        for helper in (*helpers, *begun):
+            helper.wait()
 
 
 def divided(names: Sequence[str], processes: int) -> list[list[str]]:
@@ -156,13 +155,6 @@ def divided(names: Sequence[str], processes: int) -> list[list[str]]:
 def _seconds(name: str, share: Sequence[str]) -> float:
     kin, seconds = KIN.get(name, ("", 0.0))
     return seconds if kin in share else ROOTS[name][2]
-
-
-def cores() -> int:
-    """Return how many cores this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 def absent(names: Sequence[str]) -> list[str]:
@@ -216,53 +208,3 @@ def _uncollected() -> Iterator[None]:
     finally:
         if enabled:
             gc.enable()
-
-
-@contextmanager
-def _helpers(shares: Sequence[Sequence[str]]) -> Iterator[list[subprocess.Popen[bytes]]]:
-    """Start a process a share; none outlives the block."""
-    started: list[subprocess.Popen[bytes]] = []
-    try:
-        for share in shares:
-            # no program, no memory or no right to start another: the command compiles alone
-            with suppress(OSError, ValueError):
-                started.append(_start(share))
-        yield started
-    finally:
-        for helper in started:
-            helper.kill()
-            helper.communicate()
-
-
-def _start(share: Sequence[str]) -> subprocess.Popen[bytes]:
-    if getattr(sys, "frozen", False) or not sys.executable:
-        raise OSError("there is no interpreter to start")
-    # the parent's search path, and never the working folder in its place
-    code = f"import sys; sys.path[:] = {sys.path!r}; from {__name__} import help_out; help_out({list(share)!r})"
-    return subprocess.Popen(
-        [sys.executable, "-c", code],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-        env={**os.environ, _MARK: "1"},
-        creationflags=getattr(subprocess, "CREATE_NO_WINDOW", 0),
-    )
-
-
-def help_out(names: Sequence[str]) -> None:
-    """Compile roots in a helper, and end the process.
-
-    Parameters
-    ----------
-    names : sequence of str
-        Keys of `ROOTS`.
-    """
-
-    def end_with_parent() -> None:
-        # the pipe closes when the command ends, however it ends
-        os.read(0, 1)
-        os._exit(1)
-
-    threading.Thread(target=end_with_parent, daemon=True).start()
-    compile_roots(names)
-    os._exit(0)

@@ -108,31 +108,33 @@ def find_box(
     trace_lanes(
         rows, actions, curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, tilt, nearness, px, py, data
     )
-    found = np.array([np.inf, -np.inf, np.inf, -np.inf])
-    sums = np.zeros(6)
+    found, spots = _nowhere(), _nowhere()
+    sums = np.empty(6)
+    for m in range(6):
+        sums[m] = 0.0
     nodes = np.empty(4, dtype=np.int64)
     share = hx * hy * np.cos(tilt)
     accepted = 0
-    kept = np.zeros(nx * ny, dtype=np.bool_)
+    kept = np.empty(nx * ny, dtype=np.int64)
     for a in range(nx):
         for b in range(ny):
+            kept[a * ny + b] = 0
             _cell_corners(a, b, width, nodes)
             if rejected(data, nodes, crossings, iris_radius, 0.5):
                 continue
             found[0], found[1] = min(found[0], box[0] + a * hx), max(found[1], box[0] + (a + 1) * hx)
             found[2], found[3] = min(found[2], box[2] + b * hy), max(found[3], box[2] + (b + 1) * hy)
             _weigh(data, nodes, share, view_radius, sums)
-            kept[a * ny + b] = True
+            kept[a * ny + b] = 1
             accepted += 1
             sums[4] += 1.0
-    spots = np.array([np.inf, -np.inf, np.inf, -np.inf])
     if accepted < FEW_CELLS:
         # a spot smaller than a cell may hide between the samples
         corners = np.empty((nx * ny, 2))
         n_doubtful = 0
         for cell in range(nx * ny):
             _cell_corners(cell // ny, cell % ny, width, nodes)
-            if not kept[cell] and _doubtful(data, nodes, nx, ny, crossings, iris_radius):
+            if kept[cell] == 0 and _doubtful(data, nodes, nx, ny, crossings, iris_radius):
                 corners[n_doubtful, 0] = box[0] + (cell // ny) * hx
                 corners[n_doubtful, 1] = box[2] + (cell % ny) * hy
                 n_doubtful += 1
@@ -159,6 +161,15 @@ def find_box(
         found[2 * m] = max(found[2 * m] - step, box[2 * m])
         found[2 * m + 1] = min(found[2 * m + 1] + step, box[2 * m + 1])
     return found, sums, spots
+
+
+@inner
+def _nowhere():
+    """Make a box that holds nothing."""
+    box = np.empty(4)
+    for m in range(2):
+        box[2 * m], box[2 * m + 1] = np.inf, -np.inf
+    return box
 
 
 @inner

@@ -351,7 +351,7 @@ def splat_line(x0, y0, x1, y1, flux, rgb, plane):
         Added to; what falls outside is lost to the sensor.
     """
     height, width = plane.shape[0], BLOCK * plane.shape[1]
-    length = sqrt((x1 - x0) ** 2 + (y1 - y0) ** 2)
+    length = sqrt((x1 - x0) * (x1 - x0) + (y1 - y0) * (y1 - y0))
     samples = int(min(2.0 * length, 8192.0)) + 1
     share = flux / samples
     for k in range(samples):
