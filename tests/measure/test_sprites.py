@@ -77,6 +77,20 @@ def test_one_that_goes_with_the_light_stays_upright_and_changes_over_the_constel
     assert np.array_equal(sprite_at(one, 99.0), one.pictures[1])
 
 
+@pytest.mark.parametrize(("turn", "scale"), [(0.0, 1.0), (63.0, 1.0), (-150.0, 2.0)])
+def test_a_strip_from_the_light_lies_in_its_direction_and_nowhere_else(turn, scale):
+    one = sprite([slope()], follows="light", turn_deg=turn, stretch=3.0, grain_px=1.5, corner_px=(12.0, -15.0))
+    place, size = (90.3 * scale, 101.8 * scale), (round(200 * scale), round(210 * scale))
+    got = draw_sprites([one], 3.0, place, (0.0, 0.0), (0.0, 1.0), size, scale)
+    x, y = offsets(place, size, scale)
+    c, s = np.cos(np.radians(turn)), np.sin(np.radians(turn))
+    u, v = (c * x + s * y - 12.0) / 4.5, (s * x - c * y + 15.0) / 1.5
+    inner = (u > 3.0) & (u < 27.0) & (v > 3.0) & (v < 17.0)
+    assert inner.sum() > 500
+    assert np.abs(got - straight(u, v))[inner].max() < 0.15
+    assert not got[(u < -0.01) | (u > 30.01) | (v < -0.01) | (v > 20.01)].any()
+
+
 def lights(fade, angles=ANGLES):
     """Return views of a star whose shape the pupil's shade changes, and where it is."""
     out = []

@@ -21,7 +21,7 @@ from .views import Pixels, View
 # cells across the picture of the coarsest pictures, and cells of the finer ones around the light to each side
 ACROSS, AROUND = 90, 64
 # views for each picture that goes with the light, and how many pictures there are at most: there, and about the axis
-_VIEWS, _MOST_LIGHT, _MOST_AXIS = 5, 12, 60
+VIEWS, _MOST_LIGHT, _MOST_AXIS = 5, 12, 60
 # how stiff cells are over the constellation against one view: second differences and first
 _BEND, _SLOPE = 0.02, 0.002
 # rounds in which values far from the others count less
@@ -29,9 +29,9 @@ _ROUNDS, _FAR = 4, 3.0
 # light over noise, both as powers, below which a cell is noise
 _NOISE = 1.5
 # part of a cell that must have been measured, and views (of those for a picture) that make it known
-_MEASURED, _ENOUGH = 0.3, 0.6
+_MEASURED, ENOUGH = 0.3, 0.6
 # a cell is told to this part of the noise of the darkest pixels, averaged over the cell
-_DIGIT = 0.3
+DIGIT = 0.3
 _CHUNK = 20000
 
 
@@ -54,7 +54,7 @@ def light_sprites(views: Sequence[View], pixels: Sequence[Pixels]) -> tuple[Spri
     finest = max(0, int(np.floor(np.log2(max(width / ACROSS, 1.0)))))
     left = list(pixels)
     found: list[Sprite] = []
-    angles = _knots(views, min(_MOST_LIGHT, len(views) // _VIEWS))
+    angles = even_knots(views, min(_MOST_LIGHT, len(views) // VIEWS))
     for level in range(finest, -1, -1):
         grain = 2.0**level
         box = (
@@ -97,7 +97,9 @@ def axis_sprite(views: Sequence[View], pixels: Sequence[Pixels]) -> Sprite:
         known = total > 0.0
         pictures.append(np.where(known, light / np.maximum(total, 1e-9), np.nan))
         noises.append(np.where(known, noise / np.maximum(total, 1e-9) ** 2, 0.0))
-    unit, cells = packed(_beside(_filled(_sure(np.stack(pictures), np.stack(noises)))), _DIGIT * _noise(views) / grain)
+    unit, cells = packed(
+        beside(_filled(sure(np.stack(pictures), np.stack(noises)))), DIGIT * darkest_noise(views) / grain
+    )
     return Sprite(
         follows="axis", grain_px=grain, corner_px=(float(low[0] * grain), float(low[1] * grain)),
         constellation_deg=tuple(float(np.mean([views[k].constellation_deg for k in group])) for group in groups),
@@ -112,13 +114,14 @@ def drawn(sprites: Sequence[Sprite], view: View) -> Pixels:
     return draw_sprites(sprites, view.constellation_deg, view.light_px, axis, (cosine, sine), view.size_px)
 
 
-def _noise(views: Sequence[View]) -> float:
+def darkest_noise(views: Sequence[View]) -> float:
     """Return the standard deviation of the darkest pixels."""
     known = [view.variance[np.isfinite(view.variance)] for view in views]
     return float(np.sqrt(min((np.percentile(each, 5) for each in known if each.size), default=0.0)))
 
 
-def _knots(views: Sequence[View], count: int) -> tuple[float, ...]:
+def even_knots(views: Sequence[View], count: int) -> tuple[float, ...]:
+    """Return so many constellations, evenly from the first to the last; the mean when they are fewer than two."""
     angles = [view.constellation_deg for view in views]
     if count < 2:
         return (float(np.mean(angles)),)
@@ -159,17 +162,17 @@ def _fitted(
         noise += weights[k] ** 2 * variance
     told = np.array([view.constellation_deg for view in views])
     shape = (len(views), -1)
-    found = _over_angles(values.reshape(shape), weights.reshape(shape), told, np.array(angles))
+    found = over_angles(values.reshape(shape), weights.reshape(shape), told, np.array(angles))
     # what too few views tell is as its neighbours are
     total = weights.sum(axis=0)
-    known = total >= _ENOUGH * len(views) / max(len(angles), _VIEWS)
+    known = total >= ENOUGH * len(views) / max(len(angles), VIEWS)
     noise = np.where(known, noise * len(angles) / np.maximum(total, 1e-9) ** 2, 0.0)
     pictures = np.where(known, found.reshape(len(angles), rows, columns, 3), np.nan)
-    pictures = _beside(_sure(pictures, np.broadcast_to(noise, pictures.shape)))
+    pictures = beside(sure(pictures, np.broadcast_to(noise, pictures.shape)))
     if fade:
         # beyond its border a fine picture is 0, and the coarse ones go on
         pictures *= np.outer(_window(rows), _window(columns))[..., None]
-    unit, cells = packed(pictures, _DIGIT * _noise(views) / grain)
+    unit, cells = packed(pictures, DIGIT * darkest_noise(views) / grain)
     return Sprite(
         follows="light", grain_px=grain, corner_px=(float(left), float(top)), constellation_deg=angles, rows=rows,
         columns=columns, unit=unit, cells=cells,
@@ -182,7 +185,7 @@ def _window(count: int) -> Pixels:
     return np.asarray(np.sin(0.5 * np.pi * np.minimum(away, 1.0)) ** 2, dtype=np.float32)
 
 
-def _over_angles(values: Pixels, weights: Pixels, told: Floats, knots: Floats) -> Pixels:
+def over_angles(values: Pixels, weights: Pixels, told: Floats, knots: Floats) -> Pixels:
     """Fit every cell over the constellation, linear between knots, what stands out counting less; shape (K, cells)."""
     basis = _hats(told, knots)
     count = knots.size
@@ -241,7 +244,7 @@ def _cells(picture: Pixels, view: View, x: Floats, y: Floats, side: float) -> tu
     if side > 1.0:
         mean, part = _boxes(picture, x, y, side)
     else:
-        mean, part = _points(picture, x, y)
+        mean, part = points(picture, x, y)
     row = np.clip(y.astype(np.int64), 0, picture.shape[0] - 1)
     column = np.clip(x.astype(np.int64), 0, picture.shape[1] - 1)
     weight = np.where((part > _MEASURED) & np.isfinite(view.variance[row, column]), part, 0.0)
@@ -249,7 +252,7 @@ def _cells(picture: Pixels, view: View, x: Floats, y: Floats, side: float) -> tu
     return np.where(weight > 0.0, mean, 0.0), variance, weight
 
 
-def _sure(pictures: Floats, variance: Floats) -> Floats:
+def sure(pictures: Floats, variance: Floats) -> Floats:
     """Return pictures with as much of each cell as stands out of noise; what is not known stays so.
 
     Of light of power s in noise of power n, least squares keep 1 - n / (s + n) (Wiener); s + n is the mean over colours
@@ -272,7 +275,7 @@ def _linear(whole: Floats, x: Floats, y: Floats) -> Floats:
     return np.asarray((1.0 - b) * upper + b * ((1.0 - a) * whole[top + 1, left] + a * whole[top + 1, left + 1]))
 
 
-def _points(picture: Pixels, x: Floats, y: Floats) -> tuple[Floats, Floats]:
+def points(picture: Pixels, x: Floats, y: Floats) -> tuple[Floats, Floats]:
     """Return values between pixels, and 1 where all around was measured, shape (..., 3) each."""
     height, width = picture.shape[:2]
     # up to the very border, half a pixel beyond the outermost middles
@@ -289,7 +292,7 @@ def _points(picture: Pixels, x: Floats, y: Floats) -> tuple[Floats, Floats]:
     return values.astype(float), (clear & inside[..., None]).astype(float)
 
 
-def _beside(pictures: Floats | Pixels) -> Pixels:
+def beside(pictures: Floats | Pixels) -> Pixels:
     """Fill cells that are not known from known ones beside them, farther and farther; with 0 where there are none."""
     out = np.asarray(pictures, dtype=np.float32)
     while True:

@@ -57,18 +57,23 @@ def draw_sprites(
     out = np.zeros((height, width, 3), np.float32)
     for sprite in sprites:
         cells = sprite_at(sprite, constellation_deg)
-        cosine, sine = direction if sprite.follows == "axis" else (1.0, 0.0)
+        turn = np.radians(sprite.turn_deg)
+        cosine, sine = direction if sprite.follows == "axis" else (float(np.cos(turn)), float(np.sin(turn)))
         x0, y0 = axis_px if sprite.follows == "axis" else light_px
         step = 1.0 / (scale * sprite.grain_px)
         # along = cos dx - sin dy and down = sin dx + cos dy, dx and dy counted right and down
-        matrix = step * np.array([[cosine, sine], [-sine, cosine]])
-        begin = matrix @ np.array([0.5 - y0, 0.5 - x0]) - np.array(sprite.corner_px[::-1]) / sprite.grain_px - 0.5
+        sides = np.array([1.0, 1.0 / sprite.stretch])
+        matrix = step * sides[:, None] * np.array([[cosine, sine], [-sine, cosine]])
+        corner = np.array(sprite.corner_px[::-1]) * sides / sprite.grain_px
+        begin = matrix @ np.array([0.5 - y0, 0.5 - x0]) - corner - 0.5
         top, left, rows, columns = _window(matrix, begin, cells.shape[:2], (height, width))
         if not (rows and columns):
             continue
         r, c = np.mgrid[top : top + rows, left : left + columns]
         at = matrix @ np.stack([r.ravel(), c.ravel()]) + begin[:, None]
-        out[top : top + rows, left : left + columns] += samples(cells, at[1], at[0]).reshape(rows, columns, 3)
+        inside = ((at >= -0.5) & (at <= np.array(cells.shape[:2])[:, None] - 0.5)).all(axis=0)
+        r, c, at = r.ravel()[inside], c.ravel()[inside], at[:, inside]
+        out[r, c] += samples(cells, at[1], at[0])
     return out
 
 

@@ -29,6 +29,7 @@ from .numbers import channel_numbers
 from .pursuit import pursue
 from .replay import draw, light_px
 from .settle import Settling, settle, to_model
+from .spike_fit import spike_sprites
 from .sprite_fit import axis_sprite, drawn, light_sprites
 from .views import Pixels, View, halved, views_of
 
@@ -43,6 +44,8 @@ LEFT_BEHIND = 0.1
 _OFF_AXIS = 0.02
 # rounds in which stray places lose their weight, and how well a light's place is known at best
 _LAW_ROUNDS, _LIGHT_PX = 20, 0.05
+# part of the width by which a light's place may differ from the law of all places
+_NEAR_LAW = 0.01
 # ghosts are looked for in pictures halved until they are no wider
 SEARCH_WIDTH = 400
 
@@ -272,13 +275,25 @@ def with_rest(model: GhostModel, views: Sequence[View]) -> GhostModel:
         roll = turn - (180.0 if view.constellation_deg < 0.0 else 0.0)
         ghosts = draw(model, view.constellation_deg, roll, view.size_px)
         known = np.where(np.isfinite(view.variance), view.pixels, np.nan)
-        # the light where a replay puts it
-        placed.append(replace(view, light_px=light_px(model, view.constellation_deg, roll)))
+        placed.append(replace(view, light_px=_light_of(model, view, roll)))
         left.append((known - ghosts - _light(model.halo, model.star, placed[-1])).astype(np.float32))
+    spikes = spike_sprites(placed, left, model.star)
+    left = [each - drawn(spikes, view) for each, view in zip(left, placed, strict=True)]
     going = light_sprites(placed, left)
     left = [each - drawn(going, view) for each, view in zip(left, placed, strict=True)]
-    out: GhostModel = model.replace(sprites=(*going, axis_sprite(placed, left)))
+    out: GhostModel = model.replace(sprites=(*spikes, *going, axis_sprite(placed, left)))
     return out
+
+
+def _light_of(model: GhostModel, view: View, roll_deg: float) -> tuple[float, float]:
+    """Return where a view's light is: as seen, or where a replay puts it when that is far off or beyond the picture.
+
+    Next to the axis a camera that nods turns the light's direction about: there a roll does not tell the place.
+    """
+    told = light_px(model, view.constellation_deg, roll_deg)
+    off = np.hypot(*np.subtract(view.light_px, told))
+    inside = all(0.0 <= at <= side for at, side in zip(view.light_px, view.size_px, strict=True))
+    return view.light_px if inside and off < _NEAR_LAW * view.size_px[0] else told
 
 
 def _dimmed_anew(dim: Dimmed, views: Sequence[View], ghosts: Sequence[Found]) -> Dimmed:

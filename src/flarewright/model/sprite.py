@@ -29,8 +29,13 @@ class Sprite(Frozen):
     grain_px : float
         Side of a cell, pixels.
     corner_px : tuple of float
-        Where the first cell begins, from the light or the axis: "light": right and down; "axis": towards the light and
-        at right angles to it, down when the light is right.
+        Where the first cell begins, from the light or the axis: "light": along the rows' direction and at right angles
+        to it, down when that is right; "axis": towards the light and at right angles to it, down when the light is
+        right.
+    turn_deg : float
+        "light" only: direction in which rows run, counterclockwise from the right in the upright picture.
+    stretch : float
+        Length of a cell along its row over `grain_px`.
     constellation_deg : tuple of float
         Of each picture, rising; linear between them, and beyond as at the ends.
     rows, columns : int
@@ -45,6 +50,8 @@ class Sprite(Frozen):
     follows: Literal["light", "axis"]
     grain_px: float = Field(gt=0.0)
     corner_px: tuple[float, float]
+    turn_deg: float = 0.0
+    stretch: float = Field(default=1.0, gt=0.0)
     constellation_deg: tuple[float, ...] = Field(min_length=1)
     rows: int = Field(ge=1)
     columns: int = Field(ge=1)
