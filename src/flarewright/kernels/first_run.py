@@ -57,6 +57,8 @@ ROOTS = {
         "f8[:,::1], f8, f8[:,::1], f8[::1], f8, f8, f8, f8[:,::1]",
         2.0,
     ),
+    "path matrices": ("matrix.path_matrices", "i8[::1], i8[::1], f8[::1], f8[::1], f8[::1], f8, f8[:,:,::1]", 0.5),
+    "row sums": ("raster.sum_rows", "f8[:,:,::1]", 0.2),
     "mirrors": (
         "matrix.mirror_squares",
         "i8[::1], i8[::1], i8[::1], i8[::1], f8[::1], none, f8[::1], f8[::1], f8, f8, f8, f8, f8, f8, f8[:,::1]",
@@ -97,6 +99,7 @@ KIN = {
     "densities": ("draw", 0.2),
     "ghosts' light": ("matrices", 0.6),
     "mirrors": ("matrices", 0.3),
+    "path matrices": ("matrices", 0.1),
 }
 # what a helper loses to its own start
 _START = 0.7

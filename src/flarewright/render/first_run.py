@@ -47,7 +47,8 @@ def compile_for_render(project: Project, threads: int | None = None) -> None:
         # only here: what the ghost analysis starts with need not know how ghosts are drawn
         from .ghosts import CROWD
 
-        names += ["matrices", "mirrors"] if coated else ["matrices"]
+        names += ["matrices", "path matrices", "row sums"]
+        names += ["mirrors"] if coated else []
         if len(ghost_paths(settled.lens, project.quality.paths)) * len(project.lights) >= CROWD:
             names += ["ghosts' light"]
     if project.output.starburst:
