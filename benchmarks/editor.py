@@ -90,7 +90,7 @@ def measure(chrome, lens):
         final = tab.js("flarewright.view.stats.final")
         # what is quickly drawn needs no traced picture in between
         soon = tab.js("flarewright.view.stats.soon ?? null")
-        soon_told = "" if soon is None else f"traced in three colours {soon:.0f} ms and "
+        soon_told = "" if soon is None else f"traced for the screen {soon:.0f} ms and "
         print(
             f"{lens or 'sample'}: {count / (now - begun_at):.0f} frames/s of {width} px, latency "
             f"{median(stats['latency']):.0f} ms (9 of 10 below {median(stats['latency'], 0.9):.0f}), processor time a "

@@ -1,5 +1,6 @@
 """Pictures of the editor: hit test, outline, matched drafts, working views, looks."""
 
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -10,12 +11,12 @@ from flarewright.editor.drawings import section
 from flarewright.editor.edit_shot import move_light
 from flarewright.editor.files import project_for_lens
 from flarewright.editor.hand import Hand
-from flarewright.editor.screen import Screen
+from flarewright.editor.screen import Screen, packed
 from flarewright.editor.seen import Seen, SeenGhost, alone, is_there, outline, see, under
 from flarewright.editor.session import begin
 from flarewright.editor.shown import FALSE_COLOURS, jpeg, pixels_of, plate_for
 from flarewright.editor.view import View
-from flarewright.editor.viewing import outline_png, picked, shown_jpeg, target_jpeg
+from flarewright.editor.viewing import outline_png, picked, target_jpeg
 from flarewright.errors import ProjectError
 from flarewright.model import Camera, Everywhere, Iris, Light, Output, Quality, QuarterWave
 from flarewright.optics.color import luminance_weights
@@ -237,14 +238,30 @@ def test_the_screen_keeps_the_last_good_picture(project):
     assert screen.wait(60.0)
     assert screen.problem
     assert screen.picture.project != session.project
-    assert len(shown_jpeg(screen)) > 1000
+    assert len(packed(screen)) > 1000
     session.put(lens, "Back")
     assert screen.wait(60.0)
     assert screen.problem == ""
     assert screen.picture.project == lens
 
 
-def test_a_slow_picture_is_traced_in_three_colours_first():
+def test_the_first_traced_picture_of_a_zoom_can_hardly_be_told_from_the_final_one():
+    """The Canon's 351 ghosts: no jump in brightness, and hardly one in any pixel, as eight bits show them."""
+    project = project_for_lens("canon-28-80")
+    soon, final = (studio.take(project, grade, View()) for grade in ("soon", "final"))
+    exposure = studio.exposure_of(final)
+    first, last = (pixels_of(one.ghosts + one.rest, exposure, View()).astype(int) for one in (soon, final))
+    apart = np.abs(first - last)
+    assert apart.mean() < 0.6
+    assert np.percentile(apart, 99.0) <= 4
+    # brightness over blocks of 60 pixels, stops
+    ours, theirs = (one.ghosts.reshape(9, 60, 16, 60, 3).mean(axis=(1, 3)).mean(axis=2) for one in (soon, final))
+    lit = theirs > 0.02 * theirs.mean()
+    assert np.abs(np.log2(ours[lit] / theirs[lit])).mean() < 0.01
+    assert soon.seconds < final.seconds
+
+
+def test_a_slow_picture_is_traced_for_the_screen_first():
     session, _ = begin(None)
     screen = Screen(session)
     grades = []
@@ -264,6 +281,22 @@ def test_a_slow_picture_is_traced_in_three_colours_first():
         session.do("move_light", {"light": 0, "x": light[0] + 1.0, "y": light[1]})
         assert screen.wait(60.0)
         assert grades == wanted
+    # a hand's own last picture is as good as a draft
+    hand = Hand(screen)
+    for seconds, wanted in ((5.0, ["soon", "final"]), (0.38, ["final"])):
+        grades.clear()
+        screen.final_s = seconds
+        place = {"light": 0, "x": 4.0 + seconds, "y": 1.0}
+        assert hand.picture(partial(move_light, **place), session.revision)
+        session.do("move_light", place)
+        assert screen.wait(60.0)
+        assert grades == wanted
+        # and what is done next begins with a draft again
+        grades.clear()
+        screen.final_s = 5.0
+        session.undo()
+        assert screen.wait(60.0)
+        assert grades == ["draft", "soon", "final"]
 
 
 def test_a_hand_is_followed_and_let_go(project):

@@ -87,6 +87,10 @@ class Hand:
             project = moved(session.project)
             drawn = self._drawn(project, session.view)
             self._lean(time.perf_counter() - begun)
+            if revision != session.revision:
+                # the hand has let go meanwhile, and the final picture needs all the time there is
+                return None
+            self.screen.moved = project
         # the next one is drawn while this one is packed
         data = jpeg(self._pixels(drawn), QUALITY)
         return Moved(project, data, time.perf_counter() - begun)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
@@ -17,9 +18,12 @@ from .jobs import Check, Lane, Overtaken
 from .seen import Seen
 from .session import Session
 from .sharpening import sharpen
-from .shown import pixels_of, plate_for
+from .shown import jpeg, pixels_of, plate_for
 from .studio import Match, Picture
 from .view import View
+
+# of a picture that rests
+QUALITY = 92
 
 
 class Screen:
@@ -37,6 +41,10 @@ class Screen:
         self.match = Match()
         self.problem = ""
         self.number = 0
+        # the picture as it is sent, of this number
+        self.packed: tuple[int, bytes] = (-1, b"")
+        # what a hand was shown last, until a picture of the screen's own takes its place
+        self.moved: Project | None = None
         # called when all is drawn and measured
         self.idle: Callable[[], None] | None = None
         # how long the last final picture took; none has yet
@@ -88,7 +96,11 @@ class Screen:
 
     def show(self, picture: Picture) -> None:
         """Show another picture."""
-        self.picture, self.problem = picture, ""
+        self.picture, self.problem, self.moved = picture, "", None
+        # a background may be gone: whoever asks for the picture is told
+        with suppress(FlarewrightError):
+            # packed before anybody asks, while nothing else is drawn
+            self.packed = (self.number + 1, jpeg(shown_pixels(self), QUALITY))
         self._publish()
 
     def _publish(self) -> None:
@@ -121,6 +133,21 @@ class Screen:
         """Go on with the final picture after a drag that changed nothing."""
         if self._busy is None:
             self._heard({"type": "changed"})
+
+
+def packed(screen: Screen) -> bytes:
+    """Return the picture that is shown as JPEG; black before there is one."""
+    number, data = screen.packed
+    return data if number == screen.number else jpeg(shown_pixels(screen), QUALITY)
+
+
+def shown_pixels(screen: Screen) -> NDArray[np.uint8]:
+    """Return the picture that is shown as sRGB pixels; black before there is one."""
+    picture = screen.picture
+    if picture is None:
+        width, height = studio.view_size(screen.session.project)
+        return np.zeros((height, width, 3), dtype=np.uint8)
+    return pixels_of_picture(screen, picture)
 
 
 def pixels_of_picture(screen: Screen, picture: Picture) -> NDArray[np.uint8]:

@@ -30,6 +30,7 @@ from .edit_shot import move_light
 from .guard import Application, Guard
 from .hand import Moved
 from .imports import take_in
+from .screen import packed, shown_pixels
 from .snapshot import ghosts_of
 
 STATIC = Path(__file__).parent / "static"
@@ -101,7 +102,7 @@ def _rest(desk: Desk, _request: Request, _body: Any) -> Any:
 
 
 def _picture(desk: Desk, _request: Request, _body: Any) -> Any:
-    return _jpeg(viewing.shown_jpeg(desk.screen))
+    return _jpeg(packed(desk.screen))
 
 
 def _moved(desk: Desk, asked: Mapping[str, Any]) -> Moved | None:
@@ -247,7 +248,7 @@ def _export(desk: Desk, request: Request, _body: Any) -> Any:
     if kind == "png":
         from .shown import png
 
-        return Response(png(viewing.shown_pixels(desk.screen)), media_type="image/png", headers=name)
+        return Response(png(shown_pixels(desk.screen)), media_type="image/png", headers=name)
     if kind == "csv" and desk.screen.seen is None:
         raise ProjectError("the ghosts are still being measured; try again in a moment")
     from ..io.project_file import project_text

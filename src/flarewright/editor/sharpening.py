@@ -1,8 +1,7 @@
-"""How a picture comes about that waits: a draft first, the final one after it, and what is seen where."""
+"""How a picture comes about that waits: drafted, traced for the screen, traced in full; and what is seen where."""
 
 from __future__ import annotations
 
-import math
 import time
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -19,15 +18,17 @@ if TYPE_CHECKING:
 
 # a lens whose final picture takes less needs no draft in front of it
 SOON_S = 0.35
-# one whose final picture takes more is shown traced at few wavelengths first, without what adds up to nearly nothing
-LATE_S = 1.5
-TELL_S = 0.12
+# one whose final picture takes more is first traced as well as a screen can show, which takes a third of the time
+LATE_S = 0.4
+# what is done sooner than WAIT_S needs no progress told
+WAIT_S, TELL_S = 0.6, 0.12
 
 
 def sharpen(screen: Screen, project: Project, view: View, check: Check) -> None:
     """Draw a project for the screen: a draft, the final picture, then what lies where in it.
 
-    Between the draft and a final picture that takes long stands one that is traced at few wavelengths.
+    A hand's last picture is as good as a draft. A final picture that takes long is first traced at few wavelengths,
+    with the detail that eight bits show.
 
     Parameters
     ----------
@@ -44,8 +45,9 @@ def sharpen(screen: Screen, project: Project, view: View, check: Check) -> None:
     fresh = view.found_stops is None if shown is None else studio.lens_name(shown.project) != studio.lens_name(project)
     changed = shown is None or not studio.same_scene(shown.project, project)
     working = view.grey or view.unclipped
+    followed = screen.moved is not None and studio.same_scene(screen.moved, project)
     draft: Picture | None = None
-    if changed or working or screen.final_s > SOON_S:
+    if changed or working or (screen.final_s > SOON_S and not followed):
         draft = studio.take(project, "draft", view, levels=() if changed else screen.match.levels)
         check()
         if fresh:
@@ -54,7 +56,7 @@ def sharpen(screen: Screen, project: Project, view: View, check: Check) -> None:
             screen.match = replace(screen.match, levels=())
         screen.show(draft)
     if not working:
-        if LATE_S < screen.final_s < math.inf and project.quality.wavelengths > studio.SOON_WAVELENGTHS:
+        if screen.final_s > LATE_S:
             screen.show(studio.take(project, "soon", view, progress=_progress(screen, "traced picture", check)))
         final = studio.take(project, "final", view, progress=_progress(screen, "final picture", check))
         check()
@@ -91,7 +93,7 @@ def _match_ghosts(screen: Screen, project: Project, view: View, seen: Seen, chec
 
 
 def _progress(screen: Screen, what: str, check: Check) -> Any:
-    told = 0.0
+    told = time.perf_counter() + WAIT_S - TELL_S
 
     def step(part: float, _: str) -> None:
         nonlocal told

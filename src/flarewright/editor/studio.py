@@ -27,10 +27,11 @@ Levels = tuple[tuple[float, tuple[str, ...]], ...]
 # the viewport's picture fits into this
 WIDEST, HIGHEST = 960, 540
 DRAFT_WAVELENGTHS = 3
-# and those of a first traced picture; coatings tell the colours between them
-SOON_WAVELENGTHS = 3
+# and those of a first traced picture, for eight bits; coatings tell the colours between them
+SOON_WAVELENGTHS = 5
 # its faintest ghosts are left out that carry together no more than this part of all ghost light
-SOON_CULL = 1e-3
+SOON_CULL = 3e-3
+SOON_TOLERANCE_PX = 0.5
 # gains of a draft's ghosts: their step, the least and the largest
 # (one that a rim hides now may come out as the hand goes on, so it is never dimmed altogether)
 STEP, LEAST, MOST = 2.0**0.25, 2.0**-1.5, 2.0
@@ -96,6 +97,7 @@ def staged(project: Project, grade: Grade, scale: float = 1.0) -> Project:
         if grade == "soon":
             few = min(quality.wavelengths, SOON_WAVELENGTHS)
             quality = quality.replace(wavelengths=few, bridge=True, cull=max(quality.cull, SOON_CULL))
+            quality = quality.replace(tolerance_px=max(quality.tolerance_px, SOON_TOLERANCE_PX), screen=True)
     else:
         quality = Quality(mode="draft", wavelengths=DRAFT_WAVELENGTHS, paths=own.paths)
     output = Output(layers="passes", starburst=project.output.starburst)

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from . import studio
 from .edit_wishes import new_discs, target_project
-from .screen import Screen, pixels_of_picture
+from .screen import QUALITY, Screen
 from .seen import alone, is_there, outline, under
 from .shown import jpeg, pixels_of, png
 
@@ -16,21 +15,7 @@ OUTLINE = (240, 176, 84)
 LOOKED_AT = 6
 
 
-def shown_pixels(screen: Screen) -> NDArray[np.uint8]:
-    """Return the picture that is shown as sRGB pixels; black before there is one."""
-    picture = screen.picture
-    if picture is None:
-        width, height = studio.view_size(screen.session.project)
-        return np.zeros((height, width, 3), dtype=np.uint8)
-    return pixels_of_picture(screen, picture)
-
-
-def shown_jpeg(screen: Screen, quality: int = 92) -> bytes:
-    """Return the picture that is shown as JPEG."""
-    return jpeg(shown_pixels(screen), quality)
-
-
-def target_jpeg(screen: Screen, quality: int = 92) -> bytes:
+def target_jpeg(screen: Screen) -> bytes:
     """Draw the fictional target: the picture as the wishes would have it.
 
     Ghosts that the lens has not are even discs, a little brighter than what lies around them.
@@ -44,7 +29,7 @@ def target_jpeg(screen: Screen, quality: int = 92) -> bytes:
     for x, y, radius in new_discs(project):
         away = np.hypot(columns - width / 2 - x * across, rows - height / 2 + y * across)
         light[away < radius * across] += np.float32(level)
-    return jpeg(pixels_of(light, screen.exposure_stops, view), quality)
+    return jpeg(pixels_of(light, screen.exposure_stops, view), QUALITY)
 
 
 def picked(screen: Screen, u: float, v: float) -> tuple[str, ...]:

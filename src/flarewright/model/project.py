@@ -79,6 +79,9 @@ class Quality(Frozen):
         Of those only paths that carry more than this part of all two-reflection light in the picture.
     source_step_deg : float
         An area light wider than this is traced in parts: what a part's ghosts differ by over it is taken as straight.
+    screen : bool
+        For a picture that is only looked at (final): what eight bits hardly show is drawn in less detail, and ghosts
+        are looked for in the middle colour alone.
     seed : int
         Begins the random numbers.
     reference_error : float
@@ -102,6 +105,7 @@ class Quality(Frozen):
     orders: Literal[2, 4] = 2
     order4_limit: float = Field(1e-4, gt=0.0, lt=1.0)
     source_step_deg: float = Field(2.0, ge=0.05, le=60.0)
+    screen: bool = False
     seed: int = Field(0, ge=0, lt=2**63)
     reference_error: float = Field(0.02, gt=0.0, le=1.0)
     reference_error_of: Literal["total", "blocks"] = "blocks"

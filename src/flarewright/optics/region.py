@@ -20,6 +20,8 @@ Floats = NDArray[np.float64]
 PREPASS = (32, 64)
 # and of the scans of a part of it; of what reaches the stop at least ENTRY, for a spot must be found at first
 FINER, ENTRY = (12, 24), (20, 40)
+# in half as many places, for a first look
+PREPASS_QUICK, ENTRY_QUICK = (24, 48), (14, 28)
 # and of a part's scans at other wavelengths, once the middle one has shown that no small spot is looked for: so many
 # cells of the whole front or of a part
 COARSE = (8, 16)
@@ -135,6 +137,7 @@ def find_region(
     iris_radius: float,
     view_radius: float = float("inf"),
     within: Floats | None = None,
+    quick: bool = False,
 ) -> Region | None:
     """Find the part of the pupil that a path accepts (Hullin 2011, section 4.2, "Ray Bounding").
 
@@ -149,6 +152,8 @@ def find_region(
         Radius around the axis that the picture covers, mm.
     within : ndarray, shape (4,), optional
         A box that holds the region; None: the whole front.
+    quick : bool
+        Look at the middle wavelength alone, in half as many places, and leave more room around for the others.
 
     Returns
     -------
@@ -156,13 +161,16 @@ def find_region(
         None when nothing passes.
     """
     limits = (path.stop_crossings, iris_radius, view_radius)
-    middle, *others = [(*_looking_arguments(packed, w, path, tilt), *limits) for w in wavelengths_fitted(packed)]
-    box, cells = front_box(packed, tilt), cells_across(packed, PREPASS)
+    middle, *others = [
+        (*_looking_arguments(packed, w, path, tilt), *limits)
+        for w in wavelengths_fitted(packed)[: 1 if quick else None]
+    ]
+    box, cells = front_box(packed, tilt), cells_across(packed, PREPASS_QUICK if quick else PREPASS)
     finest = _finest(packed, tilt)
     if within is not None:
         # as dense as on the whole front
         parts = (within[1::2] - within[0::2]) / (box[1::2] - box[0::2])
-        few = cells_across(packed, ENTRY)
+        few = cells_across(packed, ENTRY_QUICK if quick else ENTRY)
         cells = (max(ceil(cells[0] * parts[0]), few[0]), max(ceil(cells[1] * parts[1]), few[1]))
         box = within
     whole = True
@@ -185,13 +193,30 @@ def find_region(
             # the next scan need not see again what hid between the samples beside the main region
             held = join_boxes(held, spots)
         found = join_boxes(found, held)
-        area = float((found[1] - found[0]) * (found[3] - found[2]))
-        shrunk = area < 0.3 * (box[1] - box[0]) * (box[3] - box[2])
+        shrunk = _area(found) < 0.3 * _area(box)
+        roomy = _with_room(found, box, cells)
         box, cells, whole = found, cells_across(packed, FINER), False
         if not shrunk:
             break
+    return _region(roomy if quick else box, sums)
+
+
+def _region(box: Floats, sums: Floats) -> Region:
+    """Tell what a scan found in a box."""
     seen = float(sums[1]) if sums[3] > 0.0 else 0.0
-    return Region(box, float(sums[0]), seen, float(sums[2] / sums[0]), float(np.clip(sums[5] / area, 1e-3, 1.0)))
+    share = float(np.clip(sums[5] / _area(box), 1e-3, 1.0))
+    return Region(box, float(sums[0]), seen, float(sums[2] / sums[0]), share)
+
+
+def _area(box: Floats) -> float:
+    return float((box[1] - box[0]) * (box[3] - box[2]))
+
+
+def _with_room(found: Floats, box: Floats, cells: tuple[int, int]) -> Floats:
+    """Widen what the middle colour's scan of a box found by a cell: other colours may pass a little beside."""
+    step = (box[1::2] - box[0::2]) / cells
+    low, high = np.maximum(found[0::2] - step, box[0::2]), np.minimum(found[1::2] + step, box[1::2])
+    return np.array([low[0], high[0], low[1], high[1]])
 
 
 def _finest(packed: PackedLens, tilt: float) -> tuple[float, float]:
@@ -221,13 +246,7 @@ def measure_region(
     found, sums, _ = _scan(packed, arguments, box, cells, _finest(packed, tilt))
     if found[1] <= found[0] or sums[0] <= 0.0:
         return None
-    # other colours than the middle one may pass a little beside: one more cell of room
-    low = np.maximum(found[0::2] - (box[1::2] - box[0::2]) / cells, box[0::2])
-    high = np.minimum(found[1::2] + (box[1::2] - box[0::2]) / cells, box[1::2])
-    box = np.array([low[0], high[0], low[1], high[1]])
-    area = float((box[1] - box[0]) * (box[3] - box[2]))
-    seen = float(sums[1]) if sums[3] > 0.0 else 0.0
-    return Region(box, float(sums[0]), seen, float(sums[2] / sums[0]), float(np.clip(sums[5] / area, 1e-3, 1.0)))
+    return _region(_with_room(found, box, cells), sums)
 
 
 def grown(packed: PackedLens, region: Region, tilt: float, part: float) -> Region:

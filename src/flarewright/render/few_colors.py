@@ -31,6 +31,8 @@ def gathered_weights(
     weights: Floats,
     shown: tuple[int, ...],
     seen: Callable[[Floats], Bools],
+    *,
+    careful: bool = True,
 ) -> Floats | None:
     """Give the light of all traced wavelengths to a few of them.
 
@@ -47,6 +49,8 @@ def gathered_weights(
         The wavelengths that are drawn, rising.
     seen : callable
         Tells which traced rays (`optics.bundle.trace_points`) pass and land in the picture.
+    careful : bool
+        Whether to look where the path is cut and lands at the ends of the spectrum.
 
     Returns
     -------
@@ -64,7 +68,7 @@ def gathered_weights(
     if len(shown) == count:
         return weights
     where = spread_rays(bundle, shown, seen, SAMPLE)
-    if where.size == 0 or not _seen_alike(packed, bundle, tilt, shown, seen):
+    if where.size == 0 or (careful and not _seen_alike(packed, bundle, tilt, shown, seen)):
         return None
     flux = np.empty(count)
     for w in range(count):

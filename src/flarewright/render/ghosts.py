@@ -30,7 +30,7 @@ from .ghosts_draft import (
     seen_small,
     spread_light,
 )
-from .ghosts_final import FinalPass, contrast, detail_of, draw_alone, draw_final
+from .ghosts_final import SCREEN, FinalPass, contrast, detail_of, draw_alone, draw_final
 from .looking import looking
 from .shot import Shot
 from .sources import halvings, motion, spread_border
@@ -173,7 +173,7 @@ def _final(
     meter: _Meter,
 ) -> GhostPass:
     others, faintest = levels
-    look = looking(shots, paths, art)
+    look = looking(shots, paths, art, quality.screen)
 
     def find(path: LightPath) -> list[FinalPass]:
         if meter.cancelled.is_set():
@@ -187,6 +187,8 @@ def _final(
     flux = np.array([sum(item.region.seen_flux * item.gain for item in items) for items in found])
     own = _level(found)
     level = own + others
+    # against which it is judged how much of a ghost can be seen
+    seen_level = level * (SCREEN if quality.screen else 1.0)
     keep = _worth_drawing(flux, quality.cull)
     if faintest > 0.0:
         keep &= np.array([_level([items], plain=True) > faintest for items in found], dtype=np.bool_)
@@ -213,7 +215,7 @@ def _final(
                     alike.setdefault(item.alone, []).append(item)
                 elif item.region.seen_flux > 0.0:
                     # a layer of its own may be graded up, so it is drawn in full
-                    visibility = float("inf") if k in alone else contrast(item, level)
+                    visibility = float("inf") if k in alone else contrast(item, seen_level)
                     draw_final(item, quality, canvas, visibility, meter.cancelled)
             meter.step(f"ghost {called[k]}")
         for together in alike.values():
@@ -227,7 +229,7 @@ def _final(
                 draw_alone(group, quality, canvas, meter.cancelled)
         return canvas.planes
 
-    wide = _alike([item for k in order if k not in alone for item in found[k]], level)
+    wide = _alike([item for k in order if k not in alone for item in found[k]], seen_level)
     jobs = [partial(draw_spread, wide[k::_MOST_CHUNKS]) for k in range(min(len(wide), _MOST_CHUNKS))]
     total, layers = _collect(shots, order, named, singles, art, draw, pool, jobs, len(shots))
     share = float(flux[~keep].sum() / flux.sum()) if flux.sum() > 0.0 else 0.0

@@ -44,6 +44,8 @@ BRIDGE_PX = 2.0
 SHIFT_QUANTILE = 0.9
 # a step of colour or a ring fainter than this part of the picture's mean is not seen
 STEP_CONTRAST = 2e-3
+# and on a screen, whose steps are this many times coarser, the rim's error may be doubled so often
+SCREEN, SCREEN_ROUGH = 10.0, 3
 # and a ghost this many times fainter still needs one colour only
 ONE_COLOR = 1.0 / 6.0
 # and where nothing but fringes ends a ghost, steps of this part of their scale sqrt(lambda L / 2)
@@ -108,8 +110,9 @@ class FinalPass:
 
 
 def find_final(
-    shot: Shot, path: LightPath, art: PathArt = PLAIN, entry: Region | None = None, around: Floats | None = None
-) -> FinalPass | None:
+    shot: Shot, path: LightPath, art: PathArt = PLAIN, entry: Region | None = None, around: Floats | None = None,
+    quick: bool = False,
+) -> FinalPass | None:  # fmt: skip
     """Look where a path accepts light; None when it passes nothing.
 
     Parameters
@@ -122,6 +125,8 @@ def find_final(
         What reaches the stop without a mirror, of a path that begins so (`LightPath.entry`).
     around : ndarray, shape (4,), optional
         A part of the pupil known to hold all that the path accepts; of a point that `art` does not frame.
+    quick : bool
+        As in `optics.region.find_region`.
 
     Returns
     -------
@@ -150,7 +155,7 @@ def find_final(
         orders = grating_orders(lens, path.second_reflection, shot.grating)
         view_radius += float(np.nanmax([np.hypot(*order.shift_mm.T) for order in orders]))
     if around is None:
-        region = find_region(lens, path, tilt, iris_radius, view_radius, within)
+        region = find_region(lens, path, tilt, iris_radius, view_radius, within, quick)
     else:
         region = measure_region(lens, path, tilt, iris_radius, view_radius, around)
     if region is None:
@@ -236,11 +241,11 @@ def draw_final(
     bundle = trace_grid(
         shot.packed, path, tilt, (opening.radius, opening.inner), item.region,
         tolerance=quality.tolerance_px, scale=scale, view_radius=item.view_radius, one_color=few and one_color,
-        rough=detail,
+        rough=detail + (SCREEN_ROUGH if quality.screen else 0),
     )  # fmt: skip
     count = len(shot.packed.wavelengths_nm)
     bend = traced_bend(shot, path, bundle, item.to_pixels)
-    if few and _drawn_in_few(item, bundle, bend, canvas.plane(detail), to_pixels):
+    if few and _drawn_in_few(item, bundle, bend, canvas.plane(detail), to_pixels, careful=not quality.screen):
         return
     rings, step_px = None, BRIDGE_PX
     if shot.ringing is not None and visibility >= STEP_CONTRAST:
@@ -290,12 +295,15 @@ def _places(item: FinalPass, to_pixels: Floats, w: int, part: float) -> list[tup
     return places
 
 
-def _drawn_in_few(item: FinalPass, bundle: Bundle, bend: Floats | None, plane: Plane, to_pixels: Floats) -> bool:
+def _drawn_in_few(
+    item: FinalPass, bundle: Bundle, bend: Floats | None, plane: Plane, to_pixels: Floats, *, careful: bool
+) -> bool:
     """Draw a ghost whose steps of colour nobody sees at its grid's wavelengths alone, if these can stand for all."""
     shot, path, opening = item.shot, item.path, item.shot.opening
     shown = tuple(sorted(bundle.traced))
     colors = shot.weights(shot.packed.wavelengths_nm, bend) * item.art.rgb
-    weights = gathered_weights(shot.packed, bundle, shot.incidence.tilt, colors, shown, seen_of(shot, item.to_pixels))
+    seen = seen_of(shot, item.to_pixels)
+    weights = gathered_weights(shot.packed, bundle, shot.incidence.tilt, colors, shown, seen, careful=careful)
     if weights is None:
         return False
     for w, rgb in zip(shown, weights, strict=True):

@@ -33,7 +33,7 @@ __all__ = ["looking"]
 
 
 def looking(
-    shots: Sequence[Shot], paths: Sequence[LightPath], art: Mapping[str, PathArt]
+    shots: Sequence[Shot], paths: Sequence[LightPath], art: Mapping[str, PathArt], quick: bool = False
 ) -> Callable[[LightPath], list[FinalPass]]:
     """Return what looks for the ghost of a path, one of `paths`, by every light.
 
@@ -43,6 +43,8 @@ def looking(
     paths : sequence of LightPath
     art : mapping of str to PathArt
         What is changed by hand, by path name.
+    quick : bool
+        As in `optics.region.find_region`.
 
     Returns
     -------
@@ -61,7 +63,7 @@ def looking(
 
         def at(k: int, around: Floats | None = None) -> FinalPass | None:
             if k not in found:
-                found[k] = find_final(shots[k], path, changed, inside[k], around)
+                found[k] = find_final(shots[k], path, changed, inside[k], around, quick)
             return found[k]
 
         for row in [] if changed.framed else rows:

@@ -84,7 +84,9 @@ def spread_rays(
     along, across = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     share = np.repeat(np.abs(along[:, 0] * across[:, 1] - along[:, 1] * across[:, 0]), 3)
     for w in waves:
-        share *= passes(bundle.traced[w][nodes])
+        rays = bundle.traced[w]
+        # a node belongs to some six triangles: it is asked once where that is less to ask
+        share *= passes(rays)[nodes] if len(rays) < nodes.size else passes(rays[nodes])
     reached = np.cumsum(share)
     if reached.size == 0 or not reached[-1] > 0.0:
         return np.empty(0, dtype=np.intp)
@@ -107,10 +109,12 @@ def seen_of(shot: Shot, to_pixels: Floats) -> Callable[[Floats], Bools]:
         From rays as in `optics.bundle.trace_points`, shape (N, 5 + 2 C), to a mask of shape (N,).
     """
     width, height = shot.size_px
+    # the upright picture is the meridional frame's, turned and upside down
+    turned = (-shot.incidence.axes * [to_pixels[2], -to_pixels[3]]).T
 
     def seen(rays: Floats) -> Bools:
-        upright = -rays[:, [X, Y]] @ shot.incidence.axes
-        column, row = to_pixels[0] + to_pixels[2] * upright[:, 0], to_pixels[1] - to_pixels[3] * upright[:, 1]
+        x, y = rays[:, X], rays[:, Y]
+        column, row = (to_pixels[k] + turned[k, 0] * x + turned[k, 1] * y for k in (0, 1))
         lands = (column >= 0.0) & (column < width) & (row >= 0.0) & (row < height)
         return np.asarray(_passes(rays, shot.opening.radius) & lands)
 
@@ -118,7 +122,7 @@ def seen_of(shot: Shot, to_pixels: Floats) -> Callable[[Floats], Bools]:
 
 
 def _passes(rays: Floats, iris_radius: float) -> Bools:
-    within = (np.hypot(rays[:, STOP_X::2], rays[:, STOP_X + 1 :: 2]) <= iris_radius).all(axis=1)
+    within = (rays[:, STOP_X::2] ** 2 + rays[:, STOP_X + 1 :: 2] ** 2 <= iris_radius**2).all(axis=1)
     return np.asarray((rays[:, ALIVE] > 0.0) & (rays[:, REL] <= 1.0) & within)
 
 

@@ -27,7 +27,11 @@ function take(state) {
   app.light = Math.min(app.light, state.lights.length - 1);
   const shot = (s) => JSON.stringify([s.lights, s.lens, s.camera, s.iris, s.dirt, s.coating, s.pass_gain, s.by_hand, s.view.grey, s.view.unclipped]);
   const moved = !old || shot(old) !== shot(state);
-  if (moved) { app.view.outline = null; drawSection(); }
+  if (moved) {
+    app.view.outline = null;
+    // where a hand waits for its picture, that comes first
+    if (app.view.released) app.view.afterwards = drawSection; else drawSection();
+  }
   if (moved || JSON.stringify(old?.design) !== JSON.stringify(state.design)) { app.places(); app.view.refreshTarget(); }
   update();
   if (state.picture.number !== app.view.shownNumber) app.view.refresh(Boolean(old));
@@ -237,7 +241,7 @@ function working(words, part) {
   what.textContent = meter.hidden ? '' : words;
   bar.style.width = `${100 * part}%`;
 }
-const GRADES = { moving: 'moving', draft: 'draft, by matrices', soon: 'traced rays, three colours', final: 'final, by traced rays', working: 'working view, by matrices' };
+const GRADES = { moving: 'moving', draft: 'draft, by matrices', soon: 'by traced rays, getting sharper', final: 'final, by traced rays', working: 'working view, by matrices' };
 function status() {
   const { picture, frame, camera } = app.state;
   grade.textContent = `${GRADES[picture.grade] ?? ''}${picture.seconds ? ` · ${Math.round(picture.seconds * 1000)} ms` : ''}`;

@@ -208,6 +208,7 @@ export function viewport(canvas, app) {
     self.show(bitmap, fade);
     self.shownGrade = grade;
     self.shownNumber = app.state.picture.number;
+    if (['soon', 'final', 'working'].includes(grade)) { self.afterwards?.(); self.afterwards = null; }
     if (grade === 'soon' && self.released) self.stats.soon = performance.now() - self.released;
     if (grade === 'final' && self.released) { self.stats.final = performance.now() - self.released; self.released = 0; }
   });
@@ -263,7 +264,8 @@ export function viewport(canvas, app) {
     const place = now ?? app.state.lights[light].field_deg;
     app.state.lights[light].field_deg = place.map((deg) => Number(deg.toFixed(4)));
     self.drag = null;
-    await self.settle('move_light', { light, x: place[0], y: place[1] }, group);
+    // as the hand's last picture had it
+    await self.settle('move_light', { light, x: Number(place[0].toFixed(4)), y: Number(place[1].toFixed(4)) }, group);
   }
 
   // ---------------------------------------------------------------------------------------------------- annotating
