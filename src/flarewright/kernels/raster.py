@@ -287,7 +287,7 @@ def fill_polygon(polygon, count, density, gx, gy, density_low, density_high, rgb
             right = following
         level = min(left_end, right_end)
         y_next = min(row + 1.0, level)
-        rows = count - count + 1
+        rows = np.int64(1)
         if y_next > y and row <= last_row:
             xl, xr = polygon[left, PX], polygon[right, PX]
             yl, yr = polygon[left, PY], polygon[right, PY]
