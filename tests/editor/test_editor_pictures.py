@@ -11,7 +11,7 @@ from flarewright.editor.drawings import section
 from flarewright.editor.edit_shot import move_light
 from flarewright.editor.files import project_for_lens
 from flarewright.editor.hand import Hand
-from flarewright.editor.screen import Screen, packed
+from flarewright.editor.screen import Screen, packed, shown_pixels
 from flarewright.editor.seen import Seen, SeenGhost, alone, is_there, outline, see, under
 from flarewright.editor.session import begin
 from flarewright.editor.shown import FALSE_COLOURS, jpeg, pixels_of, plate_for
@@ -346,3 +346,33 @@ def test_every_ghost_of_the_picture_has_rays_in_the_cross_section():
     # a round iris has no corners
     assert section(project.replace(iris=Iris(blades=0)), "18-10").told
     assert section(project, "8-6-7-2").told
+
+
+def test_grey_is_seen_at_the_exposure_of_the_lens():
+    """Films may leave a ten thousandth of what grey surfaces reflect: it was white all over."""
+    session, _ = begin("flektogon-35")
+    screen = Screen(session)
+    screen.start()
+    assert screen.wait(60.0)
+    plain, stops = screen.picture, screen.exposure_stops
+    session.set_view({"grey": True})
+    assert screen.wait(60.0)
+    assert screen.picture.grey
+    assert screen.exposure_stops == stops
+    grey = shown_pixels(screen)
+    assert 20.0 < grey.mean() < 170.0
+    assert (grey == 255).mean() < 0.2
+    # while the light moves it is held
+    before = screen.match.grey
+    session.do("move_light", {"light": 0, "x": 3.0, "y": 2.0})
+    assert screen.wait(60.0)
+    assert screen.match.grey == before
+    # another lens chosen in grey gets the exposure of its own picture
+    session.do("choose_lens", {"lens": "tessar-brendel"})
+    assert screen.wait(60.0)
+    chosen = screen.exposure_stops
+    session.set_view({"grey": False})
+    assert screen.wait(60.0)
+    assert screen.exposure_stops == chosen
+    assert 10.0 < shown_pixels(screen).mean() < 170.0
+    assert plain.project.lens == "flektogon-35"

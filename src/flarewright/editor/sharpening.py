@@ -51,9 +51,14 @@ def sharpen(screen: Screen, project: Project, view: View, check: Check) -> None:
         draft = studio.take(project, "draft", view, levels=() if changed else screen.match.levels)
         check()
         if fresh:
-            screen.match = Match(exposure_stops=studio.exposure_of(draft))
+            # a grey picture tells nothing of the exposure
+            plain = studio.take(project, "draft", View()) if draft.grey else draft
+            screen.match = Match(exposure_stops=studio.exposure_of(plain))
         elif changed:
             screen.match = replace(screen.match, levels=())
+        if draft.grey and (fresh or shown is None or not shown.grey):
+            stops = studio.exposure_of(draft, Match()) - screen.match.exposure_stops
+            screen.match = replace(screen.match, grey=2.0**stops)
         screen.show(draft)
     if not working:
         if screen.final_s > LATE_S:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import threading
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 from ..design.candidate import outcomes
@@ -29,6 +31,8 @@ from .view import View
 CANDIDATES = 5
 LOOK_EVERY_S = 1.0
 THUMB_SCALE = 0.4
+
+GETTING_READY = "Getting ready; the first search of a machine takes a minute more"
 
 
 @dataclass(frozen=True)
@@ -72,6 +76,8 @@ class Solver:
         self.session = session
         self.progress = Progress()
         self._stop = threading.Event()
+        # set once a search can be ended at any time: compiling, at the first one of a machine, cannot
+        self._ready = threading.Event()
         self._thread: threading.Thread | None = None
 
     def start(self, seconds: float, exposure_stops: float) -> None:
@@ -79,7 +85,7 @@ class Solver:
         self.stop()
         project = self.session.project
         problem, settled = problem_of(project)
-        self._begin(lambda: self._search(project, problem, settled.lens.name, seconds, exposure_stops))
+        self._begin(partial(self._search, project, problem, settled.lens.name, seconds, exposure_stops))
 
     def start_colors(self, kind: str, exposure_stops: float) -> None:
         """Begin to search coatings for the wished colours."""
@@ -88,7 +94,8 @@ class Solver:
         films: Any = "film" if kind == "film" else "quarter-wave"
         problem, lens = color_problem(project, films)
 
-        def work() -> None:
+        def work(_: threading.Event, ready: threading.Event) -> None:
+            ready.set()
             found = solve_colors(problem)
             new = coated(lens, problem.structure, films, found.values)
             words = "Coatings for the wished colours"
@@ -99,8 +106,13 @@ class Solver:
     def stop(self) -> None:
         """End the search and keep the best."""
         self._stop.set()
-        if self._thread is not None:
+        if self._thread is None or not self._thread.is_alive():
+            return
+        if self._ready.is_set():
             self._thread.join(30.0)
+        else:
+            # it ends by itself when it is ready, and nobody waits for that
+            self._tell(False, "Stopped before the search began", 0.0, self.progress.found)
 
     def accept(self, number: int) -> None:
         """Take a lens that was found; the wishes are fulfilled and go."""
@@ -112,22 +124,29 @@ class Solver:
             project.replace(lens=found[number].lens, coating=AsLens(), f_number=None, zoom=None), "Accept a found lens"
         )
 
-    def _begin(self, work: Any) -> None:
-        self._stop = threading.Event()
-        self._tell(True, "Getting ready", 0.0, ())
+    def _begin(self, work: Callable[[threading.Event, threading.Event], None]) -> None:
+        stop, ready = self._stop, self._ready = threading.Event(), threading.Event()
+        self._tell(True, GETTING_READY, 0.0, ())
 
         def run() -> None:
             try:
-                work()
+                work(stop, ready)
             except FlarewrightError as error:
-                self._tell(False, str(error), 0.0, self.progress.found)
+                if ready.is_set() or not stop.is_set():
+                    self._tell(False, str(error), 0.0, self.progress.found)
 
         self._thread = threading.Thread(target=run, name="solver", daemon=True)
         self._thread.start()
 
-    def _search(self, project: Project, problem: Problem, name: str, seconds: float, exposure_stops: float) -> None:
+    def _search(
+        self, project: Project, problem: Problem, name: str, seconds: float, exposure_stops: float,
+        stop: threading.Event, ready: threading.Event,
+    ) -> None:  # fmt: skip
         compile_kernels(problem.objective.picture is not None)
-        looked, stop = 0.0, self._stop
+        if stop.is_set():
+            return
+        ready.set()
+        looked = 0.0
 
         def look(state: State) -> None:
             nonlocal looked

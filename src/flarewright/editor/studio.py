@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from math import log
 from typing import Literal
@@ -51,6 +51,8 @@ class Picture:
     seconds : float
         It took.
     remarks : tuple of str
+    grey : bool
+        Every ghost reflects alike, so that its brightness is none of the lens'.
     """
 
     project: Project
@@ -59,6 +61,7 @@ class Picture:
     rest: Floats
     seconds: float
     remarks: tuple[str, ...] = ()
+    grey: bool = False
 
     @property
     def ghost_light(self) -> NDArray[np.float64]:
@@ -150,7 +153,8 @@ def take(
     if look.grey or look.unclipped:
         layer = working_ghosts(stage, grey=look.grey, unclipped=look.unclipped)
         light = spread([layer], size)
-        return Picture(project, "working", light, np.zeros_like(light), time.perf_counter() - begun)
+        seconds = time.perf_counter() - begun
+        return Picture(project, "working", light, np.zeros_like(light), seconds, grey=look.grey)
     rendering = render(stage.replace(art=_levelled(stage.art, levels)), progress=progress)
     parts = [layer for layer in rendering.layers if layer.name != "beauty"]
     ghosts = spread([layer for layer in parts if layer.name.startswith("ghosts")], size)
@@ -188,10 +192,13 @@ class Match:
         Of a draft's ghosts, R, G, B.
     exposure_stops : float
         Found for the lens, and held while the light moves or the lens is edited.
+    grey : float
+        Of a grey picture, whose brightness means nothing, so that it is seen at this exposure.
     """
 
     gain: tuple[float, float, float] = (1.0, 1.0, 1.0)
     exposure_stops: float = 0.0
+    grey: float = 1.0
     levels: Levels = ()
 
 
@@ -215,7 +222,7 @@ def matched(draft: Picture | None, final: Picture, held: Match) -> Match:
     if min(ours.min(), theirs.min()) <= 0.0:
         return held
     red, green, blue = (float(gain) for gain in np.clip(theirs / ours, 0.02, 4.0))
-    return Match((red, green, blue), held.exposure_stops, held.levels)
+    return replace(held, gain=(red, green, blue))
 
 
 def levels_of(drafted: Mapping[str, float], final: Mapping[str, float]) -> Levels:
@@ -260,6 +267,8 @@ def light_of(picture: Picture, match: Match) -> Floats:
 
 def ghosts_of(picture: Picture, match: Match) -> Floats:
     """Return the ghosts alone, matched as in `light_of`."""
+    if picture.grey:
+        return np.asarray(picture.ghosts * np.float32(match.grey))
     if picture.grade not in ("moving", "draft"):
         return picture.ghosts
     return np.asarray(picture.ghosts * np.array(match.gain, dtype=np.float32))
