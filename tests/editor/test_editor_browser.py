@@ -338,6 +338,32 @@ def test_annotate_solve_accept(tab, tmp_path):
     assert tab.state()["design"]["wishes"][0]["ghost"] == "8-6"
 
 
+def test_a_ghost_beside_the_light_can_be_pulled_too(tab):
+    """Whichever is nearer is taken: the light's handle lay over the ghosts around it."""
+    tab.js("flarewright.deed('move_light', {light: 0, x: 0.5, y: 0.25})")
+    tab.rest()
+    tab.tab("target")
+    tab.until("flarewright.view.places.length > 0")
+    lx, ly = tab.light()
+    box = tab.page.locator("#view").bounding_box()
+
+    def at(one):
+        x, y = tab.js(f"flarewright.view.toPage(...flarewright.view.line({one['place']}))")
+        return box["x"] + x, box["y"] + y
+
+    places = [(one, at(one)) for one in tab.js("flarewright.view.places")]
+    one, start = next((one, (x, y)) for one, (x, y) in places if 7.0 < np.hypot(x - lx, y - ly) < 15.0)
+    tab.js(f"flarewright.choose({json.dumps(one['name'])})")
+    tab.drag(start, (start[0] + 30, start[1] - 15))
+    tab.until("flarewright.state.design?.wishes.length === 1")
+    assert tab.state()["design"]["wishes"][0]["ghost"] == one["name"]
+    assert tab.state()["lights"][0]["field_deg"] == [0.5, 0.25]
+    # and the light itself is taken where it is
+    tab.drag((lx, ly), (lx - 40, ly + 10))
+    tab.rest()
+    assert tab.state()["lights"][0]["field_deg"][0] < 0.0
+
+
 def test_the_library_and_the_keys(tab):
     tab.tab("library")
     tab.until("document.querySelectorAll('.library button').length > 10")

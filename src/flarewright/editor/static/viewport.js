@@ -293,8 +293,8 @@ export function viewport(canvas, app) {
       const [x, y] = toPage(...line(one.place), f);
       const away = Math.hypot(px - x, py - y);
       const rim = Math.max(3, Math.abs(one.radius) * f.mm);
-      if (Math.abs(away - rim) < 7 && rim > 9) return { kind: 'rim', one };
-      if (away < Math.max(rim, 9)) return { kind: 'ghost', one, start: along(px, py) - one.place };
+      if (Math.abs(away - rim) < 7 && rim > 9) return { kind: 'rim', one, away: Math.abs(away - rim) };
+      if (away < Math.max(rim, 9)) return { kind: 'ghost', one, away, start: along(px, py) - one.place };
     }
     return null;
   }
@@ -343,6 +343,12 @@ export function viewport(canvas, app) {
   };
 
   // ---------------------------------------------------------------------------------------------------------- hands
+  // The light's handle or the chosen ghost, whichever is nearer: ghosts may lie next to the light.
+  function under(px, py) {
+    const near = app.state.lights.map((_, k) => [k, ...handle(k)]).find(([, x, y]) => Math.hypot(px - x, py - y) < NEAR_PX);
+    const taken = grab(px, py);
+    return near && !(taken && taken.away < Math.hypot(px - near[1], py - near[2])) ? { near, taken: null } : { near: null, taken };
+  }
   const local = (event) => { const rect = canvas.getBoundingClientRect(); return [event.clientX - rect.left, event.clientY - rect.top]; };
   canvas.addEventListener('pointerdown', (event) => {
     if (!app.state) return;
@@ -353,8 +359,7 @@ export function viewport(canvas, app) {
     if (event.button === 1 || (event.button === 0 && (event.altKey || self.space))) { self.drag = { kind: 'pan', px, py, x: self.panX, y: self.panY }; return; }
     if (event.button !== 0) return;
     if (self.compare === 'wipe' && Math.abs(px - f.x - f.w * self.wipe) < 7) { self.drag = { kind: 'wipe' }; return; }
-    const near = app.state.lights.map((_, k) => [k, ...handle(k)]).find(([, x, y]) => Math.hypot(px - x, py - y) < NEAR_PX);
-    const taken = near ? null : grab(px, py);
+    const { near, taken } = under(px, py);
     if (taken) { self.drag = { ...taken, px, py, group: stroke() }; return; }
     const light = near ? near[0] : app.light;
     if (near) app.chooseLight(light);
@@ -394,8 +399,7 @@ export function viewport(canvas, app) {
     redraw();
   }, { passive: false });
   function cursor(px, py) {
-    const near = app.state && app.state.lights.some((_, k) => { const [x, y] = handle(k); return Math.hypot(px - x, py - y) < NEAR_PX; });
-    const taken = !near && app.state ? grab(px, py) : null;
+    const { near, taken } = app.state ? under(px, py) : {};
     canvas.style.cursor = near ? 'grab' : taken ? (taken.kind === 'rim' ? 'nwse-resize' : 'move') : 'crosshair';
   }
   self.fit = (zoom = 1) => { self.zoom = zoom; self.panX = 0; self.panY = 0; redraw(); };
