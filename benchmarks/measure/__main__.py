@@ -1,6 +1,7 @@
 """The proof of the measurement, as a table.
 
     python -m benchmarks.measure LENS ... [--width 720] [--merge real|ideal] [--keep FOLDER] [--json FILE]
+    python -m benchmarks.measure LENS ... --isolated [--width 360]
     python -m benchmarks.measure --speed
 
 A synthetic camera (`tests/measure/synthetic_camera.py`) photographs each lens at the even ones of 100 constellations;
@@ -17,6 +18,7 @@ import time
 from pathlib import Path
 from typing import Any
 
+from benchmarks.measure.isolated import isolated, summary
 from benchmarks.measure.judge import judge
 from benchmarks.measure.shoot import setup_of, shoot
 from benchmarks.measure.speed import replay_speed
@@ -58,6 +60,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.measure", description=__doc__)
     parser.add_argument("lens", nargs="*")
     parser.add_argument("--speed", action="store_true", help="how fast a model replays")
+    parser.add_argument("--isolated", action="store_true", help="ghosts one by one, and Walch's way for comparison")
     parser.add_argument("--width", type=int, default=720)
     parser.add_argument("--count", type=int, default=100, help="constellations, both kinds")
     parser.add_argument("--f-number", type=float, default=5.6)
@@ -68,8 +71,14 @@ def main() -> None:
     rows = [replay_speed()] if given.speed else []
     for row in rows:
         print(json.dumps(row), flush=True)
-    with tempfile.TemporaryDirectory() as made:
+    if given.isolated:
+        alone: list[dict[str, Any]] = []
         for lens in given.lens:
+            alone += isolated(lens, given.width, given.count, given.f_number, lambda text: print(text, flush=True))
+        rows += [*alone, summary(alone)]
+        print(json.dumps(rows[-1]), flush=True)
+    with tempfile.TemporaryDirectory() as made:
+        for lens in () if given.isolated else given.lens:
             folder = (given.keep or Path(made)) / f"{lens}-{given.width}-{given.f_number:g}"
             rows.append(prove(lens, folder, given))
             print(json.dumps(rows[-1], indent=1), flush=True)

@@ -46,11 +46,13 @@ class Tally:
     """What was counted, constellation after constellation, by the class of the true ghost.
 
     `found` are ghosts of a model, fragments merged, that belong to a true ghost of a class; `good` those of them that
-    are it; `strange` belong to none. `apart` and `met_apart` count true ghosts, coinciding paths as one.
+    are it; `strange` belong to none. `apart` and `met_apart` count true ghosts, coinciding paths as one. `near` counts
+    true ghosts whose footprint something found shares, though it may stand for another one: no target goes by it.
     """
 
     true: dict[str, int] = field(default_factory=lambda: dict.fromkeys(CLASSES, 0))
     met: dict[str, int] = field(default_factory=lambda: dict.fromkeys(CLASSES, 0))
+    near: dict[str, int] = field(default_factory=lambda: dict.fromkeys(CLASSES, 0))
     found: dict[str, int] = field(default_factory=lambda: dict.fromkeys(CLASSES, 0))
     good: dict[str, int] = field(default_factory=lambda: dict.fromkeys(CLASSES, 0))
     strange: int = 0
@@ -236,6 +238,7 @@ def _judge_ghosts(
         if seen[t]:
             tally.true[name] += 1
             tally.met[name] += same
+            tally.near[name] += same or bool((overlaps[t] >= SAME).any())
             shared = twins.get(ghost.name, ghost.name)
             one_of[shared] = one_of.get(shared, False) or same
         if same and ghost.snr >= SHARP and merged is not None:
@@ -303,6 +306,8 @@ def summary(tally: Tally) -> dict[str, Any]:
         "precision": good / max(found, 1),
         "true": true, "true, coinciding paths as one": tally.apart, "found": found, "pieces": tally.pieces,
         "found, of no true ghost": tally.strange,
+        "recall, all, one found for several": sum(tally.near.values()) / max(true, 1),
+        "met of true, one found for several": {name: (tally.near[name], tally.true[name]) for name in CLASSES},
         "met of true": {name: (tally.met[name], tally.true[name]) for name in CLASSES},
         "good of found": {name: (tally.good[name], tally.found[name]) for name in CLASSES},
         "centre px, no fold": spread(unfolded),

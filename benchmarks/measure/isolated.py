@@ -1,0 +1,186 @@
+"""Ghosts one by one, without noise and without each other: what the primitive itself is worth, and against Walch's way.
+
+Each path is rendered alone at all constellations; the search and the fit get the even ones, and the odd ones are judged
+against a straight line between the neighbours. The same ghosts, one picture each, are fitted with Walch's primitive by
+Levenberg and Marquardt and in his own way, from the same start.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from benchmarks.measure.shoot import setup_of
+from benchmarks.measure.truth import footprint
+from numpy.typing import NDArray
+from synthetic_camera import Pose, Setup, ghost_layers, poses, project_of, scale_of
+
+from flarewright.kernels.measure_pupil import FIRST_I
+from flarewright.measure.find import rims_of
+from flarewright.measure.fit import Fit, Shape, free_numbers, patches_of, refine, render
+from flarewright.measure.grow import Growth, grow
+from flarewright.measure.numbers import field, frame, with_blades
+from flarewright.measure.pursuit import pursue
+from flarewright.measure.views import View
+from flarewright.measure.walch import circle, descend, draw, fit_bezier, window_of
+from flarewright.model.ghost_model import Blades
+from flarewright.render.prepare import settle as prepared
+
+Floats = NDArray[np.float64]
+
+# ghosts of a lens, by their light
+GHOSTS = 5
+# part of a ghost's median level that passes for noise: fits need some
+NOISE = 1e-2
+# of the constellations that one fit looks at
+VIEWS = 16
+# views that must show a ghost
+_LEAST_VIEWS = 8
+_ROUNDS = 200
+
+
+def pictures_of(setup: Setup) -> tuple[list[Pose], dict[str, list[Floats | None]]]:
+    """Return the poses, and of every path its green at each pose; None where it is dark."""
+    scale = scale_of(setup)
+    every = poses(setup)
+    found: dict[str, list[Floats | None]] = {}
+    for pose in every:
+        for name, image in ghost_layers(setup, pose, scale):
+            lit = image[..., 1].astype(np.float32)
+            found.setdefault(name, [None] * len(every))[pose.number] = lit if lit.any() else None
+    return every, found
+
+
+def view_of(setup: Setup, pose: Pose, green: Floats | None, noise: float) -> View:
+    """Return one picture as the fitter takes it."""
+    width, height = setup.size_px
+    shown = np.zeros((height, width)) if green is None else green
+    placed = frame(setup.axis_px, setup.roll_deg, pose.constellation_deg, 1.0)
+    pixels = np.repeat(shown[..., None], 3, axis=2).astype(np.float32)
+    largest = max(abs(angle) for angle in setup.angles_deg)
+    return View(
+        pose.constellation_deg, abs(field(pose.constellation_deg, largest)), placed, (1e4, 0.0), pixels,
+        np.full_like(pixels, noise**2),
+    )  # fmt: skip
+
+
+def isolated(lens: str, width: int, count: int, f_number: float, tell: Callable[[str], None]) -> list[dict[str, Any]]:
+    """Return what came of each of a lens' brightest ghosts."""
+    setup = setup_of(lens, width, count, f_number).steady
+    every, images = pictures_of(setup)
+    light = {name: sum(float(each.sum()) for each in some if each is not None) for name, some in images.items()}
+    rows: list[dict[str, Any]] = []
+    for name in sorted(light, key=lambda each: -light[each]):
+        some = images[name]
+        if sum(each is not None for each in some[::2]) < _LEAST_VIEWS or len(rows) == GHOSTS:
+            continue
+        levels = [seen[2] for each in some if each is not None and (seen := footprint(each)) is not None]
+        noise = NOISE * float(np.median(levels))
+        views = [view_of(setup, pose, some[pose.number], noise) for pose in every]
+        rows.append({"lens": lens, "path": name, **_alone(views, iris_of_setup(setup)), **_against_walch(views, some)})
+        tell(str(rows[-1]))
+    return rows
+
+
+def iris_of_setup(setup: Setup) -> Blades | None:
+    """Return the iris that the lens has, which a run finds from its star; None: round."""
+    iris = prepared(project_of(setup, poses(setup)[0], "ghosts")).iris
+    # its first edge is up
+    return Blades(count=iris.blades, first_deg=90.0 + iris.rotation_deg) if iris.blades and not iris.rounding else None
+
+
+def _alone(views: list[View], iris: Blades | None) -> dict[str, Any]:
+    """Find and fit one ghost at the even views; return its numbers and its gain over interpolation at the odd ones."""
+    even = views[::2]
+    start = time.process_time()
+    found = pursue(even, [np.ones(view.pixels.shape[:2], bool) for view in even], most=1, iris=iris)
+    if not found:
+        return {"numbers": 0, "gain dB": None, "found": False}
+    rough = max(found, key=lambda one: one.shapes[1].numbers[FIRST_I])
+    there = [k for k, view in enumerate(even) if view.pixels.any()]
+    shown = [even[k] for k in there[:: max(1, len(there) // VIEWS)]]
+    fits = [fit for rim in rims_of(iris) if (fit := _fitted(rough.shapes[1], rim, shown)) is not None]
+    best = min(fits, key=lambda fit: fit.cost)
+    took = time.process_time() - start
+    first, last = 2 * there[0], 2 * there[-1]
+    mine = between = whole = 0.0
+    for k in range(1, len(views) - 1, 2):
+        a, b = views[k - 1], views[k + 1]
+        part = (views[k].constellation_deg - a.constellation_deg) / (b.constellation_deg - a.constellation_deg)
+        line = (1.0 - part) * a.pixels[..., 1] + part * b.pixels[..., 1]
+        true = views[k].pixels[..., 1]
+        drawn = render(best.shape, views[k]) if first - 1 <= k <= last + 1 else np.zeros(true.shape)
+        between += float(((line - true) ** 2).sum())
+        mine += float(((drawn - true) ** 2).sum())
+        whole += float((true**2).sum())
+    return {
+        "numbers": int(best.free.size), "gain dB": 10.0 * float(np.log10(between / max(mine, 1e-300))), "found": True,
+        "error": float(np.sqrt(mine / whole)), "interpolation's": float(np.sqrt(between / whole)), "fit CPU s": took,
+    }  # fmt: skip
+
+
+def _fitted(start: Shape, rim: Blades | None, views: list[View]) -> Fit | None:
+    """Fit a ghost with a kind of rim, as far as 27 numbers go, until noise hides every step."""
+    grown = grow(replace(start, numbers=with_blades(start.numbers, rim)), views, 1, most=Growth(order=2, discs=1))
+    if grown is None:
+        return None
+    patches = patches_of(grown.shape, views, 1)
+    free = free_numbers(2, grown.shape.discs, 1)
+    return refine(grown.shape, patches, free, width=views[0].size_px[0], steps=30, error=0.0) if patches else None
+
+
+def _against_walch(views: list[View], images: list[Floats | None]) -> dict[str, Any]:
+    """Fit the picture in the middle of a ghost's life in both ways; return times and errors."""
+    shown = [k for k, each in enumerate(images) if each is not None]
+    view = views[shown[len(shown) // 2]]
+    green = view.pixels[..., 1].astype(float)
+    seen = footprint(green)
+    if seen is None:
+        return {}
+    (left, top, width, height), _, level = seen
+    # the middle of the outline along the light's line, and its mean size
+    x, y = left + 0.5 * width - view.frame[0], top + 0.5 * height - view.frame[1]
+    centre, radius = x * view.frame[2] - y * view.frame[3], 0.25 * (width + height)
+    start = circle(centre + 0.1 * radius, 1.1 * radius, np.full(3, 0.8 * level), np.full(3, 0.8 * level))
+    window = window_of(start, view.frame, view.size_px, margin=8)
+    x0, y0, w, h = window
+    wanted = green[y0 : y0 + h, x0 : x0 + w]
+    if wanted.size == 0:
+        return {}
+    draw(start, view.frame, window)
+    fit_bezier(start, *_colours(wanted, level), view.frame, window, steps=1)
+    begin = time.process_time()
+    mine, _ = fit_bezier(start, *_colours(wanted, level), view.frame, window)
+    middle = time.process_time()
+    his = descend(start, wanted, view.frame, window, rounds=_ROUNDS)
+    end = time.process_time()
+    errors = [
+        float(np.sqrt(((draw(one.numbers, view.frame, window)[..., 1] - wanted) ** 2).mean())) / level
+        for one in (mine, his)
+    ]
+    return {
+        "walch: times slower": (end - middle) / max(middle - begin, 1e-9),
+        "error, ours over his": errors[0] / errors[1],
+        "error, ours": errors[0], "error, his": errors[1], "pictures": (mine.evaluations, his.evaluations),
+    }  # fmt: skip
+
+
+def _colours(wanted: Floats, level: float) -> tuple[Floats, Floats]:
+    """Return a picture in three colours alike, and weights."""
+    picture = np.repeat(wanted[..., None], 3, axis=2)
+    return picture, np.full_like(picture, 1.0 / (0.01 * level) ** 2)
+
+
+def summary(rows: list[dict[str, Any]]) -> dict[str, Any]:
+    """Return the table's rows of many ghosts."""
+    good = [row for row in rows if row["gain dB"] is not None and row["gain dB"] >= 10.0 and row["numbers"] <= 27]
+    told = [row for row in rows if "error, his" in row]
+    return {
+        "isolated ghosts": len(rows), "of at most 27 numbers, 10 dB and more": len(good),
+        "gain dB": [None if row["gain dB"] is None else round(row["gain dB"], 1) for row in rows],
+        "walch, median times slower": float(np.median([row["walch: times slower"] for row in told])) if told else None,
+        "error over his, median": float(np.median([row["error, ours over his"] for row in told])) if told else None,
+    }  # fmt: skip
