@@ -265,7 +265,7 @@ def fill_polygon(polygon, count, density, gx, gy, density_low, density_high, rgb
     way = 1 if twice_area > 0.0 else count - 1
     left, right = top, top
     y, end = polygon[top, PY], polygon[bottom, PY]
-    row = int(y)
+    row = np.int64(y)
     flat = plane.reshape(plane.size)
     last_row = plane.shape[0] - 1
     left_slope, right_slope = 0.0, 0.0
