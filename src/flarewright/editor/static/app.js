@@ -242,9 +242,10 @@ function working(words, part) {
   bar.style.width = `${100 * part}%`;
 }
 const GRADES = { moving: 'moving', draft: 'draft, by matrices', soon: 'by traced rays, getting sharper', final: 'final, by traced rays', working: 'working view, by matrices' };
+const FIRST = 'drawing the first picture; the very first on a machine takes some ten seconds';
 function status() {
   const { picture, frame, camera } = app.state;
-  grade.textContent = `${GRADES[picture.grade] ?? ''}${picture.seconds ? ` · ${Math.round(picture.seconds * 1000)} ms` : ''}`;
+  grade.textContent = `${GRADES[picture.grade] ?? FIRST}${picture.seconds ? ` · ${Math.round(picture.seconds * 1000)} ms` : ''}`;
   size.textContent = `${camera.size_px.join(' × ')} px · ${frame.sensor.map((mm) => Number(mm.toFixed(2))).join(' × ')} mm`;
   remark.textContent = app.state.remarks.join(' · ');
   remark.title = app.state.remarks.join('\n');
