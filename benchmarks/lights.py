@@ -44,7 +44,7 @@ def _frame(mode: str, lights: tuple[Light, ...], *, starburst: bool = True, lens
         f_number=8.0,
         lights=lights,
         camera=Camera(size_px=SIZE_PX),
-        quality=Quality(mode=mode, wavelengths=3 if mode == "draft" else 7),
+        quality=Quality(mode=mode, wavelengths=3 if mode == "draft" else 7, ringing="off"),
         output=Output(layers="passes", starburst=starburst),
     )
 

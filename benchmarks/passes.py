@@ -53,6 +53,7 @@ def plain() -> Project:
         coating=Everywhere(coating=Bare()),
         lights=(Light(field_deg=PLACE),),
         camera=Camera(size_px=(480, 270)),
+        quality=Quality(ringing="off"),
         output=Output(layers="passes", starburst=False),
     )
 
@@ -83,7 +84,7 @@ def variants() -> dict[str, Project]:
         "four reflections": base.replace(quality=quality.replace(orders=4)),
         "a tint for each ghost": base.replace(art=Art(rules=(Rule(select="all", tint=(1.0, 0.5, 0.2)),))),
         "a layer for each ghost": base.replace(output=base.output.replace(layers="ghosts")),
-        "draft": base.replace(quality=Quality(mode="draft", wavelengths=3)),
+        "draft": base.replace(quality=quality.replace(mode="draft", wavelengths=3)),
         "reference, 16,384 points": base.replace(
             quality=Quality(mode="reference", reference_samples=POINTS, reference_error=1e-6)
         ),

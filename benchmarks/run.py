@@ -206,42 +206,46 @@ def _draw(corners, rgb, plane):
 # --- frames
 
 
-def canon_frame(f_number: float, iris: Iris, *, bridge: bool, size: tuple[int, int] = (1280, 720)) -> Project:
-    """The workload "Canon": 171 ghosts, 3 wavelengths, no starburst."""
+def canon_frame(
+    f_number: float, iris: Iris, *, bridge: bool, size: tuple[int, int] = (1280, 720), ringing: str = "off"
+) -> Project:
+    """The workload "Canon": 171 ghosts, 3 wavelengths, no starburst, no rings unless asked for."""
     return Project(
         lens="canon-28-80",
         f_number=f_number,
         iris=iris,
         lights=(Light(field_deg=LIGHT),),
         camera=Camera(size_px=size),
-        quality=Quality(wavelengths=3, paths="same-side", bridge=bridge),
+        quality=Quality(wavelengths=3, paths="same-side", bridge=bridge, ringing=ringing),
         output=Output(layers="passes", starburst=False),
     )
 
 
-def heliar_frame(mode: str, *, starburst: bool) -> Project:
+def heliar_frame(mode: str, *, starburst: bool, ringing: str = "off") -> Project:
     return Project(
         lens="heliar-tronnier",
         f_number=8.0,
         lights=(Light(field_deg=LIGHT),),
-        quality=Quality(mode=mode, wavelengths=3 if mode == "draft" else 7),
+        quality=Quality(mode=mode, wavelengths=3 if mode == "draft" else 7, ringing=ringing),
         output=Output(layers="passes", starburst=starburst),
     )
 
 
 def frame(repeat: int) -> Rows:
-    """Whole renders, lens loading included, as the command line and the library do them."""
+    """Whole renders, lens loading included, as the command line and the library do them; rings where a row says so."""
     found = []
     for label, f_number, iris in (("f/8, six blades", 8.0, Iris(blades=6)), ("wide open", 2.8, Iris())):
-        for bridge in (False, True):
-            project = canon_frame(f_number, iris, bridge=bridge)
+        for bridge, ringing in ((False, "off"), (True, "off"), (True, "collins")):
+            project = canon_frame(f_number, iris, bridge=bridge, ringing=ringing)
             seconds = median_seconds(lambda project=project: render(project), repeat)  # type: ignore[misc]
             name = f"Canon 1280x720, {label}, bridge {'on' if bridge else 'off'}"
+            name += "" if ringing == "off" else ", rings"
             found.append(row("frame", name, 1e3 * seconds, "ms"))
     for name, project in (
         ("Heliar draft 1280x720, ghosts", heliar_frame("draft", starburst=False)),
         ("Heliar draft 1280x720, with starburst", heliar_frame("draft", starburst=True)),
         ("Heliar final 1280x720, with starburst", heliar_frame("final", starburst=True)),
+        ("Heliar final 1280x720, with starburst and rings", heliar_frame("final", starburst=True, ringing="collins")),
     ):
         seconds = median_seconds(lambda project=project: render(project), repeat)  # type: ignore[misc]
         found.append(row("frame", name, 1e3 * seconds, "ms"))

@@ -41,7 +41,7 @@ def scene(lens: str, mode: str) -> Project:
         lens=lens,
         lights=(Light(field_deg=FIELDS[lens]),),
         camera=Camera(size_px=SIZE, sensor_mm=SENSORS[lens]),
-        quality=Quality(mode=mode, wavelengths=3 if mode == "draft" else 5, paths=PATHS[lens]),
+        quality=Quality(mode=mode, wavelengths=3 if mode == "draft" else 5, paths=PATHS[lens], ringing="off"),
         # the starburst is the same in both, once is enough
         output=Output(layers="ghosts", brightest=BRIGHTEST, starburst=mode == "final"),
         **SCENES[lens],

@@ -175,7 +175,9 @@ def project_of(setup: Setup, pose: Pose, layers: str) -> fw.Project:
         lens=setup.lens, f_number=setup.f_number, zoom=setup.zoom,
         lights=(fw.Light(field_deg=pose.field_deg, diameter_deg=setup.light_diameter_deg),),
         camera=fw.Camera(size_px=big, sensor_mm=(big[0] * pixel, big[1] * pixel)),
-        quality=fw.Quality(mode=setup.quality, wavelengths=setup.wavelengths, tolerance_px=setup.tolerance_px),
+        quality=fw.Quality(
+            mode=setup.quality, wavelengths=setup.wavelengths, tolerance_px=setup.tolerance_px, ringing="off"
+        ),
         output=fw.Output(layers=layers, starburst=layers != "ghosts"), **iris, **coating,
     )  # fmt: skip
 

@@ -24,6 +24,7 @@ from flarewright.optics.ringing import (
     fresnel_intensity,
     frft_fresnel_number,
     halved,
+    ripple_height,
     stop_to_sensor,
 )
 from flarewright.optics.spectrum import band_contents
@@ -273,3 +274,17 @@ def test_an_image_resampled_keeps_its_light_and_its_side():
     assert found.sum() * 0.01**2 == pytest.approx((3.0 / 8) * (3.0 / 6), rel=1e-3)
     assert found[at > 1.0][:, at > 1.1].max() == pytest.approx(1.0, abs=0.1)
     assert found[at < 0.5].max() == 0.0
+
+
+@pytest.mark.parametrize("blur", [0.05, 0.1, 0.3, 0.7, 1.0, 1.5, 2.5, 4.0, 7.0, 12.0, 20.0])
+def test_ripples_of_a_knife_edge_are_as_high_as_told_once_they_are_blurred(blur):
+    at = np.arange(-60.0, 60.0, 0.005)
+    sine, cosine = fresnel(at)
+    apart = 0.5 * ((cosine + 0.5) ** 2 + (sine + 0.5) ** 2) - (at > 0.0)
+    count = max(round(blur / 0.005), 1)
+    across = (np.arange(count) + 0.5) / count * 2.0 - 1.0
+    highest = []
+    for weights in (np.ones(count), np.sqrt(1.0 - across**2)):
+        blurred = np.convolve(apart, weights / weights.sum(), "same")
+        highest.append(blurred[np.abs(at) < 25.0].max())
+    assert max(highest) - 1e-3 < ripple_height(blur) < 1.35 * max(highest)

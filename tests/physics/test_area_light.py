@@ -27,7 +27,7 @@ def project(*lights, lens="heliar-tronnier", f_number=8.0, mode="final", step=2.
         f_number=f_number,
         lights=lights,
         camera=Camera(size_px=size, **parts_.pop("camera", {})),
-        quality=Quality(mode=mode, wavelengths=1, bridge=False, source_step_deg=step),
+        quality=Quality(mode=mode, wavelengths=1, bridge=False, ringing="off", source_step_deg=step),
         output=Output(**parts_),
     )
 

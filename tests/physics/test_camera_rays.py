@@ -32,7 +32,7 @@ def project(lamp, lens="heliar-tronnier", camera=None, quality=None, **how):
         f_number=8.0,
         lights=(lamp,),
         camera=Camera(size_px=SIZE, **(camera or {})),
-        quality=Quality(wavelengths=1, bridge=False, **{"source_step_deg": 30.0, **(quality or {})}),
+        quality=Quality(wavelengths=1, bridge=False, ringing="off", **{"source_step_deg": 30.0, **(quality or {})}),
         output=Output(starburst=False),
         **how,
     )

@@ -32,7 +32,7 @@ def project(light=DISC, holdout=None, mode="final", **how):
         f_number=8.0,
         lights=(light,),
         camera=Camera(size_px=SIZE),
-        quality=Quality(mode=mode, wavelengths=1, bridge=False, **how.pop("quality", {})),
+        quality=Quality(mode=mode, wavelengths=1, bridge=False, ringing="off", **how.pop("quality", {})),
         output=Output(**how),
         holdout=holdout,
     )

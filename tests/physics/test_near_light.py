@@ -33,7 +33,7 @@ def project(distance, field=(8.0, 5.0), name="heliar-tronnier", f_number=8.0, li
         iris=Iris(),
         lights=(Light(field_deg=field, distance=distance, spectrum=D_LINE, **(light or {})),),
         camera=Camera(size_px=parts.pop("size", (192, 120)), **parts.pop("camera", {})),
-        quality=Quality(wavelengths=1, bridge=False, **parts.pop("quality", {})),
+        quality=Quality(wavelengths=1, bridge=False, ringing="off", **parts.pop("quality", {})),
         output=Output(**parts),
     )
 

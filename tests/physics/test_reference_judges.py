@@ -40,7 +40,7 @@ def scene(lens, field, f_number=None, *, size=(256, 160), light=None, wavelength
         f_number=f_number,
         lights=(Light(field_deg=field, spectrum=D_LINE) if light is None else light,),
         camera=Camera(size_px=size),
-        quality=Quality(wavelengths=wavelengths, bridge=False),
+        quality=Quality(wavelengths=wavelengths, bridge=False, ringing="off"),
         output=Output(layers="ghosts", starburst=False),
         **parts,
     )

@@ -55,7 +55,7 @@ def lens_flares(project: Project, quality: str, threads: int | None) -> Flares:
     sampled, frame = square_flare(project, statistics_quality(quality), threads=threads)
     size = tuple(max(1, round(side / sampled.pitch_mm)) for side in (frame.width, frame.height))
     camera = final.camera.replace(size_px=size, sensor_mm=(frame.width, frame.height))
-    judged = luminous(project.replace(camera=camera), Quality(wavelengths=JUDGED_NM, bridge=False))
+    judged = luminous(project.replace(camera=camera), Quality(wavelengths=JUDGED_NM, bridge=False, ringing="off"))
     judge = lens_flare(judged, threads=threads)
     return Flares(sampled, frame, quality, judge, lens_flare(final, threads=threads))
 

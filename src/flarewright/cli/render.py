@@ -225,7 +225,8 @@ def render(
     ringing: Annotated[
         str | None,
         typer.Option(
-            help="Rings inside ghosts: off; collins, exact paraxial diffraction; frft, Hullin's estimate.",
+            help="Rings inside ghosts, final quality: collins, exact paraxial diffraction, the default; frft, Hullin's "
+            "estimate; off.",
             rich_help_panel=_WORK,
         ),
     ] = None,
@@ -361,6 +362,8 @@ def render(
         raise
     files, remarks = _write(rendering, output, full_windows, None if no_png else (exposure, view))
     remarks = [*rendering.remarks, *remarks]
+    if ringing == "collins" and settings.quality.mode != "final":
+        remarks.insert(0, f"{settings.quality.mode} quality traces rays alone: --ringing is for final quality")
     if run is not None:
         remarks.append(f"to go on to a smaller --error: --resume {run.state_file}")
     tell(remarks)

@@ -81,7 +81,7 @@ def see(project: Project, grade: Grade, progress: Callable[[float, str], None] |
     art = Art(rules=tuple(rule for rule in project.art.rules if rule.enable is None))
     quality = stage.quality
     if grade == "final":
-        quality = Quality(mode="final", wavelengths=3, paths=quality.paths, tolerance_px=1.0)
+        quality = Quality(mode="final", wavelengths=3, paths=quality.paths, tolerance_px=1.0, ringing="off")
     stage = stage.replace(art=art, quality=quality, output=Output(layers="ghosts", starburst=False))
     rendering = render(stage, progress=progress)
     width, height = stage.camera.size_px

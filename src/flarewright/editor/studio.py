@@ -99,7 +99,7 @@ def staged(project: Project, grade: Grade, scale: float = 1.0) -> Project:
         quality = own.replace(mode="final") if own.mode != "final" else own
         if grade == "soon":
             few = min(quality.wavelengths, SOON_WAVELENGTHS)
-            quality = quality.replace(wavelengths=few, bridge=True, cull=max(quality.cull, SOON_CULL))
+            quality = quality.replace(wavelengths=few, bridge=True, ringing="off", cull=max(quality.cull, SOON_CULL))
             quality = quality.replace(tolerance_px=max(quality.tolerance_px, SOON_TOLERANCE_PX), screen=True)
     else:
         quality = Quality(mode="draft", wavelengths=DRAFT_WAVELENGTHS, paths=own.paths)

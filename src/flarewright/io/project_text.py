@@ -50,7 +50,7 @@ ABOUT = {
     "quality.paths": '"all" or "same-side" of the stop',
     "quality.orders": "4 also draws ghosts of four reflections (final)",
     "quality.order4_limit": "of those, what carries more than this part of the two-reflection light",
-    "quality.ringing": '"off", "collins": diffraction in ghosts, "frft": Hullin\'s estimate of it',
+    "quality.ringing": '"collins": diffraction in ghosts (final), "frft": Hullin\'s estimate of it, "off"',
     "quality.source_step_deg": "an area light wider than this is traced in parts",
     "quality.seed": "begins the random numbers",
     "quality.reference_error": "where reference quality ends: relative standard error of the ghosts",

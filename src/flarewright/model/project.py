@@ -69,7 +69,7 @@ class Quality(Frozen):
         The bundle's grid is refined until interpolation errs by less than this, in pixels.
     ringing : {"off", "collins", "frft"}
         Rings inside ghosts (final quality). collins: Fresnel diffraction at the iris with each ghost's own matrix, per
-        wavelength; frft: one fractional Fourier transform for all (Hullin et al. 2011,
+        wavelength, where it can be seen; frft: one fractional Fourier transform for all (Hullin et al. 2011,
         equation 5); off: sharp edges.
     cull : float
         Paths that carry less than this part of all ghost flux are left out, and said so.
@@ -100,7 +100,7 @@ class Quality(Frozen):
     bridge: bool = True
     paths: Literal["all", "same-side"] = "all"
     tolerance_px: float = Field(0.25, gt=0.0, le=10.0)
-    ringing: Literal["off", "collins", "frft"] = "off"
+    ringing: Literal["off", "collins", "frft"] = "collins"
     cull: float = Field(0.0, ge=0.0, lt=1.0)
     orders: Literal[2, 4] = 2
     order4_limit: float = Field(1e-4, gt=0.0, lt=1.0)

@@ -42,8 +42,11 @@ COLOR_STEP = 0.01
 SPREADS_AN_OCTAVE, PIXELS_AN_OCTAVE, SCALES_AN_OCTAVE = 8, 4, 4
 """How finely the spreads of bands, the sizes of pixels and, of curved blades, s are told apart."""
 
-LEAST_SPREAD, LEAST_PIXEL = 1e-3, 0.1
+LEAST_SPREAD, LEAST_PIXEL = 3e-3, 0.1
 """What is smaller averages nothing that is seen."""
+
+KEPT_AVERAGES, KEPT_BANDS = 384, 96
+"""Tables that are kept, a few hundred kB each: a zoom's ghosts ask for some 300, again and again."""
 
 # the finest fringes of the wave that are left turn in two of its samples and a quarter
 _WAVE_SAMPLES = 8
@@ -293,7 +296,7 @@ def averaged(form: BladeForm, scale: float, spread: float, pixel: float = 0.0) -
     return _averaged(corner_of(form, scale), 2.0 ** (width / SPREADS_AN_OCTAVE), 2.0 ** (side / PIXELS_AN_OCTAVE))
 
 
-@lru_cache(maxsize=128)
+@lru_cache(maxsize=KEPT_AVERAGES)
 def _averaged(corner: Corner, spread: float, pixel: float) -> EdgeTables:
     """Average a band over a pixel."""
     band = _band(corner, spread, 0.5 * math.ceil(2.0 * (REACH + 0.5 + 0.5 * pixel)))
@@ -302,7 +305,7 @@ def _averaged(corner: Corner, spread: float, pixel: float) -> EdgeTables:
     return replace(band, profile=profile, corner=_boxed_corner(band.corner, pixel * CORNER_SAMPLES))
 
 
-@lru_cache(maxsize=32)
+@lru_cache(maxsize=KEPT_BANDS)
 def _band(corner: Corner, spread: float, margin: float) -> EdgeTables:
     """Average a band whose light rises and falls evenly over ln s."""
     base = edge_tables(corner, margin)
@@ -372,9 +375,10 @@ def _boxed(values: NDArray[Any], axis: int, width: float) -> Floats:
         return np.asarray(values, dtype=np.float64)
     ends = [(0, 0)] * values.ndim
     ends[axis] = (side + 1, side)
-    sums = np.cumsum(np.pad(np.asarray(values, dtype=np.float64), ends, mode="edge"), axis=axis)
-    after, before = (np.take(sums, np.arange(values.shape[axis]) + k, axis=axis) for k in (2 * side + 1, 0))
-    return np.asarray((after - before) / (2 * side + 1))
+    count, width = values.shape[axis], 2 * side + 1
+    sums = np.moveaxis(np.cumsum(np.pad(values, ends, mode="edge"), axis=axis, dtype=np.float64), axis, 0)
+    means: Floats = (sums[width : width + count] - sums[:count]) / width
+    return np.moveaxis(means, 0, axis)
 
 
 def _excess(corner: Corner, tables: EdgeTables) -> tuple[float, float, float]:

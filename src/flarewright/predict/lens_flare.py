@@ -32,7 +32,9 @@ def statistics_quality(mode: str) -> Quality:
     ----------
     mode : {"draft", "final"}
     """
-    return Quality.model_validate({"mode": mode, "wavelengths": 5, "bridge": False, "tolerance_px": 2.0})
+    return Quality.model_validate(
+        {"mode": mode, "wavelengths": 5, "bridge": False, "tolerance_px": 2.0, "ringing": "off"}
+    )
 
 
 def luminous(project: Project, quality: Quality) -> Project:

@@ -40,7 +40,12 @@ def compile_for_render(project: Project, threads: int | None = None) -> None:
         names += ["draw" if iris.mask is None else "draw masked", "densities", "pixels", "double"]
         if coated and not scattering:
             names += ["hits"]
-        if project.quality.ringing != "off":
+        # wide open, and with lights that have a size, rings are rarely seen: then it is compiled when it is called
+        if (
+            project.quality.ringing != "off"
+            and project.f_number is not None
+            and not all(light.extended for light in project.lights)
+        ):
             names += ["draw ringing"]
     elif project.quality.mode == "draft" and iris.mask is None:
         # a draft through a mask is rare: its kernel is compiled when it is called

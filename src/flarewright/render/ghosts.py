@@ -9,6 +9,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import product
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,10 +31,13 @@ from .ghosts_draft import (
     seen_small,
     spread_light,
 )
-from .ghosts_final import SCREEN, FinalPass, contrast, detail_of, draw_alone, draw_final
+from .ghosts_final import SCREEN, STEP_CONTRAST, FinalPass, contrast, detail_of, draw_alone, draw_final
 from .looking import looking
 from .shot import Shot
 from .sources import halvings, motion, spread_border
+
+if TYPE_CHECKING:
+    from .surroundings import Surroundings
 
 Progress = Callable[[float, str], None]
 
@@ -198,11 +202,14 @@ def _final(
     named = [found[k][0].path for k in order]
     called = {k: path.name for k, path in zip(order, named, strict=True)}
     found, faint, faint_share = _without_faint(found, alone)
+    around = _around([item for k in order for item in found[k]], level, pool)
 
     def draw(group: list[int]) -> list[Plane | None]:
         canvas = blank(shots[0].size_px)
         # blurring is linear, so ghosts of one blur or one spread are blurred together
         alike: dict[object, list[FinalPass]] = {}
+        # rings of a layer of its own are looked at by themselves
+        seen_in = around if alone.isdisjoint(group) else None
         for k in group:
             if meter.cancelled.is_set():
                 break
@@ -210,23 +217,23 @@ def _final(
                 if item.source is not None and k not in alone:
                     continue
                 if item.region.seen_flux > 0.0 and item.art.ramps:
-                    draw_alone([item], quality, canvas, meter.cancelled)
+                    draw_alone([item], quality, canvas, meter.cancelled, seen_in)
                 elif item.region.seen_flux > 0.0 and item.alone:
                     alike.setdefault(item.alone, []).append(item)
                 elif item.region.seen_flux > 0.0:
                     # a layer of its own may be graded up, so it is drawn in full
                     visibility = float("inf") if k in alone else contrast(item, seen_level)
-                    draw_final(item, quality, canvas, visibility, meter.cancelled)
+                    draw_final(item, quality, canvas, visibility, meter.cancelled, seen_in)
             meter.step(f"ghost {called[k]}")
         for together in alike.values():
-            draw_alone(together, quality, canvas, meter.cancelled)
+            draw_alone(together, quality, canvas, meter.cancelled, seen_in)
         return canvas.planes
 
     def draw_spread(groups: list[list[FinalPass]]) -> list[Plane | None]:
         canvas = blank(shots[0].size_px)
         for group in groups:
             if not meter.cancelled.is_set():
-                draw_alone(group, quality, canvas, meter.cancelled)
+                draw_alone(group, quality, canvas, meter.cancelled, around)
         return canvas.planes
 
     wide = _alike([item for k in order if k not in alone for item in found[k]], seen_level)
@@ -379,6 +386,17 @@ def _level(found: Sequence[Sequence[FinalPass]], *, plain: bool = False) -> floa
         return 0.0
     seen = sum(item.region.seen_flux * (item.shot.light.intensity if plain else item.gain) for item in items)
     return float(seen / (np.pi * items[0].shot.view_radius ** 2))
+
+
+def _around(items: Sequence[FinalPass], level: float, pool: ThreadPoolExecutor) -> Surroundings | None:
+    """Sketch what rings may be too faint to be seen in; None where there are no rings."""
+    bright = [item for item in items if item.region.seen_flux > 0.0 and contrast(item, level) >= STEP_CONTRAST]
+    if not any(item.shot.ringing is not None for item in bright):
+        return None
+    # only here: what has no rings need not know of them
+    from .surroundings import surroundings
+
+    return surroundings(bright, pool.map)
 
 
 def _alike(items: list[FinalPass], level: float) -> list[list[FinalPass]]:

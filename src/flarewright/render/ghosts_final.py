@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from ..kernels.bundle import draw_bundle, measure_bundle, node_densities
 from ..kernels.trace import ALIVE, REL, STOP_X, X, Y
 from ..model import Quality
-from ..optics.border import points
+from ..optics.border import mapped, points
 from ..optics.bundle import Bundle, trace_bundle, trace_grid
 from ..optics.grating import GratingOrder, grating_orders
 from ..optics.paths import LightPath
@@ -36,6 +36,7 @@ from .spread import shape_kernel, spread_within
 
 if TYPE_CHECKING:
     from .ringing import Rings
+    from .surroundings import Surroundings
 
 Floats = NDArray[np.float64]
 
@@ -216,7 +217,12 @@ def detail_of(visibility: float) -> int:
 
 
 def draw_final(
-    item: FinalPass, quality: Quality, canvas: Canvas, visibility: float = float("inf"), stop: Event | None = None
+    item: FinalPass,
+    quality: Quality,
+    canvas: Canvas,
+    visibility: float = float("inf"),
+    stop: Event | None = None,
+    around: Surroundings | None = None,
 ) -> None:
     """Trace one path of one light and add it to a canvas.
 
@@ -230,6 +236,8 @@ def draw_final(
         Its `contrast`: what cannot be told from its surroundings needs neither sharp edges nor many wavelengths.
     stop : Event, optional
         Set to leave off between two wavelengths.
+    around : Surroundings, optional
+        The light that its rings lie in; None: they are looked at by themselves.
     """
     detail = detail_of(visibility)
     shot, path = item.shot, item.path
@@ -252,6 +260,10 @@ def draw_final(
         pixels_per_mm = (float(to_pixels[2]), float(to_pixels[3]))
         nearness = shot.packed.nearness / shot.incidence.tilt_cosine
         rings = shot.ringing.of(shot.packed, path, shot.light, bundle, pixels_per_mm, nearness)
+        # only here: what has no rings need not know how they are seen
+        from .ripples import ripples_seen
+
+        rings = rings if rings is not None and ripples_seen(item, rings, bundle, around, 2.0**detail) else None
     if rings is not None:
         if _is_soft(bundle, opening.radius):
             step_px = max(BRIDGE_PX, BRIDGE_FRINGES * rings.fringe_px)
@@ -348,7 +360,13 @@ def _with_shadow(item: FinalPass, rings: Rings, quality: Quality, scale: float) 
     )  # fmt: skip
 
 
-def draw_alone(items: Sequence[FinalPass], quality: Quality, canvas: Canvas, stop: Event | None = None) -> None:
+def draw_alone(
+    items: Sequence[FinalPass],
+    quality: Quality,
+    canvas: Canvas,
+    stop: Event | None = None,
+    around: Surroundings | None = None,
+) -> None:
     """Draw ghosts on a plane of their own, spread, ramp and blur it, and add it to a canvas.
 
     Parameters
@@ -360,6 +378,8 @@ def draw_alone(items: Sequence[FinalPass], quality: Quality, canvas: Canvas, sto
         Added to.
     stop : Event, optional
         Set to leave off between two wavelengths.
+    around : Surroundings, optional
+        As in `draw_final`.
     """
     art, shot, frame, source = items[0].art, items[0].shot, items[0].frame, items[0].source
     detail = max(items[0].detail, coarseness(art, shot.to_pixels) if art.blur > 0.0 else 0)
@@ -370,9 +390,11 @@ def draw_alone(items: Sequence[FinalPass], quality: Quality, canvas: Canvas, sto
         mx, my = mx + kernel.shape[1] // 2, my + kernel.shape[0] // 2
     width, height = (-(-side // 2**detail) for side in canvas.size_px)
     sheet = blank((width + 2 * mx, height + 2 * my))
+    beside = None if around is None else around.moved((mx, my), detail)
+    small = None if source is None else mapped(source, 0.5**detail * np.eye(2))
     for item in items:
         shifted = item.to_pixels / 2.0**detail + np.array([mx, my, 0.0, 0.0])
-        draw_final(replace(item, to_pixels=shifted), quality, sheet, stop=stop)
+        draw_final(replace(item, to_pixels=shifted, source=small), quality, sheet, stop=stop, around=beside)
     pixels = merge(sheet.planes, sheet.size_px)
     if kernel is not None:
         pixels = spread_within(pixels, kernel)

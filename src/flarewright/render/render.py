@@ -262,7 +262,7 @@ def _remarks(settled: Settled, shots: tuple[Shot, ...]) -> tuple[str, ...]:
         told.append("draft quality draws the lens as designed, without decentre, tilt and figure errors")
     quality = settled.project.quality
     told += _grating_remarks(settled, shots)
-    if quality.ringing != "off" and quality.mode != "final":
+    if quality.ringing == "frft" and quality.mode != "final":
         told.append(f"{quality.mode} quality traces rays alone: quality.ringing is for final quality")
     return tuple(told)
 

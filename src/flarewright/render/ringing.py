@@ -262,6 +262,8 @@ class Rings:
         One a crossing of the stop; a piece where the edge is sharp.
     fringe_px : float
         The finest sqrt(lambda L / 2) of an edge that is lit, on the sensor in pixels; 0 where one is sharp.
+    widest_px : float
+        The widest of an edge that has rings.
     """
 
     ringing: Ringing
@@ -269,11 +271,17 @@ class Rings:
     wavelengths_nm: Floats
     crossings: tuple[EdgeCrossing | _Crossing | Piece, ...]
     fringe_px: float
+    widest_px: float
 
     @property
     def reach(self) -> float:
         """How far out in the stop light is looked for, mm."""
         return max(item.reach for item in self.crossings if not isinstance(item, Piece))
+
+    def lit_nodes(self, data: Floats) -> NDArray[np.bool_]:
+        """Tell which rays of a traced bundle come to an edge that has rings."""
+        ringed = [c for c, item in enumerate(self.crossings) if not isinstance(item, Piece)]
+        return np.asarray(_near_edge(data, len(self.crossings), self.ringing.opening)[:, ringed].any(axis=1))
 
     def textures(self, drawn_nm: Floats) -> Textures:
         """Prepare for drawing at some wavelengths."""
@@ -384,20 +392,27 @@ def _rings(
         for item, m, shines in zip(found, magnified, lit, strict=True)
         if shines
     ]
-    return Rings(ringing, light, packed.wavelengths_nm, tuple(crossings), min(fringes))
+    widest = max(
+        m * math.sqrt(0.5 * float(np.abs(item.area).max())) for item, m in zip(found, magnified, strict=True) if item
+    )
+    return Rings(ringing, light, packed.wavelengths_nm, tuple(crossings), min(fringes), widest)
 
 
 def _lit(traced: Sequence[Floats], crossings: int, opening: Opening) -> list[bool]:
     """Tell for each crossing whether light that passes everything else comes to the edge of the iris."""
+    lit = np.zeros(crossings, dtype=np.bool_)
+    for data in traced:
+        lit |= _near_edge(data, crossings, opening).any(axis=0)
+    return [bool(shines) for shines in lit]
+
+
+def _near_edge(data: Floats, crossings: int, opening: Opening) -> NDArray[np.bool_]:
+    """Tell which rays pass everything near the edge of the iris, at which crossing: shape (N, C)."""
     # an image may have edges anywhere
     inner = 0.0 if opening.mask is not None else LIT * opening.inner
-    lit = [False] * crossings
-    for data in traced:
-        radius = np.hypot(data[:, STOP_X::2], data[:, STOP_X + 1 :: 2])
-        passing = (data[:, ALIVE] > 0.0) & (data[:, REL] <= 1.0) & (radius <= opening.radius * (1.0 + 1e-9)).all(axis=1)
-        for c in range(crossings):
-            lit[c] = lit[c] or bool((radius[passing, c] >= inner).any())
-    return lit
+    radius = np.hypot(data[:, STOP_X::2], data[:, STOP_X + 1 :: 2])[:, :crossings]
+    passing = (data[:, ALIVE] > 0.0) & (data[:, REL] <= 1.0) & (radius <= opening.radius * (1.0 + 1e-9)).all(axis=1)
+    return np.asarray(passing[:, None] & (radius >= inner), dtype=np.bool_)
 
 
 def _crossing(

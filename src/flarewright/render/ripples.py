@@ -1,0 +1,86 @@
+"""Which rings inside ghosts can be seen: how high their ripples stand out of the light that they lie in."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..kernels.bundle import node_densities
+from ..kernels.trace import ALIVE, X, Y
+from ..optics.border import points
+from ..optics.bundle import Bundle
+from ..optics.ringing import ripple_height
+from .surroundings import Surroundings, unit
+
+if TYPE_CHECKING:
+    from .ghosts_final import FinalPass
+    from .ringing import Rings
+
+Floats = NDArray[np.float64]
+
+LEAST_RIPPLE = 0.01
+"""A ripple less high than this part of the light that it lies in is not seen: Weber's fraction at its best."""
+
+# directions in which the width of a light's spread is measured, over half a turn
+_DIRECTIONS = 16
+
+
+def ripples_seen(
+    item: FinalPass, rings: Rings, bundle: Bundle, around: Surroundings | None, pixel_px: float = 1.0
+) -> bool:
+    """Tell whether any ripple of a ghost's rings can be seen.
+
+    Parameters
+    ----------
+    item : FinalPass
+    rings : Rings
+    bundle : Bundle
+        Traced as far as the iris.
+    around : Surroundings or None
+        None: the ghost is looked at by itself.
+    pixel_px : float
+        Side of the pixels that it is drawn on, in those of `item`.
+
+    Returns
+    -------
+    bool
+    """
+    fringe = rings.widest_px * pixel_px
+    height = ripple_height(pixel_px / fringe)
+    if item.source is not None:
+        height = min(height, ripple_height(narrowest(item.source) / fringe))
+    if height < LEAST_RIPPLE:
+        return False
+    return around is None or height * _largest_part(item, rings, bundle, around) >= LEAST_RIPPLE
+
+
+def narrowest(border: Floats) -> float:
+    """Return a shape's least width over all directions."""
+    turn = np.pi * np.arange(_DIRECTIONS) / _DIRECTIONS
+    along = points(border) @ np.stack([np.cos(turn), np.sin(turn)])
+    return float(np.ptp(along, axis=0).min())
+
+
+def _largest_part(item: FinalPass, rings: Rings, bundle: Bundle, around: Surroundings) -> float:
+    """Compare a ghost's irradiance at its lit edge with all light there, where it is in the picture."""
+    shot, axes = item.shot, item.shot.incidence.axes
+    data = bundle.traced[len(shot.packed.wavelengths_nm) // 2]
+    own = node_densities(data, bundle.pupil, bundle.triangles) * unit(item, bundle, data)
+    lit = rings.lit_nodes(data)
+    near = bundle.triangles[lit[bundle.triangles].any(axis=1) & (data[:, ALIVE] > 0.0)[bundle.triangles].all(axis=1)]
+    (left, top), (right, bottom) = around.corners_px
+    largest = 0.0
+    for mirror in (1.0, -1.0)[: bundle.halves]:
+        x, y = mirror * data[:, X], data[:, Y]
+        # the upright picture is the sensor turned by 180 degrees
+        columns = item.to_pixels[0] - item.to_pixels[2] * (x * axes[0, 0] + y * axes[1, 0])
+        rows = item.to_pixels[1] + item.to_pixels[3] * (x * axes[0, 1] + y * axes[1, 1])
+        c, r = columns[near], rows[near]
+        seen = (c.max(axis=1) >= left) & (c.min(axis=1) <= right) & (r.max(axis=1) >= top) & (r.min(axis=1) <= bottom)
+        if seen.any():
+            bright = own[near[seen]].max(axis=1)
+            there = np.maximum(around.at(c[seen], r[seen]).min(axis=1), bright)
+            largest = max(largest, float((bright / np.maximum(there, 1e-300)).max()))
+    return largest

@@ -1,0 +1,137 @@
+"""Rings are drawn where they can be seen, and only there: by default, and at no cost where there are none."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from flarewright.kernels import ringing as kernel
+from flarewright.model import Camera, Iris, Light, Output, Project, Quality
+from flarewright.optics.border import closed
+from flarewright.optics.paths import ghost_paths
+from flarewright.render import ripples
+from flarewright.render.canvas import blank, merge
+from flarewright.render.ghosts_final import draw_final, find_final
+from flarewright.render.prepare import settle
+from flarewright.render.render import render
+from flarewright.render.ripples import narrowest
+from flarewright.render.shot import make_opening, make_shots
+from flarewright.render.surroundings import COARSE, sketch
+
+LUMINANCE = (0.2126, 0.7152, 0.0722)
+
+
+def project(f_number=8.0, ringing=None, **changes):
+    fields = {
+        "lens": "heliar-tronnier",
+        "f_number": f_number,
+        "iris": Iris(blades=6),
+        "lights": (Light(field_deg=(10.0, 5.0)),),
+        "camera": Camera(size_px=(640, 360)),
+        "output": Output(starburst=False),
+        "quality": Quality(wavelengths=3) if ringing is None else Quality(wavelengths=3, ringing=ringing),
+    }
+    return Project.model_validate({**fields, **changes})
+
+
+def picture(wanted):
+    layer = {layer.name: layer for layer in render(wanted).layers}["ghosts"]
+    width, height = wanted.camera.size_px
+    pixels = np.zeros((height, width))
+    x, y, w, h = layer.window
+    pixels[y : y + h, x : x + w] = layer.pixels @ LUMINANCE
+    return pixels
+
+
+@pytest.fixture
+def drawn(monkeypatch):
+    """Tell for each ghost with rings whether they were found worth drawing."""
+    told = []
+
+    def watched(*known):
+        told.append(real(*known))
+        return told[-1]
+
+    real = ripples.ripples_seen
+    monkeypatch.setattr(ripples, "ripples_seen", watched)
+    return told
+
+
+def test_final_quality_has_rings_by_default(drawn):
+    found, sharp = picture(project()), picture(project(ringing="off"))
+    assert any(drawn)
+    assert np.abs(found - sharp).max() > 0.1 * sharp.mean()
+    assert found.sum() == pytest.approx(sharp.sum(), rel=2e-3)
+
+
+def test_the_first_command_needs_no_kernel_for_rings(monkeypatch):
+    """Wide open the rings of the Heliar lie in the light of other ghosts."""
+
+    def refuse(*_):
+        raise AssertionError("rings were drawn")
+
+    wanted = project(None, lights=(Light(field_deg=(12.0, 7.0)),), camera=Camera())
+    monkeypatch.setattr("flarewright.render.ringing.draw_ringing", refuse)
+    assert kernel.draw_ringing is not refuse
+    assert np.array_equal(picture(wanted), picture(wanted.replace(quality=Quality(wavelengths=3, ringing="off"))))
+
+
+@pytest.mark.parametrize(("f_number", "light"), [(5.6, (4.0, 3.0)), (8.0, (10.0, 5.0)), (None, (12.0, 7.0))])
+def test_what_is_left_out_is_below_what_an_eye_tells_apart(f_number, light, drawn, monkeypatch):
+    wanted = project(f_number, lights=(Light(field_deg=light),))
+    found = picture(wanted)
+    assert not all(drawn)
+    monkeypatch.setattr(ripples, "LEAST_RIPPLE", -1.0)
+    whole = picture(wanted)
+    lit = np.maximum(whole, 0.01 * whole.mean())
+    assert (np.abs(found - whole) / lit).max() < 1.5 * 0.01
+
+
+def test_an_area_light_washes_rings_out(drawn):
+    def ripples_of(size):
+        wanted = project(lights=(Light(field_deg=(10.0, 5.0), diameter_deg=size),))
+        found, sharp = picture(wanted), picture(wanted.replace(quality=Quality(wavelengths=3, ringing="off")))
+        return (np.abs(found - sharp) / np.maximum(sharp, 0.01 * sharp.mean())).max(), found.sum() / sharp.sum()
+
+    (point, whole), (sun, light) = ripples_of(0.0), ripples_of(0.53)
+    assert sun < 0.15 * point
+    assert (whole, light) == pytest.approx((1.0, 1.0), rel=2e-3)
+    drawn.clear()
+    ripples_of(4.0)
+    # some ghosts of an area light are left as they are, whose rings a point would show
+    assert not all(drawn)
+
+
+def test_a_layer_of_its_own_is_looked_at_by_itself(drawn):
+    wide = project(None, lights=(Light(field_deg=(12.0, 7.0)),), output=Output(starburst=False, layers="ghosts"))
+    picture(wide)
+    assert any(drawn)
+
+
+def test_a_sketch_is_the_ghost_seen_coarsely():
+    settled = settle(project())
+    (shot,) = make_shots(settled, make_opening(settled, None))
+    compared = 0
+    for path in ghost_paths(settled.lens, "all"):
+        item = find_final(shot, path)
+        if item is None or item.region.seen_flux < 1e-3 * item.gain * shot.opening.radius**2 * 1e-3:
+            continue
+        canvas = blank(shot.size_px)
+        draw_final(item, Quality(wavelengths=3), canvas)
+        fine = merge(canvas.planes, shot.size_px) @ np.array(LUMINANCE)
+        height, width = (-(-side // COARSE) for side in fine.shape)
+        padded = np.pad(fine, ((0, height * COARSE - fine.shape[0]), (0, width * COARSE - fine.shape[1])))
+        coarse = padded.reshape(height, COARSE, width, COARSE).sum(axis=(1, 3))
+        if coarse.sum() <= 0.0:
+            continue
+        found = sketch(item).astype(np.float64)
+        assert np.abs(found / found.sum() - coarse / coarse.sum()).sum() < 0.25
+        compared += 1
+    assert compared > 10
+
+
+def test_a_shape_is_as_narrow_as_its_least_width():
+    corners = np.array([[-5.0, -1.0], [5.0, -1.0], [5.0, 1.0], [-5.0, 1.0]])
+    turn = np.array([[0.0, -1.0], [1.0, 0.0]])
+    assert narrowest(closed(corners)) == pytest.approx(2.0)
+    assert narrowest(closed(corners @ turn)) == pytest.approx(2.0)
