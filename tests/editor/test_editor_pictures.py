@@ -38,7 +38,9 @@ def seen_and_picture():
 def test_what_is_under_a_place_is_what_has_light_there(seen_and_picture):
     seen, project = seen_and_picture
     # an independent judge: every ghost as its own layer of an ordinary render, at the size of the project
-    judge = render(project.replace(output=Output(layers="ghosts", starburst=False), quality=Quality(wavelengths=3)))
+    judge = render(
+        project.replace(output=Output(layers="ghosts", starburst=False), quality=Quality(wavelengths=3, ringing="off"))
+    )
     width, height = project.camera.size_px
     singles = [layer for layer in judge.layers if layer.name.startswith("ghost.")]
     for u, v in ((0.31, 0.62), (0.5, 0.5), (0.72, 0.2), (0.12, 0.88)):
@@ -66,7 +68,7 @@ def test_what_is_under_a_place_is_what_has_light_there(seen_and_picture):
 
 def test_the_table_agrees_with_the_picture(seen_and_picture):
     seen, project = seen_and_picture
-    whole = render(project.replace(output=Output(starburst=False), quality=Quality(wavelengths=3)))
+    whole = render(project.replace(output=Output(starburst=False), quality=Quality(wavelengths=3, ringing="off")))
     across = project.camera.sensor[0] / project.camera.size_px[0]
     light = next(layer for layer in whole.layers if layer.name == "ghosts").pixels @ luminance_weights("rec709")
     assert sum(ghost.flux for ghost in seen.ghosts) == pytest.approx(float(light.sum()) * across**2, rel=0.01)
@@ -95,7 +97,7 @@ def test_a_ghost_alone_is_where_it_is_listed_and_its_outline_is_its_border(seen_
 def test_a_picture_traced_soon_is_nearly_the_final_one(seen_and_picture):
     """Nine films and three wavelengths: the coatings' curves tell the colours between these."""
     _, project = seen_and_picture
-    project = project.replace(quality=Quality(wavelengths=7))
+    project = project.replace(quality=Quality(wavelengths=7, ringing="off"))
     soon, final = (studio.take(project, grade, View()) for grade in ("soon", "final"))
     assert np.abs(soon.ghosts - final.ghosts).sum() < 0.02 * np.abs(final.ghosts).sum()
     np.testing.assert_array_equal(soon.ghosts.shape, final.ghosts.shape)

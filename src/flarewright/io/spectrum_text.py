@@ -63,7 +63,7 @@ def parse_spectrum(text: str, *, folder: Path | None = None) -> Spectrum:
         reason = {
             "black-body": "a black body has between 500 and 100000 K",
             "lines": "spectral lines lie between 360 and 830 nm and have powers of 0 or more",
-            "rgb": "a colour is three numbers of 0 or more, not all 0",
+            "rgb": "a colour is three numbers of 0 or more, not all 0; write it like rgb:1,0.5,0.1",
         }[word]
         raise ProjectError(f"the spectrum {text!r} is out of range: {reason}") from error
     near = difflib.get_close_matches(word, ["d65", "equal-energy", "black-body", "lines", "rgb"], 1)

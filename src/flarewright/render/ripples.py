@@ -73,11 +73,11 @@ def _largest_part(item: FinalPass, rings: Rings, bundle: Bundle, around: Surroun
     (left, top), (right, bottom) = around.corners_px
     largest = 0.0
     for mirror in (1.0, -1.0)[: bundle.halves]:
-        x, y = mirror * data[:, X], data[:, Y]
+        # what a ray that ended holds may be infinite, so only of those that live is anything computed
+        x, y = mirror * data[near, X], data[near, Y]
         # the upright picture is the sensor turned by 180 degrees
-        columns = item.to_pixels[0] - item.to_pixels[2] * (x * axes[0, 0] + y * axes[1, 0])
-        rows = item.to_pixels[1] + item.to_pixels[3] * (x * axes[0, 1] + y * axes[1, 1])
-        c, r = columns[near], rows[near]
+        c = item.to_pixels[0] - item.to_pixels[2] * (x * axes[0, 0] + y * axes[1, 0])
+        r = item.to_pixels[1] + item.to_pixels[3] * (x * axes[0, 1] + y * axes[1, 1])
         seen = (c.max(axis=1) >= left) & (c.min(axis=1) <= right) & (r.max(axis=1) >= top) & (r.min(axis=1) <= bottom)
         if seen.any():
             bright = own[near[seen]].max(axis=1)
