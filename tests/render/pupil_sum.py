@@ -22,7 +22,8 @@ D_LINE = Lines(lines=((587.56, 1.0),))
 
 
 def scene(lens: str, *lights: Light, f_number: float | None = 8.0, iris: Iris | None = None, **parts) -> Project:
-    """Return a project: parts of camera, quality and output by their own names."""
+    """Return a project of rays alone: parts of camera, quality and output by their own names."""
+    parts = {"ringing": "off", **parts}
 
     def pick(model):
         return model(**{k: v for k, v in parts.items() if k in model.model_fields})
