@@ -247,7 +247,11 @@ def test_a_drawn_image_of_dirt(tmp_path):
 
 def test_dirt_in_ghosts_takes_its_share_and_leaves_the_edges():
     dirt = Dirt(dust_per_mm2=1.0, dust_um=(300.0, 800.0), seed=2, in_ghosts=True)
-    given = {"f_number": 5.6, "iris": Iris(blades=6), "quality": Quality(wavelengths=1, paths="same-side")}
+    given = {
+        "f_number": 5.6,
+        "iris": Iris(blades=6),
+        "quality": Quality(wavelengths=1, paths="same-side", ringing="off"),
+    }
     clean, dirty = picture("ghosts", **given), picture("ghosts", dirt=dirt, **given)
     only_burst = picture("ghosts", dirt=dirt.replace(in_ghosts=False), **given)
     np.testing.assert_array_equal(only_burst, clean)
