@@ -161,7 +161,7 @@ import sys
 from pathlib import Path
 from flarewright.kernels import first_run, helpers
 helpers.cores = lambda: 2
-helpers._TRACING = (("pixels",),)
+helpers.TRACING = (("pixels",),)
 with helpers.head_start():
     (helper,) = helpers.ahead()
     first_run.compile_together(["double", "pixels"], int(sys.argv[1]))

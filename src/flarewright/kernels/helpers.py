@@ -14,7 +14,7 @@ from pathlib import Path
 # a helper that takes longer than this is given up, and the command compiles alone
 PATIENCE_S = 120.0
 # what every command compiles that traces rays, whatever it makes of them; with two cores one helper has it all
-_TRACING = (("mesh", "nodes"), ("prepass",))
+TRACING = (("mesh", "nodes"), ("prepass",))
 # set for helpers, which start none themselves
 _MARK = "FLAREWRIGHT_HELPER"
 # of the process: those that began before the command knew what it needs
@@ -76,7 +76,7 @@ def head_start() -> Iterator[None]:
     """
     shares: Sequence[Sequence[str]] = ()
     if cores() > 1 and not is_helper() and _surely_cold():
-        shares = [sum(_TRACING, ())] if cores() == 2 else _TRACING
+        shares = [sum(TRACING, ())] if cores() == 2 else TRACING
     with helping(shares) as helpers:
         _ahead[:] = helpers
         try:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from ..kernels.first_run import absent, compile_together
-from ..kernels.helpers import cores
+from ..kernels.helpers import TRACING, cores
 from ..model import Bare, Project
 from ..optics.pack import resolve_coatings
 from ..optics.paths import ghost_paths
 from .prepare import settle
 
 # what every command calls that traces rays
-_TRACING = ("mesh", "prepass", "nodes", "measure")
+_TRACING = (*sum(TRACING, ()), "measure")
 # what a render with scatter calls besides; that of a lens file compiles when it is called
 _SCATTERING = ("hits", "scatter", "scatter picture", "scatter share")
 

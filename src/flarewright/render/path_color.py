@@ -22,7 +22,7 @@ RAYS = 12
 # and these are looked for among so many triangles of its grid
 TRIANGLES = 512
 
-__all__ = ["direct_bend", "direct_flux", "draft_weights", "seen_of", "spread_rays", "traced_bend"]
+__all__ = ["direct_bend", "direct_flux", "draft_weights", "places_of", "seen_of", "spread_rays", "traced_bend"]
 
 
 def traced_bend(shot: Shot, path: LightPath, bundle: Bundle, to_pixels: Floats) -> Floats | None:
@@ -109,16 +109,33 @@ def seen_of(shot: Shot, to_pixels: Floats) -> Callable[[Floats], Bools]:
         From rays as in `optics.bundle.trace_points`, shape (N, 5 + 2 C), to a mask of shape (N,).
     """
     width, height = shot.size_px
-    # the upright picture is the meridional frame's, turned and upside down
-    turned = (-shot.incidence.axes * [to_pixels[2], -to_pixels[3]]).T
 
     def seen(rays: Floats) -> Bools:
-        x, y = rays[:, X], rays[:, Y]
-        column, row = (to_pixels[k] + turned[k, 0] * x + turned[k, 1] * y for k in (0, 1))
+        column, row = places_of(shot, to_pixels, rays[:, X], rays[:, Y])
         lands = (column >= 0.0) & (column < width) & (row >= 0.0) & (row < height)
         return np.asarray(_passes(rays, shot.opening.radius) & lands)
 
     return seen
+
+
+def places_of(shot: Shot, to_pixels: Floats, x: Floats, y: Floats) -> tuple[Floats, Floats]:
+    """Tell the columns and rows of places on the sensor.
+
+    Parameters
+    ----------
+    shot : Shot
+    to_pixels : ndarray, shape (4,)
+        The shot's, or a ghost's own.
+    x, y : ndarray
+        Meridional frame, mm.
+
+    Returns
+    -------
+    columns, rows : ndarray
+    """
+    # the upright picture is the meridional frame's, turned and upside down
+    turned = (-shot.incidence.axes * [to_pixels[2], -to_pixels[3]]).T
+    return to_pixels[0] + turned[0, 0] * x + turned[0, 1] * y, to_pixels[1] + turned[1, 0] * x + turned[1, 1] * y
 
 
 def _passes(rays: Floats, iris_radius: float) -> Bools:

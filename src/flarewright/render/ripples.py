@@ -12,6 +12,7 @@ from ..kernels.trace import ALIVE, X, Y
 from ..optics.border import points
 from ..optics.bundle import Bundle
 from ..optics.ringing import ripple_height
+from .path_color import places_of
 from .surroundings import Surroundings, unit
 
 if TYPE_CHECKING:
@@ -65,8 +66,7 @@ def narrowest(border: Floats) -> float:
 
 def _largest_part(item: FinalPass, rings: Rings, bundle: Bundle, around: Surroundings) -> float:
     """Compare a ghost's irradiance at its lit edge with all light there, where it is in the picture."""
-    shot, axes = item.shot, item.shot.incidence.axes
-    data = bundle.traced[len(shot.packed.wavelengths_nm) // 2]
+    data = bundle.traced[len(item.shot.packed.wavelengths_nm) // 2]
     own = node_densities(data, bundle.pupil, bundle.triangles) * unit(item, bundle, data)
     lit = rings.lit_nodes(data)
     near = bundle.triangles[lit[bundle.triangles].any(axis=1) & (data[:, ALIVE] > 0.0)[bundle.triangles].all(axis=1)]
@@ -74,10 +74,7 @@ def _largest_part(item: FinalPass, rings: Rings, bundle: Bundle, around: Surroun
     largest = 0.0
     for mirror in (1.0, -1.0)[: bundle.halves]:
         # what a ray that ended holds may be infinite, so only of those that live is anything computed
-        x, y = mirror * data[near, X], data[near, Y]
-        # the upright picture is the sensor turned by 180 degrees
-        c = item.to_pixels[0] - item.to_pixels[2] * (x * axes[0, 0] + y * axes[1, 0])
-        r = item.to_pixels[1] + item.to_pixels[3] * (x * axes[0, 1] + y * axes[1, 1])
+        c, r = places_of(item.shot, item.to_pixels, mirror * data[near, X], data[near, Y])
         seen = (c.max(axis=1) >= left) & (c.min(axis=1) <= right) & (r.max(axis=1) >= top) & (r.min(axis=1) <= bottom)
         if seen.any():
             bright = own[near[seen]].max(axis=1)
