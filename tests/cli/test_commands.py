@@ -367,6 +367,8 @@ def test_lens_check_tells_and_converts(capsys, folder):
     assert "  - row 3: glass 'BAF9' is not in the catalogue" in said.out
     call(capsys, "lens", "convert", "heliar-tronnier", "copy.toml")
     assert fw.load_lens("copy.toml") == fw.load_lens("heliar-tronnier")
+    call(capsys, "lens", "convert", "tessar-brendel", "copy.toml", "--force")
+    assert fw.load_lens("copy.toml") == fw.load_lens("tessar-brendel")
     files = call_json(capsys, "lens", "check", "copy.toml")["files"]
     assert files[0]["usable"] is True
     assert [path.name for path in folder.iterdir()] == ["copy.toml"]

@@ -142,6 +142,17 @@ def test_aspheres_of_other_kinds(tmp_path):
     np.testing.assert_allclose(x_sag, r**2 / 50.0, rtol=1e-12)
 
 
+def test_a_rim_beyond_its_own_sphere_is_left_out_and_told(tmp_path):
+    path = tmp_path / "wide.zmx"
+    path.write_text(doublet().replace("DIAM 12.5 1", "DIAM 50.5 1", 2), "utf-16")
+    remarks = []
+    lens = load_lens(path, remarks=remarks)
+    rims = [row.semi_diameter for row in lens.rows if isinstance(row, Surface)]
+    assert rims[0] == 50.5
+    assert rims[1] < 1 / abs(lens.rows[1].curvature)
+    assert any("row 1: a rim of 50.5 mm does not fit a surface that ends 44.64 mm" in told for told in remarks)
+
+
 def test_a_stop_on_glass_gets_a_plane_of_its_own(tmp_path):
     front = text_of(surface(1, 0.02, 5.0, "N-BK7 0 0 1.5 40", more=["STOP"]), surface(2, 0.0, 90.0), surface(3))
     lens, remarks = loaded(write(tmp_path, front))

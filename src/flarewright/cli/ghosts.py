@@ -226,17 +226,24 @@ def _print_table(table: GhostTable, name: str, angles: tuple[float, float], brig
     console().print(out)
 
 
+def _of_direct(row: GhostRow, direct: GhostRow) -> str:
+    if row.first_reflection is None:
+        return "1"
+    # light that no lens takes in directly may still make ghosts
+    return f"{row.throughput_mm2 / direct.throughput_mm2:.2e}" if direct.throughput_mm2 > 0.0 else "-"
+
+
 def _cells(row: GhostRow, direct: GhostRow) -> tuple[str, ...]:
-    of_direct = row.throughput_mm2 / direct.throughput_mm2 if direct.throughput_mm2 > 0.0 else math.nan
     if row.throughput_mm2 == 0.0:
         return ("0", "-", "-", "-", "-", row.bounded_by, "-")
     ghost = row.first_reflection is not None
+    peak = f"{row.peak_irradiance:.3g}" if ghost and direct.throughput_mm2 > 0.0 else "-"
     return (
         f"{row.throughput_mm2:.4g}",
-        f"{of_direct:.2e}" if ghost else "1",
+        _of_direct(row, direct),
         f"{row.centroid_mm[0]:.2f}, {row.centroid_mm[1]:.2f}",
         f"{row.rms_radius_mm:.3g}",
-        f"{row.peak_irradiance:.3g}" if ghost else "-",
+        peak,
         row.bounded_by if ghost else "-",
         "-" if row.focus_distance_mm is None or not ghost else f"{row.focus_distance_mm:.1f}",
     )

@@ -19,11 +19,14 @@ EPILOG = (
 def convert(
     source: Annotated[str, typer.Argument(metavar="IN", help="A lens file of any known kind, or a shipped name.")],
     target: Annotated[Path, typer.Argument(metavar="OUT", help="The lens file to write, *.toml.")],
+    force: Annotated[bool, typer.Option("--force", help="Replace a file that is there already.")] = False,
 ) -> None:
     """Write a lens as a Flarewright lens file: repaired, complete, estimates marked."""
     check_place(target, ".toml")
     if target.exists() and Path(source).exists() and target.samefile(source):
         raise OutputError(f"{target} is the file to convert; give another name for the output")
+    if target.exists() and not force:
+        raise OutputError(f"{target} exists already; choose another name, or replace it with --force")
     from ..io.lens_writer import write_lens
     from ..render.prepare import load_lens
 

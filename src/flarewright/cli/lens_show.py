@@ -42,6 +42,9 @@ def show(
     f_number = chosen_fstop(fstop)
     if plot is not None:
         check_place(plot, ".svg")
+    elif light is not None or ghost is not None:
+        flag = "--light" if light is not None else "--ghost"
+        raise ProjectError(f"{flag} says which rays to draw, but nothing is drawn: add --plot OUT.svg")
 
     from ..render.prepare import build, first_order, load_lens
 

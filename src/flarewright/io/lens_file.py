@@ -42,6 +42,8 @@ from .sentences import count, did_you_mean, shorten, summary, validation_sentenc
 from .shape_fields import read_elements, read_positions, read_shape
 from .text_file import read_toml
 
+# by which a rim may pass its surface's own end: numbers are rounded
+ROUNDED = 1e-6
 MOST_ROWS = 500
 """Lenses of photography end at some sixty rows; beyond this the file is no lens."""
 
@@ -276,7 +278,17 @@ def _surface(
             problems.append(f"row {k}: {error}")
     if (numbers.get("thickness") or 0.0) < 0.0 and ("n_d" in entry or glass is not None):
         problems.append(f"row {k}: thickness is {entry['thickness']!r}: glass cannot be thinner than 0 mm")
-    return Surface(**values) if len(problems) == before else None
+    if len(problems) > before:
+        return None
+    surface = Surface(**values)
+    semi = surface.semi_diameter
+    if semi is not None and semi * (1.0 - ROUNDED) > surface.equator:
+        problems.append(
+            f"row {k}: a semi_diameter of {semi:g} mm does not fit the surface, which turns back "
+            f"{surface.equator:g} mm from the axis: correct it, or leave it out and it is estimated"
+        )
+        return None
+    return surface
 
 
 def _curvature(entry: dict[str, Any], k: int, problems: list[str], axis: str = "") -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import inf, sqrt
 from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
@@ -81,6 +82,14 @@ class Surface(Frozen):
     def toroidal(self) -> bool:
         """Whether the two meridians differ."""
         return self.meridian_x != (self.curvature, self.conic)
+
+    @property
+    def equator(self) -> float:
+        """How far from the axis the surface turns away from it, mm, as a sphere does at its radius; inf for never."""
+        return min(
+            1.0 / (abs(curvature) * sqrt(1.0 + conic)) if curvature != 0.0 and conic > -1.0 else inf
+            for curvature, conic in (self.meridian_x, (self.curvature, self.conic))
+        )
 
     @property
     def displaced(self) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from math import atan, radians, sqrt
+from math import atan, radians
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,8 @@ IMAGE_RADIUS = 21.63
 CORNER_PUPIL = 0.6
 # mechanical allowance on the light's own radius
 ALLOWANCE = 1.02
+# estimates stay within this part of a surface's own sphere, and within what a lens file may say, mm
+WITHIN_SPHERE, WIDEST = 0.98, 2000.0
 # steps in which the chief ray is walked out to the corner
 FIELD_STEPS = 24
 # thinnest edge of an element or gap, mm
@@ -60,7 +62,8 @@ def complete(lens: Lens) -> Lens:
     for k in missing:
         row = rows[k]
         assert isinstance(row, Surface)
-        rows[k] = row.replace(semi_diameter=float(min(needed[k], _own_limit(row))), semi_diameter_estimated=True)
+        radius = float(min(needed[k], WITHIN_SPHERE * row.equator, WIDEST))
+        rows[k] = row.replace(semi_diameter=radius, semi_diameter_estimated=True)
     _keep_apart(rows, set(missing))
     completed: Lens = lens.replace(rows=tuple(rows))
     return completed
@@ -123,15 +126,6 @@ def _aim(lens: Lens, angle: float, guess: float, reach: float, distance: float) 
     k = crossing[np.argmin(np.abs(y[crossing] - guess))]
     change = at_stop[k + 1] - at_stop[k]
     return float(y[k] if change == 0.0 else y[k] - at_stop[k] * (y[k + 1] - y[k]) / change)
-
-
-def _own_limit(row: Surface) -> float:
-    """Largest radius at which the surface still faces the axis."""
-    limit = 2000.0
-    for curvature, conic in (row.meridian_x, (row.curvature, row.conic)):
-        if curvature != 0.0 and conic > -1.0:
-            limit = min(limit, 0.98 / (abs(curvature) * sqrt(1.0 + conic)))
-    return limit
 
 
 def _edge_gap(front: Surface, back: Surface, r: float) -> float:

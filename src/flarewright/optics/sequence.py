@@ -11,7 +11,7 @@ from math import atan, degrees
 from pydantic import ValidationError
 
 from ..errors import LensError
-from ..model import Lens, Row, Stop
+from ..model import Lens, Row, Stop, Surface
 from ..model.raw_lens import LensReading, RawSequence, SequenceRow
 from .paraxial import FirstOrder, first_order
 
@@ -48,11 +48,14 @@ def lens_of_sequence(raw: RawSequence) -> LensReading:
         if not 0.3 < f_number <= 256.0:
             raise LensError(f"{raw.file}: its opening would be f/{f_number:.3g}, which no lens has: set FNUM")
         _tell_image(kept[-1], order, remarks)
+        rows = _within_spheres(rows, remarks)
         _tell_rims(kept, remarks)
         distance = None if raw.focus_distance is None else raw.focus_distance + front
         if distance is not None:
             remarks.append(f"the object stands {distance:g} mm in front of the lens; it is focused there")
-        lens = draft.replace(f_number=f_number, field_deg=_field_deg(raw, order), focus_distance=distance)
+        lens = draft.replace(
+            rows=tuple(rows), f_number=f_number, field_deg=_field_deg(raw, order), focus_distance=distance
+        )
         remarks += raw.remarks
         notes = [f"Imported from {raw.file}.", raw.notes, *remarks]
         return LensReading(lens.replace(notes="\n".join(note for note in notes if note)), tuple(remarks))
@@ -146,6 +149,21 @@ def _tell_image(last: SequenceRow, order: FirstOrder, remarks: list[str]) -> Non
             f"the file's image lies {gap:.2f} mm behind the last surface, {gap - order.bfl:+.2f} mm from the paraxial "
             f"focus ({order.bfl:.2f}); the sensor is placed at the focus"
         )
+
+
+def _within_spheres(rows: list[Row], remarks: list[str]) -> list[Row]:
+    """Leave out rims that lie beyond their own surface, to be estimated."""
+    kept: list[Row] = []
+    for k, row in enumerate(rows):
+        if isinstance(row, Surface) and row.semi_diameter is not None and row.semi_diameter > row.equator:
+            remarks.append(
+                f"row {k}: a rim of {row.semi_diameter:g} mm does not fit a surface that ends {row.equator:g} mm from "
+                "the axis; it will be estimated"
+            )
+            kept.append(row.replace(semi_diameter=None))
+        else:
+            kept.append(row)
+    return kept
 
 
 def _tell_rims(kept: list[SequenceRow], remarks: list[str]) -> None:
