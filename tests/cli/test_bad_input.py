@@ -174,6 +174,7 @@ PROJECT_FILES = {
     "source parts of no size": (PROJECT + "[quality]\nsource_step_deg = 0\n", "quality.source_step_deg"),
     "light wider than the sky": (PROJECT + "diameter_deg = 200\n", "lights[0].diameter_deg"),
     "zoom of a prime": ("zoom = 50.0\n" + PROJECT, "has no positions"),
+    "zoom below nothing": ("zoom = -3\n" + PROJECT, "zoom: -3 is no focal length; give one above 0"),
     "filter that is a number": ("filter = 3\n" + PROJECT, "filter"),
     "filter of no glass": ('filter = "X:2"\n' + PROJECT, "X"),
     "filter without thickness": ("filter = { gap = 2.0 }\n" + PROJECT, "filter.thickness is missing"),
@@ -229,6 +230,21 @@ COMMAND_LINES = {
     "sun nowhere": ([*H, "--light", "sun", "-o", "a.exr"], "--light sun@10,5"),
     "rectangle of words": ([*H, *GOOD, "--light-size", "big"], "--light-size 'big' is not two numbers"),
     "rectangle below zero": ([*H, *GOOD, "--light-size", "-1x2"], "--light-size"),
+    "a sun of another shape": (
+        [*H, "--light", "sun@1,1", "--light-size", "3x2", "-o", "a.exr"], "--light sun@X,Y is a disc already"),
+    "one size too many beside a sun": (
+        [*H, "--light", "sun@1,1", *GOOD, *["--light-size", "3x2"] * 2], "is given 2 times for 1 other light;"),
+    "disc and rectangle": (
+        [*H, *GOOD, "--light-size", "3x2", "--light-diameter", "1"], "each say how large a light is; give one"),
+    "polygon of two corners": ([*H, *GOOD, "--light-polygon", "0,0 1,0"], "has 2 corners; give three or more"),
+    "polygon of words": ([*H, *GOOD, "--light-polygon", "0,0 1,0 x,1"], "--light-polygon 'x,1' is not two numbers"),
+    "polygon that crosses itself": (
+        [*H, *GOOD, "--light-polygon", "0,0 4,0 0,3 3,3"], "has edges that cross each other"),
+    "rule without its words": ([*H, *GOOD, "--rule", "row:2"], "--rule 'row:2' is no rule; write --rule"),
+    "rule with a strange word": ([*H, *GOOD, "--rule", "select='all', tin=[1,1,1]"], "did you mean 'tint'?"),
+    "rule for no ghosts": ([*H, *GOOD, "--rule", "gain = 2"], "--rule: select is missing"),
+    "rule of negative light": ([*H, *GOOD, "--rule", "select = 'all', gain = -2"], "--rule: gain should be greater"),
+    "spiral beyond a quarter turn": ([*H, *GOOD, "--starburst-spiral", "100"], "--starburst-spiral should be less"),
     "colour of two numbers": ([*H, *GOOD, "--spectrum", "rgb:1,0"], "a colour is three numbers"),
     "black light": ([*H, *GOOD, "--spectrum", "rgb:0,0,0"], "a colour is three numbers"),
     "negative colour": ([*H, *GOOD, "--spectrum", "rgb:1,-1,0"], "a colour is three numbers"),

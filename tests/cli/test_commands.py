@@ -29,6 +29,7 @@ from flarewright.model import (
     Preset,
     Project,
     QuarterWave,
+    Rectangle,
     Tabulated,
 )
 
@@ -181,6 +182,41 @@ def test_art_flags_come_after_the_project_s_rules(capsys, projects, folder):
         ("largest:2", False, 1.0), ("not 4-1", None, 0.5)]  # fmt: skip
     assert physical.art.physical
     assert physical.art.rules == read_project("p.toml").art.rules
+
+
+def test_a_flag_for_all_that_art_and_lights_can_be(capsys, projects, folder):
+    """A rule, a polygon and the spiral mean what they mean in a project file; rules come before mutes and gains."""
+    (folder / "p.toml").write_text(
+        'lens = "heliar-tronnier"\n[[lights]]\nfield_deg = [1, 2]\n'
+        'shape = { kind = "polygon", corners_deg = [[-1, 0], [3, 0], [3, 1]] }\n'
+        "[camera]\nsize_px = [8, 6]\n[starburst]\nspiral_deg = 12\n"
+        '[[art.rules]]\nselect = "row:7"\ntint = [1, 0.5, 0]\nramp = [[0, 1, 1, 1], [1, 2, 1, 1]]\noffset_mm = [1, 2]\n'
+        '[[art.rules]]\nselect = "largest:2"\nscale = 2\nblur_px = 0.5\n'
+    )
+    call(capsys, "render", "--project", "p.toml", "-o", "a.exr")
+    call(
+        capsys, "render", "heliar-tronnier", "--light", "1,2", "--light-polygon", "-1,0 3,0 3,1", "--size", "8x6",
+        "--starburst-spiral", "12", "--rule",
+        'select = "row:7", tint = [1, 0.5, 0], ramp = [[0, 1, 1, 1], [1, 2, 1, 1]], offset_mm = [1, 2]',
+        "--rule", "select = 'largest:2', scale = 2, blur_px = 0.5", "-o", "a.exr",
+    )  # fmt: skip
+    call(
+        capsys, "render", "heliar-tronnier", "--light", "1,2", "--mute", "4-1", "--rule", "select = 'all', gain = 2",
+        "--size", "8x6", "-o", "a.exr",
+    )  # fmt: skip
+    written, told, order = projects
+    assert told == written
+    assert [rule.select for rule in order.art.rules] == ["all", "4-1"]
+
+
+def test_a_sun_stays_a_disc_beside_lights_of_a_size(capsys, projects):
+    """As the help's own example has it."""
+    words = ["render", "heliar-tronnier", "--light", "sun@10,5", "--light", "-12,2", "--size", "8x6", "-o", "a.exr"]
+    call(capsys, *words, "--light-size", "3x2")
+    call(capsys, *words, "--light-diameter", "1", "--light-diameter", "2")
+    shaped, discs = projects
+    assert [(x.diameter_deg, x.shape) for x in shaped.lights] == [(0.53, None), (0.0, Rectangle(size_deg=(3, 2)))]
+    assert [(x.diameter_deg, x.shape) for x in discs.lights] == [(1.0, None), (2.0, None)]
 
 
 def test_turning_the_blades_keeps_the_lens_own_number(capsys, projects):

@@ -68,6 +68,12 @@ def render(
         list[str] | None,
         typer.Option(metavar="WxH", help="Degrees across an evenly bright rectangle.", rich_help_panel=_LIGHT),
     ] = None,
+    light_polygon: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="'X,Y X,Y X,Y'", help="Corners of an even light, degrees from its place.", rich_help_panel=_LIGHT
+        ),
+    ] = None,
     distance: Annotated[
         list[float] | None,
         typer.Option(
@@ -129,6 +135,10 @@ def render(
     ] = False,
     starburst_size: Annotated[
         float | None, typer.Option(help="Stretches the starburst by hand; 1 is physics.", rich_help_panel=_ART)
+    ] = None,
+    starburst_spiral: Annotated[
+        float | None,
+        typer.Option(metavar="DEG", help="Smears the starburst over an angle, to hide fringes.", rich_help_panel=_ART),
     ] = None,
     scatter: Annotated[
         str | None,
@@ -228,6 +238,14 @@ def render(
             help="Rings inside ghosts, final quality: collins, exact paraxial diffraction, the default; frft, Hullin's "
             "estimate; off.",
             rich_help_panel=_WORK,
+        ),
+    ] = None,
+    rule: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="RULE",
+            help="A rule of [[art.rules]]: 'select = \"row:7\", tint = [1, 0.6, 0.3], scale = 2'; may be repeated.",
+            rich_help_panel=_ART,
         ),
     ] = None,
     mute: Annotated[
@@ -336,9 +354,10 @@ def render(
     flags = Flags(
         lens=lens, project=project, light=light or [], intensity=intensity or [], spectrum=spectrum or [],
         fstop=fstop, blades=blades, rotation=rotation, rounding=rounding, iris_image=iris_image, coating=coating,
-        light_diameter=light_diameter or [], light_size=light_size or [], distance=distance or [],
+        light_diameter=light_diameter or [], light_size=light_size or [], light_polygon=tuple(light_polygon or ()),
+        distance=distance or [], rule=tuple(rule or ()),
         roughness=roughness, dust=dust, scratches=scratches, fingerprint=fingerprint, dirt_image=dirt_image,
-        cats_eye=cats_eye, starburst_size=starburst_size,
+        cats_eye=cats_eye, starburst_size=starburst_size, starburst_spiral=starburst_spiral,
         focus=focus, size=size, sensor=sensor, sensor_distance=sensor_distance, quality=quality,
         wavelengths=wavelengths, paths=paths, layers=layers, brightest=brightest, no_starburst=no_starburst,
         colorspace=colorspace, half=half, mute=mute or [], solo=solo or [], gain=gain or [], physical=physical,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -31,14 +32,14 @@ _FLAG_OF = {
     "dirt.image": "--dirt-image",
     "dirt.seed": "--seed",
     "starburst.size": "--starburst-size",
+    "starburst.spiral_deg": "--starburst-spiral",
     "scatter.model": "--scatter",
     "scatter.roughness_nm": "--surface-roughness",
     "scatter.cleanliness_level": "--cleanliness",
     "diameter_deg": "--light-diameter",
     "distance": "--distance",
-    "shape.rectangle.size_deg": "--light-size",
     "shape.size_deg": "--light-size",
-    "shape": "--light-size",
+    "shape.corners_deg": "--light-polygon",
     "quality.ringing": "--ringing",
     "camera.size_px": "--size",
     "camera.sensor_mm": "--sensor",
@@ -129,6 +130,9 @@ class Flags:
     samples: int | None = None
     rays_from: str | None = None
     resumed: Project | None = None
+    light_polygon: tuple[str, ...] = ()
+    starburst_spiral: float | None = None
+    rule: tuple[str, ...] = ()
 
 
 def build_project(flags: Flags) -> Project:
@@ -240,7 +244,11 @@ def _sections(flags: Flags) -> dict[str, dict[str, Any]]:
             "image": dirt_image,
             "seed": flags.seed,
         },
-        "starburst": {"cats_eye": True if flags.cats_eye else None, "size": flags.starburst_size},
+        "starburst": {
+            "cats_eye": True if flags.cats_eye else None,
+            "size": flags.starburst_size,
+            "spiral_deg": flags.starburst_spiral,
+        },
         "output": {
             "layers": flags.layers,
             "brightest": flags.brightest,
@@ -258,22 +266,45 @@ def _lights(flags: Flags, base: tuple[Light, ...]) -> list[dict[str, Any]]:
     for name, values in (
         ("intensity", flags.intensity),
         ("spectrum", spectra),
-        ("diameter_deg", flags.light_diameter),
-        ("shape", [{"kind": "rectangle", "size_deg": _size(text)} for text in flags.light_size]),
         ("distance", [None if distance == float("inf") else distance for distance in flags.distance]),
     ):
-        flag = _FLAG_OF.get(name, f"--{name}")
-        if values and len(values) not in (1, len(lights)):
-            raise ProjectError(
-                f"{flag} is given {len(values)} times for {len(lights)} light{'s' if len(lights) > 1 else ''}; "
-                "give it once for all lights, or once per light in the same order"
-            )
-        for k, light in enumerate(lights):
-            if values:
-                if name == "shape":
-                    light["diameter_deg"] = 0.0
-                light[name] = values[k % len(values)]
+        _share_out(_FLAG_OF.get(name, f"--{name}"), [{name: value} for value in values], lights)
+    _extents(flags, lights)
     return lights
+
+
+def _share_out(flag: str, changes: list[dict[str, Any]], lights: list[dict[str, Any]], *, others: bool = False) -> None:
+    """Change lights by what a flag says once for all of them, or once for each."""
+    if changes and len(changes) not in (1, len(lights)):
+        what = f"{'other ' if others else ''}light{'' if len(lights) == 1 else 's'}"
+        raise ProjectError(
+            f"{flag} is given {len(changes)} times for {len(lights)} {what}; give it once for all "
+            f"{'other ' if others else ''}lights, or once per light in the same order"
+        )
+    for k, light in enumerate(lights):
+        if changes:
+            light.update(changes[k % len(changes)])
+
+
+def _extents(flags: Flags, lights: list[dict[str, Any]]) -> None:
+    """Say how large lights are: discs, rectangles or polygons; a sun is one already."""
+    shapes: dict[str, list[dict[str, Any]]] = {
+        "--light-size": [{"kind": "rectangle", "size_deg": _size(text)} for text in flags.light_size],
+        "--light-polygon": [{"kind": "polygon", "corners_deg": _corners(text)} for text in flags.light_polygon],
+    }
+    given = [flag for flag, values in {"--light-diameter": flags.light_diameter, **shapes}.items() if values]
+    if len(given) > 1:
+        raise ProjectError(
+            f"{' and '.join(given)} each say how large a light is; give one of them, or write a project file for "
+            "lights of several kinds"
+        )
+    _share_out("--light-diameter", [{"diameter_deg": angle, "shape": None} for angle in flags.light_diameter], lights)
+    suns = [light for light in lights if flags.light and light.get("name") == "sun"]
+    rest = [light for light in lights if light not in suns]
+    for flag, values in shapes.items():
+        if values and not rest:
+            raise ProjectError(f"{flag}: --light sun@X,Y is a disc already; write --light X,Y for this shape")
+        _share_out(flag, [{"shape": shape, "diameter_deg": 0.0} for shape in values], rest, others=bool(suns))
 
 
 def _light(text: str) -> dict[str, Any]:
@@ -289,6 +320,17 @@ def _light(text: str) -> dict[str, Any]:
 
 def _size(text: str) -> tuple[float, float]:
     return pair(text, "--light-size", "4x3 (degrees wide and high)", "x")
+
+
+def _corners(text: str) -> tuple[tuple[float, float], ...]:
+    """Return the corners of `--light-polygon "X,Y X,Y X,Y"`."""
+    corners = tuple(pair(corner, "--light-polygon", '"0,0 3,0 3,1" (degrees right and up)') for corner in text.split())
+    if len(corners) < 3:
+        raise ProjectError(
+            f"--light-polygon {text!r} has {len(corners)} corners; give three or more, --light-polygon "
+            '"0,0 3,0 3,1" (degrees right and up)'
+        )
+    return corners
 
 
 def _iris(flags: Flags, lens: Any, base: Project | None) -> dict[str, Any] | None:
@@ -360,9 +402,9 @@ def scatter_flags(
 
 def _art(flags: Flags, base: Art) -> dict[str, Any] | None:
     """Return the art direction with the flags' rules after the project's, or None when no flag changes it."""
-    if not (flags.mute or flags.solo or flags.gain or flags.physical):
+    if not (flags.rule or flags.mute or flags.solo or flags.gain or flags.physical):
         return None
-    rules = list(base.rules)
+    rules = [*base.rules, *(_told_rule(text) for text in flags.rule)]
     if flags.solo:
         rules += [Rule(select="all", enable=False), *(_rule("--solo", text, enable=True) for text in flags.solo)]
     rules += [_rule("--mute", text, enable=False) for text in flags.mute]
@@ -388,6 +430,21 @@ def _art(flags: Flags, base: Art) -> dict[str, Any] | None:
         else:
             rules.append(_rule("--gain", name, gain=factor))
     return {"physical": flags.physical or base.physical, "gain": passes, "rules": rules}
+
+
+def _told_rule(text: str) -> Rule:
+    """Return the rule of `--rule`, whose words are those of a project file's [[art.rules]]."""
+    try:
+        table = tomllib.loads(f"rule = {{ {text} }}")["rule"]
+    except tomllib.TOMLDecodeError:
+        raise ProjectError(
+            f"--rule {text!r} is no rule; write --rule 'select = \"row:7\", gain = 2, tint = [1, 0.6, 0.3]', with the "
+            "words of [[art.rules]] in a project file"
+        ) from None
+    try:
+        return Rule.model_validate(table)
+    except ValidationError as error:
+        raise ProjectError(f"--rule: {explain(error, table, {'': (Rule,)})[0]}") from None
 
 
 def _rule(flag: str, select: str, **changes: Any) -> Rule:

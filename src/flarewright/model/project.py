@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from .art import Art
 from .base import Frozen
@@ -177,13 +177,20 @@ class Project(Frozen):
     output: Output = Output()
     dirt: Dirt = Dirt()
     starburst: Starburst = Starburst()
-    zoom: str | Annotated[float, Field(gt=0.0)] | None = None
+    zoom: str | float | None = None
     filter: Plate | None = None
     imperfection: Imperfection | None = None
     scatter: Scatter | None = None
     holdout: Holdout | None = None
     art: Art = Art()
     design: Design | None = None
+
+    @field_validator("zoom")
+    @classmethod
+    def _zoom_is_above_zero(cls, zoom: str | float | None) -> str | float | None:
+        if isinstance(zoom, float) and not zoom > 0.0:
+            raise ValueError(f"{zoom:g} is no focal length; give one above 0, in mm, or the name of a position")
+        return zoom
 
     @model_validator(mode="after")
     def _picture_is_sane(self) -> Project:

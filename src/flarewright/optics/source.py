@@ -60,7 +60,7 @@ def outline(light: Light) -> Floats | None:
     Raises
     ------
     ProjectError
-        When a part of it lies beside or behind the camera.
+        When a part of it lies beside or behind the camera, or when it has no area or crosses itself.
     """
     if not light.extended:
         return None
@@ -83,8 +83,25 @@ def outline(light: Light) -> Floats | None:
                 f"{WIDEST_DEG:g} degrees"
             )
         corners = np.tan(np.radians(angles))
+        if _crosses_itself(corners):
+            raise ProjectError(
+                f"the light {light.name!r} has edges that cross each other; give its corners in order around it"
+            )
     area = content(closed(corners))
     return corners if area > 0.0 else corners[::-1].copy()
+
+
+def _crosses_itself(corners: Floats) -> bool:
+    """Tell whether two edges of a polygon meet between their ends."""
+    ends = np.roll(corners, -1, axis=0)
+
+    def side(points: Floats) -> Floats:
+        # twice the area of the triangle of each edge (rows) and each point (columns)
+        along, to = ends - corners, points[None] - corners[:, None]
+        return np.asarray(along[:, None, 0] * to[..., 1] - along[:, None, 1] * to[..., 0])
+
+    apart = side(corners) * side(ends) < 0.0
+    return bool((apart & apart.T).any())
 
 
 def _disc(light: Light) -> Floats:
