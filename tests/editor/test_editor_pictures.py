@@ -187,6 +187,46 @@ def test_without_its_rim_the_entrance_hides_nothing(project):
     assert same.pixels.sum() == pytest.approx(plain.pixels.sum(), rel=1e-3)
 
 
+def test_backgrounds_of_all_kinds(tmp_path):
+    import OpenEXR
+    from PIL import Image
+
+    def plate(path, size=(8, 4)):
+        return plate_for(View(plate=str(path)), size)
+
+    # 16 bits of grey are no white
+    Image.fromarray(np.full((4, 8), 0x8000, np.uint16)).save(tmp_path / "deep.png")
+    assert plate(tmp_path / "deep.png").max() == pytest.approx(0.2140, abs=1e-3)
+    # stripes of single pixels are seen as their mean, not as one of them
+    stripes = np.zeros((64, 128, 3), np.uint8)
+    stripes[:, ::2] = 255
+    Image.fromarray(stripes).save(tmp_path / "stripes.png")
+    np.testing.assert_allclose(plate(tmp_path / "stripes.png")[:, 1:-1], 0.5, atol=0.02)
+    # the middle of a picture of another shape fills the frame
+    split = np.zeros((16, 8, 3), np.uint8)
+    split[6:10] = 255
+    Image.fromarray(split).save(tmp_path / "tall.png")
+    np.testing.assert_allclose(plate(tmp_path / "tall.png"), 1.0, atol=1e-6)
+
+    def exr(name, channels, window=((0, 0), (7, 3))):
+        head = {"type": OpenEXR.scanlineimage, "displayWindow": window}
+        OpenEXR.File(head, channels).write(str(tmp_path / name))
+        return tmp_path / name
+
+    grey = np.full((4, 8), 3.0, np.float32)
+    grey[0, 0] = np.nan
+    found = plate(exr("grey.exr", {"Y": grey}))
+    assert found[2, 5].tolist() == [3.0, 3.0, 3.0]
+    assert np.isfinite(found).all()
+    # a layer of half the frame stays on its side
+    half = np.ones((4, 8), np.float32)
+    found = plate(exr("part.exr", dict.fromkeys("RGB", half), ((0, 0), (15, 3))), (16, 4))
+    assert found[:, :7].min() == 1.0
+    assert found[:, 9:].max() == 0.0
+    with pytest.raises(ProjectError, match=r"two\.exr: this cannot be read as a background .*channels are depth, mask"):
+        plate(exr("two.exr", {"depth": grey, "mask": grey}))
+
+
 def test_looks_and_background(tmp_path):
     from PIL import Image
 
@@ -379,3 +419,25 @@ def test_grey_is_seen_at_the_exposure_of_the_lens():
     assert screen.exposure_stops == chosen
     assert 10.0 < shown_pixels(screen).mean() < 170.0
     assert plain.project.lens == "flektogon-35"
+
+
+def test_rings_that_take_minutes_are_left_out_and_told(project, tmp_path):
+    """Through an image every ghost's rings are a wave on a grid: the picture never came."""
+    from PIL import Image
+
+    Image.new("L", (64, 64), 255).save(tmp_path / "mask.png")
+    masked = project.replace(iris=Iris(mask=str(tmp_path / "mask.png")))
+    assert studio.staged(project, "final").quality.ringing == "collins"
+    assert studio.staged(masked, "final").quality.ringing == "off"
+    assert studio.take(masked, "final", View(), scale=0.3).remarks[-1] == studio.NO_RINGS
+    assert studio.NO_RINGS not in studio.take(project, "final", View(), scale=0.3).remarks
+
+
+def test_rounding_draws_no_border_beside_a_ghost():
+    """Sums of rows leave next to nothing where nothing is: outlines were full of stripes."""
+    from flarewright.editor.seen import _lit
+
+    pixels = np.zeros((8, 8, 3), np.float32)
+    pixels[2:5, 2:5] = 1e-8
+    pixels[2:5, 6] = 3e-22
+    assert np.argwhere(_lit(pixels)).max() == 4

@@ -16,8 +16,8 @@ from flarewright.editor.session import begin
 from flarewright.editor.view import View
 from flarewright.errors import FlarewrightError
 from flarewright.io.project_file import read_project
-from flarewright.model import Light, PerRow, QuarterWave, Stop
-from flarewright.render.prepare import as_lens, first_order
+from flarewright.model import Light, PerRow, QuarterWave, Stop, Surface
+from flarewright.render.prepare import as_lens, first_order, settle
 
 
 def do(project, deed, /, **values):
@@ -249,8 +249,34 @@ def test_rows_come_and_go_with_everything_that_counts_them(project):
     ]
     assert first_order(as_lens(shorter.lens)).efl == pytest.approx(first_order(lens).efl, rel=1e-12)
     assert len(do(project, "duplicate_row", row=1).lens.rows) == len(lens.rows) + 1
-    assert do(project, "move_stop", row=3).lens.stop_row == 3
     assert do(project, "set_lens_facts", values={"name": "Mine"}).lens.name == "Mine"
+
+
+@pytest.mark.parametrize("name", ["canon-70-200", "nikkor-85-f1.4", "biotar-50-f1.4"])
+def test_the_stop_moves_and_the_lens_stays_as_sharp(name):
+    project = begin(name)[0].project
+    lens = as_lens(name)
+    refused, moved = [], 0
+    for row, one in enumerate(lens.rows):
+        if isinstance(one, Stop):
+            continue
+        try:
+            found = done(project, "move_stop", {"row": row})[0]
+        except FlarewrightError as error:
+            refused.append(str(error))
+            continue
+        moved += 1
+        now = as_lens(found.lens)
+        assert now.stop_row != lens.stop_row
+        assert [r.curvature for r in now.rows if isinstance(r, Surface)] == [
+            r.curvature for r in lens.rows if isinstance(r, Surface)
+        ]
+        for position in (None, *(each.name for each in lens.positions)):
+            before, after = (settle(each.replace(zoom=position)).order for each in (project, found))
+            assert after.efl == pytest.approx(before.efl, rel=1e-9)
+            assert after.bfl == pytest.approx(before.bfl, rel=1e-9)
+    assert moved >= 2
+    assert all("choose a row" in words for words in refused)
 
 
 def test_zoom_gaps_keep_their_surfaces():

@@ -7,11 +7,14 @@ from dataclasses import dataclass
 from math import atan, degrees, isfinite, radians, tan
 from typing import Any
 
+import numpy as np
+
 from ..errors import FlarewrightError, GlassError, LensError
 from ..io.coating_text import UNCOATED, coating_from, format_coating
 from ..io.media import attach
-from ..model import AsLens, CoatingChoice, Iris, Lens, PerRow, Preset, Project, Row, Stop, Surface
+from ..model import AsLens, CoatingChoice, Iris, Lens, PerRow, Position, Preset, Project, Row, Stop, Surface
 from ..model.art import Art
+from ..optics.shape import sag
 from ..render.prepare import as_lens, first_order
 
 COLUMNS = ("radius", "thickness", "glass", "n_d", "v_d", "semi_diameter", "coating")
@@ -176,18 +179,102 @@ def remove_row(project: Project, row: int) -> Project:
 
 
 def move_stop(project: Project, row: int) -> Project:
-    """Make a row the stop (thesis section 5.3.3)."""
-    from ..design.edits import move_stop as moved
+    """Put the stop into the air in front of a row, or behind it where in front is glass; no surface changes.
 
-    lens = as_lens(project.lens)
+    Parameters
+    ----------
+    project : Project
+    row : int
+        A surface.
+
+    Returns
+    -------
+    Project
+        As sharp, as bright and focused as before: ghosts are bounded elsewhere.
+
+    Raises
+    ------
+    LensError
+        When there is glass on both sides, the stop is there already, or a zoom position leaves it no room.
+
+    Notes
+    -----
+    `design.edits.move_stop` lets the stop take the place of a surface (Van Acoleyen 2025, section 5.3.3), which few
+    lenses survive.
+    """
+    lens = own_lens(project)
+    old, rows = lens.stop_row, lens.rows
+    if not 0 <= row < len(rows) or row == old:
+        raise LensError(f"row {row} is no surface; choose one between 0 and {len(rows) - 1} to put the stop next to")
+    gaps = [k for k in (row, row + 1) if k < len(rows) and (k == 0 or getattr(rows[k - 1], "medium", None) is None)]
+    free = [k for k in gaps if k not in (old, old + 1)]
+    if not free:
+        why = "the stop is there already" if gaps else "there is glass on both sides of it"
+        raise LensError(f"the stop cannot go next to row {row}: {why}; choose a row beside another gap of air")
+    # first taken out, so that its two gaps become one, then put in front of a row of what is left
+    target = free[0] - (free[0] > old)
+    left = list(rows)
+    stop = left.pop(old)
+    if old > 0:
+        left[old - 1] = left[old - 1].replace(thickness=left[old - 1].thickness + stop.thickness)
+    sensor = lens.sensor_distance
+    if old == len(left) and sensor is not None:
+        sensor += rows[old - 1].thickness
+    behind = _room_behind_stop(left, target)
+    if target:
+        left[target - 1] = left[target - 1].replace(thickness=left[target - 1].thickness - behind)
+    left.insert(target, stop.replace(thickness=behind))
+
+    def place(k: int) -> int:
+        reduced = k - (k > old)
+        return target if k == old else reduced + (reduced >= target)
+
+    positions = tuple(_with_stop_at(position, lens, target, behind) for position in lens.positions)
+    still = lens.replace(positions=(), sensor_distance=sensor)
+    moved = _renumbered(project, still, tuple(left), place)
+    if not positions:
+        return moved
+    assert isinstance(moved.lens, Lens)
+    try:
+        return with_lens(moved, moved.lens.replace(positions=positions))
+    except ValueError as error:
+        raise LensError(sentence(error)) from None
+
+
+def _room_behind_stop(rows: list[Row], target: int) -> float:
+    """Return the distance from the stop to the row that it is put in front of: the middle of what rims leave free."""
+    front, back = rows[target - 1] if target else None, rows[target]
+    semis = [each.semi_diameter for each in (front, back) if isinstance(each, Surface) and each.semi_diameter]
+    rim = np.array([min(semis, default=0.0)])
+    with np.errstate(invalid="ignore"):
+        bulge, hollow = (
+            0.0 if each is None else float(np.nan_to_num(sag(each, np.zeros(1), rim)[0])) for each in (front, back)
+        )
+    if front is None:
+        return 1.0 + max(0.0, -hollow)
+    near, far = max(0.0, bulge), front.thickness + min(0.0, hollow)
+    return front.thickness - (0.5 * (near + far) if far > near else 0.5 * front.thickness)
+
+
+def _with_stop_at(position: Position, lens: Lens, target: int, behind: float) -> Position:
+    """Return a zoom position's gaps with the stop elsewhere; it moves with the row behind it."""
     old = lens.stop_row
-    found = moved(lens, row)
-    coating = project.coating
-    if isinstance(coating, PerRow):
-        coating = PerRow(coatings=tuple(c for k, c in enumerate(coating.coatings) if k != old))
-    # the old stop is gone, and with another stop ghosts have other names
-    changed: Project = project.replace(lens=found, coating=coating, art=_without_names(project.art), f_number=None)
-    return changed
+    gaps = dict(position.gaps)
+    if old in gaps or old - 1 in gaps:
+        both = (gaps.pop(k, lens.rows[k].thickness) for k in (old - 1, old) if k >= 0)
+        total = sum(both)
+        if old > 0:
+            gaps[old - 1] = total
+    gaps = {k - (k > old): gap for k, gap in gaps.items()}
+    if target - 1 in gaps:
+        gaps[target - 1] -= behind
+        if gaps[target - 1] < 0.0:
+            raise LensError(
+                f"the stop cannot go there: in zoom position {position.name!r} that gap is {-gaps[target - 1]:.2f} mm "
+                "too narrow; choose a row beside another gap of air"
+            )
+    moved: Position = position.replace(gaps=tuple((k + (k >= target), gap) for k, gap in sorted(gaps.items())))
+    return moved
 
 
 def _behind(first: int) -> Callable[[int], int]:

@@ -153,7 +153,10 @@ def imported(name: str, data: bytes, folder: Path) -> Imported:
         lens = load_lens(path, remarks=remarks)
     except FlarewrightError as error:
         # the folder is ours, and means nothing to a person
-        raise type(error)(str(error).replace(str(path), plain)) from None
+        words = str(error).replace(str(path), plain)
+        if str(folder) in words:
+            words = f"{plain}: {words.replace(f'{folder}/', '')}; a dropped file comes alone, so use Open for this one"
+        raise type(error)(words) from None
     return Imported(lens=lens.replace(name=lens.name or plain), remarks=tuple(remarks))
 
 

@@ -21,6 +21,8 @@ Floats = NDArray[np.float32]
 
 # of the viewport's picture
 SMALL = 0.25
+# against a ghost's brightest spot: what is less is left over from sums of rows
+LEFT_OVER = 1e-6
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722], dtype=np.float32)
 
 
@@ -94,7 +96,7 @@ def see(project: Project, grade: Grade, progress: Callable[[float, str], None] |
 
 
 def _seen(layer: Layer, size: tuple[int, int], pixel_mm: float) -> SeenGhost:
-    light = np.asarray(layer.pixels @ _LUMINANCE, dtype=np.float32)
+    light = _lit(layer.pixels)
     x, y, w, h = layer.window
     total = float(light.sum(dtype=np.float64))
     if total <= 0.0:
@@ -152,10 +154,17 @@ def alone(project: Project, ghost: str, grade: Grade) -> Floats:
     only = Art(rules=(*rules, Rule(select=f"not {ghost}", enable=False)))
     quality = stage.quality
     if grade == "final":
-        quality = quality.replace(wavelengths=3)
+        # rings go beyond the ghost's border, faintly and far
+        quality = quality.replace(wavelengths=3, ringing="off")
     stage = stage.replace(art=only, quality=quality, output=Output(layers="passes", starburst=False))
     layers = [layer for layer in render(stage).layers if layer.name.startswith("ghosts")]
-    return np.asarray(spread(layers, stage.camera.size_px) @ _LUMINANCE, dtype=np.float32)
+    return _lit(spread(layers, stage.camera.size_px))
+
+
+def _lit(pixels: Floats) -> Floats:
+    """Return the luminance of a ghost that is alone, and nothing where only rounding is left."""
+    light = np.asarray(pixels @ _LUMINANCE, dtype=np.float32)
+    return np.where(light > LEFT_OVER * light.max(initial=0.0), light, np.float32(0.0))
 
 
 def is_there(light: Floats, u: float, v: float, slack_px: int = 1) -> bool:

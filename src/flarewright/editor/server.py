@@ -205,8 +205,14 @@ def _glasses(_desk: Desk, request: Request, _body: Any) -> Any:
 
     words = request.query_params.get("q", "").lower().replace(" ", "")
     names = [name for name in all_names() if words in name.lower().replace(" ", "")]
-    # those that begin so come first
-    names.sort(key=lambda name: (not name.lower().startswith(words), name))
+
+    def far(name: str) -> tuple[bool, bool, str]:
+        # a glass that begins so comes first, with or without its maker's name or the N of new glasses
+        glass = name.lower().split(" ", 1)[-1]
+        forms = (glass, glass.removeprefix("n-"), name.lower().replace(" ", ""))
+        return glass != words, not any(form.startswith(words) for form in forms), name
+
+    names.sort(key=far)
     return {"glasses": names[:40]}
 
 
@@ -275,12 +281,12 @@ def _plain(stem: str) -> str:
 
 def _solve(desk: Desk, _request: Request, body: Any) -> Any:
     seconds = min(max(float(body.get("seconds", 30.0)), 1.0), MOST_SECONDS)
-    desk.solver.start(seconds, desk.screen.exposure_stops)
+    desk.solver.start(seconds)
     return desk.state()
 
 
 def _colors(desk: Desk, _request: Request, body: Any) -> Any:
-    desk.solver.start_colors(str(body.get("kind", "quarter-wave")), desk.screen.exposure_stops)
+    desk.solver.start_colors(str(body.get("kind", "quarter-wave")))
     return desk.state()
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import FlarewrightError, ProjectError
+from ..io.exr import read_exr_colour
 from ..render.display import view
 from .view import View
 
@@ -141,9 +142,17 @@ def read_plate(path: str, changed_ns: int, size_px: tuple[int, int]) -> Floats:
     width, height = size_px
     high, wide = linear.shape[:2]
     zoom = max(width / wide, height / high)
-    rows = np.clip(((np.arange(height) + 0.5 - height / 2) / zoom + high / 2).astype(int), 0, high - 1)
-    columns = np.clip(((np.arange(width) + 0.5 - width / 2) / zoom + wide / 2).astype(int), 0, wide - 1)
-    return np.ascontiguousarray(linear[rows[:, None], columns[None, :]])
+    left, top = (wide - width / zoom) / 2.0, (high - height / zoom) / 2.0
+    box = (max(left, 0.0), max(top, 0.0), min(wide - left, wide), min(high - top, high))
+    # every pixel is the mean of what it covers: fine detail of a large plate must not flicker into steps
+    return np.stack([_scaled(linear[..., channel], size_px, box) for channel in range(3)], axis=-1)
+
+
+def _scaled(plane: Floats, size_px: tuple[int, int], box: tuple[float, float, float, float]) -> Floats:
+    from PIL import Image
+
+    scaled = Image.fromarray(np.ascontiguousarray(plane)).resize(size_px, Image.Resampling.BILINEAR, box=box)
+    return np.asarray(scaled, dtype=np.float32)
 
 
 def plate_for(look: View, size_px: tuple[int, int]) -> Floats | None:
@@ -162,20 +171,25 @@ def _read_image(path: Path) -> Floats:
 
     try:
         with Image.open(path) as image:
-            coded = np.asarray(image.convert("RGB"), dtype=np.float32) / 255.0
+            # grey of 16 bits has modes of its own, which become white where they are taken for 8 bits
+            if image.mode.startswith("I"):
+                grey = np.asarray(image, dtype=np.float32) / 65535.0
+                return _linear(np.repeat(grey[..., None], 3, axis=2))
+            return _linear(np.asarray(image.convert("RGB"), dtype=np.float32) / 255.0)
     except (OSError, UnidentifiedImageError, ValueError):
         raise ProjectError(f"{path.name} is no picture that can be read; give an EXR, PNG or JPEG file") from None
+
+
+def _linear(coded: Floats) -> Floats:
+    """Undo the curve of sRGB."""
     return np.where(coded <= 0.04045, coded / 12.92, ((coded + 0.055) / 1.055) ** 2.4).astype(np.float32)
 
 
 def _read_exr(path: Path) -> Floats:
-    import OpenEXR
-
     try:
-        channels = OpenEXR.File(str(path), separate_channels=True).channels()
-        return np.stack([np.asarray(channels[c].pixels, dtype=np.float32) for c in "RGB"], axis=-1)
-    except (RuntimeError, OSError, KeyError, ValueError):
-        raise ProjectError(f"{path.name} is no EXR picture with channels R, G and B") from None
+        return read_exr_colour(path)
+    except (OSError, ValueError) as error:
+        raise ProjectError(f"{path.name}: this cannot be read as a background ({error})") from None
 
 
 def jpeg(pixels: NDArray[np.uint8], quality: int = 82) -> bytes:

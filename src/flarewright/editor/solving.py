@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
 
@@ -20,7 +20,7 @@ from ..design.report import verdict
 from ..design.search import State, solve
 from ..design.target import problem_of
 from ..errors import FlarewrightError
-from ..model import AsLens, Lens, Project
+from ..model import AsLens, PerRow, Project, Surface
 from .edit_wishes import clear_wishes
 from .session import Session
 from .shown import jpeg, pixels_of
@@ -41,16 +41,22 @@ class Found:
 
     Attributes
     ----------
-    lens : Lens
+    changes : dict
+        What it changes in the project: the lens, or its coatings.
     words : str
         How well it does.
     picture : bytes
         JPEG.
     """
 
-    lens: Lens
+    changes: dict[str, Any]
     words: str
     picture: bytes
+
+    def taken(self, project: Project) -> Project:
+        """Return a project with it; its wishes are fulfilled and go."""
+        found: Project = clear_wishes(project).replace(**self.changes)
+        return found
 
 
 @dataclass(frozen=True)
@@ -80,14 +86,14 @@ class Solver:
         self._ready = threading.Event()
         self._thread: threading.Thread | None = None
 
-    def start(self, seconds: float, exposure_stops: float) -> None:
+    def start(self, seconds: float) -> None:
         """Begin to search lenses for the project's wishes; what cannot be searched for is refused at once."""
         self.stop()
         project = self.session.project
         problem, settled = problem_of(project)
-        self._begin(partial(self._search, project, problem, settled.lens.name, seconds, exposure_stops))
+        self._begin(partial(self._search, project, problem, settled.lens.name, seconds))
 
-    def start_colors(self, kind: str, exposure_stops: float) -> None:
+    def start_colors(self, kind: str) -> None:
         """Begin to search coatings for the wished colours."""
         self.stop()
         project = self.session.project
@@ -98,8 +104,11 @@ class Solver:
             ready.set()
             found = solve_colors(problem)
             new = coated(lens, problem.structure, films, found.values)
+            # the glass stays as it was, and so do opening and zoom
+            worn = tuple(row.coating if isinstance(row, Surface) else None for row in new.rows)
             words = "Coatings for the wished colours"
-            self._tell(False, words, 0.0, (Found(new, words, self._thumb(project, new, exposure_stops)),))
+            changes = {"lens": project.lens, "coating": PerRow(coatings=worn)}
+            self._tell(False, words, 0.0, (_found(project, changes, words),))
 
         self._begin(work)
 
@@ -115,14 +124,11 @@ class Solver:
             self._tell(False, "Stopped before the search began", 0.0, self.progress.found)
 
     def accept(self, number: int) -> None:
-        """Take a lens that was found; the wishes are fulfilled and go."""
+        """Take what was found, in the project as it stands now."""
         found = self.progress.found
         if not 0 <= number < len(found):
             return
-        project = clear_wishes(self.session.project)
-        self.session.put(
-            project.replace(lens=found[number].lens, coating=AsLens(), f_number=None, zoom=None), "Accept a found lens"
-        )
+        self.session.put(found[number].taken(self.session.project), "Accept what was found")
 
     def _begin(self, work: Callable[[threading.Event, threading.Event], None]) -> None:
         stop, ready = self._stop, self._ready = threading.Event(), threading.Event()
@@ -139,7 +145,7 @@ class Solver:
         self._thread.start()
 
     def _search(
-        self, project: Project, problem: Problem, name: str, seconds: float, exposure_stops: float,
+        self, project: Project, problem: Problem, name: str, seconds: float,
         stop: threading.Event, ready: threading.Event,
     ) -> None:  # fmt: skip
         compile_kernels(problem.objective.picture is not None)
@@ -154,12 +160,12 @@ class Solver:
             if now - looked < LOOK_EVERY_S:
                 return
             looked = now
-            best = self._found(project, problem, state, 1, name, exposure_stops, stop.is_set)
+            best = self._found(project, problem, state, 1, name, stop.is_set)
             self._tell(True, "Searching", state.seconds, best)
 
         state = solve(problem, time_limit=seconds, progress=look, cancelled=stop.is_set)
         over = until(seconds - state.seconds, stop.is_set)
-        found = self._found(project, problem, state, CANDIDATES, name, exposure_stops, over)
+        found = self._found(project, problem, state, CANDIDATES, name, over)
         told = f"{len(found)} lenses of {state.searches} tries" if found else "No lens was found; search longer"
         proven = obstacles(problem, project)
         if proven:
@@ -167,7 +173,7 @@ class Solver:
         self._tell(False, told, state.seconds, found)
 
     def _found(
-        self, project: Project, problem: Problem, state: State, count: int, name: str, exposure_stops: float,
+        self, project: Project, problem: Problem, state: State, count: int, name: str,
         over: Over,
     ) -> tuple[Found, ...]:  # fmt: skip
         best = outcomes(state, problem, count=count, name=f"After {name}", iris=project.iris, over=over)
@@ -175,16 +181,17 @@ class Solver:
         for one in best:
             worst = max(abs(float(value)) for value in one.residuals.ravel())
             words = f"{verdict(one)}, off by {worst:.3g} mm at most"
-            out.append(Found(one.lens, words, self._thumb(project, one.lens, exposure_stops)))
+            changes = {"lens": one.lens, "coating": AsLens(), "f_number": None, "zoom": None}
+            out.append(_found(project, changes, words))
         return tuple(out)
-
-    def _thumb(self, project: Project, lens: Lens, exposure_stops: float) -> bytes:
-        del exposure_stops
-        shot = clear_wishes(project).replace(lens=lens, coating=AsLens(), f_number=None, zoom=None)
-        picture = take(shot, "draft", View(), scale=THUMB_SCALE)
-        light = light_of(picture, Held())
-        return jpeg(pixels_of(light, exposure_of(picture), View()), 85)
 
     def _tell(self, running: bool, words: str, seconds: float, found: tuple[Found, ...]) -> None:
         self.progress = Progress(running, words, seconds, found, self.progress.number + 1)
         self.session.tell({"type": "solve"})
+
+
+def _found(project: Project, changes: dict[str, Any], words: str) -> Found:
+    """Draw what was found, small."""
+    found = Found(changes, words, b"")
+    picture = take(found.taken(project), "draft", View(), scale=THUMB_SCALE)
+    return replace(found, picture=jpeg(pixels_of(light_of(picture, Held()), exposure_of(picture), View()), 85))

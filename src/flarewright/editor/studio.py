@@ -32,6 +32,7 @@ SOON_WAVELENGTHS = 5
 # its faintest ghosts are left out that carry together no more than this part of all ghost light
 SOON_CULL = 3e-3
 SOON_TOLERANCE_PX = 0.5
+NO_RINGS = "the screen leaves out rings inside ghosts, which take minutes through an image or dirt; files have them"
 # gains of a draft's ghosts: their step, the least and the largest
 # (one that a rim hides now may come out as the hand goes on, so it is never dimmed altogether)
 STEP, LEAST, MOST = 2.0**0.25, 2.0**-1.5, 2.0
@@ -97,6 +98,8 @@ def staged(project: Project, grade: Grade, scale: float = 1.0) -> Project:
     if grade in ("soon", "final"):
         # reference quality is for files: it never ends
         quality = own.replace(mode="final") if own.mode != "final" else own
+        if _rings_take_minutes(project):
+            quality = quality.replace(ringing="off")
         if grade == "soon":
             few = min(quality.wavelengths, SOON_WAVELENGTHS)
             quality = quality.replace(wavelengths=few, bridge=True, ringing="off", cull=max(quality.cull, SOON_CULL))
@@ -106,6 +109,14 @@ def staged(project: Project, grade: Grade, scale: float = 1.0) -> Project:
     output = Output(layers="passes", starburst=project.output.starburst)
     found: Project = project.replace(camera=camera, quality=quality, output=output)
     return found
+
+
+def _rings_take_minutes(project: Project) -> bool:
+    """Tell whether a project's rings are out of reach of a screen: through an image each is a wave on a grid."""
+    lens = project.lens
+    iris = project.iris if project.iris is not None or isinstance(lens, str) else lens.iris
+    image = iris is not None and iris.mask is not None
+    return project.quality.ringing != "off" and (image or (project.dirt.in_ghosts and not project.dirt.clean))
 
 
 @lru_cache(maxsize=8)
@@ -159,7 +170,10 @@ def take(
     parts = [layer for layer in rendering.layers if layer.name != "beauty"]
     ghosts = spread([layer for layer in parts if layer.name.startswith("ghosts")], size)
     rest = spread([layer for layer in parts if not layer.name.startswith("ghosts")], size)
-    return Picture(project, grade, ghosts, rest, time.perf_counter() - begun, rendering.remarks)
+    told = rendering.remarks
+    if grade == "final" and _rings_take_minutes(stage.replace(quality=project.quality)):
+        told = (*told, NO_RINGS)
+    return Picture(project, grade, ghosts, rest, time.perf_counter() - begun, told)
 
 
 def moving_stage(project: Project, scale: float, levels: Levels) -> Project:

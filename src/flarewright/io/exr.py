@@ -211,6 +211,38 @@ def read_exr_plane(path: str | PathLike[str], choices: Sequence[Sequence[str]]) 
     ValueError
         When it has no such channels.
     """
+    part, names = _part_with(path, choices)
+    return _over_display(part, np.mean([np.asarray(part.channels[name].pixels, float) for name in names], axis=0))
+
+
+def read_exr_colour(path: str | PathLike[str]) -> NDArray[np.float32]:
+    """Read the colours of any EXR file, over its display window.
+
+    Parameters
+    ----------
+    path : path
+        With channels R, G and B, or a single one, or Y, which is grey.
+
+    Returns
+    -------
+    ndarray, shape (H, W, 3), float32
+        Black outside the data window, and where a value is no number or infinite.
+
+    Raises
+    ------
+    OSError
+        When it is no readable EXR file.
+    ValueError
+        When it has no such channels.
+    """
+    part, names = _part_with(path, (("R", "G", "B"), ("Y",)))
+    planes = [_over_display(part, np.asarray(part.channels[name].pixels, dtype=np.float64)) for name in names]
+    colours = np.stack(planes if len(planes) == 3 else [planes[0]] * 3, axis=-1).astype(np.float32)
+    return np.where(np.isfinite(colours), colours, np.float32(0.0))
+
+
+def _part_with(path: str | PathLike[str], choices: Sequence[Sequence[str]]) -> tuple[Any, Sequence[str]]:
+    """Find the part and the names of the first choice that a file has; a single channel may have any name."""
     import OpenEXR
 
     try:
@@ -223,11 +255,14 @@ def read_exr_plane(path: str | PathLike[str], choices: Sequence[Sequence[str]]) 
     if not found:
         told = " or ".join("".join(names) for names in choices)
         raise ValueError(f"it has no channel {told}; its channels are {', '.join(known[:8]) or 'none'}")
-    part, names = found[0]
+    return found[0]
+
+
+def _over_display(part: Any, pixels: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Lay a plane of the data window on the display window, 0 outside."""
     low, high = part.header["displayWindow"]
     left, top = (int(a) - int(b) for a, b in zip(part.header["dataWindow"][0], low, strict=True))
     width, height = (int(b) - int(a) + 1 for a, b in zip(low, high, strict=True))
-    pixels = np.mean([np.asarray(part.channels[name].pixels, dtype=np.float64) for name in names], axis=0)
     plane = np.zeros((height, width))
     inside = pixels[max(-top, 0) : max(height - top, 0), max(-left, 0) : max(width - left, 0)]
     top, left = max(top, 0), max(left, 0)

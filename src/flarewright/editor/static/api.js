@@ -30,8 +30,8 @@ async function send(path, body) {
 
 export const sentence = (text) => {
   const plain = String(text).trim();
-  // a file keeps its name as it is
-  const name = /^\S+\.\w+\b/.test(plain);
+  // a file keeps its name as it is, and so does a field
+  const name = /^\S+[._]\w+\b/.test(plain);
   return (name ? plain.charAt(0) : plain.charAt(0).toUpperCase()) + plain.slice(1) + (/[.!?]$/.test(plain) ? '' : '.');
 };
 

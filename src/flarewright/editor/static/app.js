@@ -23,6 +23,7 @@ function take(state) {
   const old = app.state;
   // what is told of the picture on its own may come before an answer that is older
   if (old && old.picture.number > state.picture.number) state.picture = old.picture;
+  Object.assign(state.view, asked);
   app.state = state;
   app.light = Math.min(app.light, state.lights.length - 1);
   const shot = (s) => JSON.stringify([s.lights, s.lens, s.camera, s.iris, s.dirt, s.coating, s.pass_gain, s.by_hand, s.view.grey, s.view.unclipped]);
@@ -65,7 +66,19 @@ app.lively = (name, values, group, key = name) => {
   if (!slow.has(key)) slow.set(key, latest((...asked) => app.deed(...asked).catch(() => {})));
   slow.get(key)(name, values, group);
 };
-app.setView = latest(async (values) => take(await post('/api/view', values)));
+// Keys come faster than answers: the page knows at once what was asked for, and nothing that was asked is dropped.
+let asked = {};
+const sendView = latest(async () => {
+  const values = asked;
+  asked = {};
+  if (Object.keys(values).length) take(await post('/api/view', values));
+});
+app.setView = (values) => {
+  Object.assign(asked, values);
+  Object.assign(app.state.view, values);
+  if (Number.isFinite(values.exposure_stops)) app.state.view.stops = values.exposure_stops;
+  return sendView();
+};
 app.ask = async (path, body) => { try { const state = await post(path, body); take(state); return state; } catch (error) { complain(error); return null; } };
 
 // ------------------------------------------------------------------------------------------------------------- ghosts
@@ -136,11 +149,35 @@ function trim(svg) {
   svg.querySelectorAll('text').forEach((text) => { if (Number(text.getAttribute('y')) > height - 30) text.remove(); });
   svg.querySelectorAll('line').forEach((each) => { if (Number(each.getAttribute('y1')) > height - 30) each.remove(); });
   // as large as the strip allows
+  const names = [...svg.querySelectorAll('text')];
+  names.forEach((text) => text.remove());
   const box = svg.getBBox();
   const clip = svg.querySelector('clipPath rect');
   const top = Math.max(box.y, clip ? Number(clip.getAttribute('y')) : 0);
   const low = Math.min(box.y + box.height, clip ? Number(clip.getAttribute('y')) + Number(clip.getAttribute('height')) : height);
-  svg.setAttribute('viewBox', `${Math.max(0, box.x) - 4} ${top - 2} ${Math.min(box.width, width) + 8} ${low - top + 4}`);
+  const [left, wide] = [Math.max(0, box.x) - 4, Math.min(box.width, width) + 8];
+  // row numbers are as large as all other words, whatever the scale; those of close rows step up
+  const [across, down] = [drawing.clientWidth - 20, drawing.clientHeight - 4];
+  let scale = Math.min(across / wide, down / (low - top + 6));
+  let rows = [];
+  for (let round = 0; round < 2; round++) {
+    rows = [];
+    for (const text of names) {
+      const x = Number(text.getAttribute('x')) * scale;
+      const free = rows.findIndex((end) => x - end > 6.2 * text.textContent.length + 2);
+      text.dataset.row = free < 0 ? rows.push(x) - 1 : free;
+      rows[text.dataset.row] = x;
+    }
+    scale = Math.min(across / wide, (down - 11 * rows.length) / (low - top + 6));
+  }
+  const size = 10.5 / scale;
+  for (const text of names) {
+    text.setAttribute('y', top - 2 - 1.02 * size * Number(text.dataset.row));
+    text.style.fontSize = `${size}px`;
+    svg.append(text);
+  }
+  const over = 1.05 * size * rows.length;
+  svg.setAttribute('viewBox', `${left} ${top - 2 - over} ${wide} ${low - top + 4 + over}`);
 }
 export function facts(state) {
   const { facts: f, name } = state.lens;
@@ -245,7 +282,7 @@ const GRADES = { moving: 'moving', draft: 'draft, by matrices', soon: 'by traced
 const FIRST = 'drawing the first picture; the very first on a machine takes some ten seconds';
 function status() {
   const { picture, frame, camera } = app.state;
-  grade.textContent = `${GRADES[picture.grade] ?? FIRST}${picture.seconds ? ` · ${Math.round(picture.seconds * 1000)} ms` : ''}`;
+  grade.textContent = `${GRADES[picture.grade] ?? FIRST}${picture.seconds ? ` · ${picture.seconds < 1 ? `${Math.round(picture.seconds * 1000)} ms` : `${picture.seconds.toFixed(1)} s`}` : ''}`;
   size.textContent = `${camera.size_px.join(' × ')} px · ${frame.sensor.map((mm) => Number(mm.toFixed(2))).join(' × ')} mm`;
   remark.textContent = app.state.remarks.join(' · ');
   remark.title = app.state.remarks.join('\n');

@@ -1,6 +1,6 @@
 // Coatings: of the whole lens, of one row, and the colours that a ghost can have.
 import { latest } from './api.js';
-import { button, choice, entry, group, h, slider } from './ui.js';
+import { button, choice, entry, group, h, refill, slider } from './ui.js';
 
 const KNOWN = [['lens', 'as the lens file says'], ['none', 'bare glass'], ['quarter-wave:550', 'quarter wave at 550 nm'], ['quarter-wave:450', 'quarter wave at 450 nm'], ['uncoated-1930s', 'uncoated, 1930s'], ['single-1950s', 'single film, 1950s'], ['early-multicoat', 'early multicoat'], ['modern-broadband', 'modern broadband']];
 const KINDS = [['none', 'bare glass'], ['quarter-wave', 'quarter wave'], ['film', 'free film'], ['uncoated-1930s', 'uncoated, 1930s'], ['single-1950s', 'single film, 1950s'], ['early-multicoat', 'early multicoat'], ['modern-broadband', 'modern broadband']];
@@ -72,7 +72,7 @@ export function coatingPanel(app) {
     update(state) {
       whole.update(state);
       const here = row();
-      rows.replaceChildren(...surfaces(state).map((each) => button(String(each.row), () => { app.row = each.row; app.panels.coating.update(app.state); }, { kind: each.row === here ? 'on' : '', tip: each.coating || 'no coating' })));
+      refill(rows, surfaces(state).map((each) => button(String(each.row), () => { app.row = each.row; app.panels.coating.update(app.state); }, { kind: each.row === here ? 'on' : '', tip: each.coating || 'no coating' })));
       for (const part of [kinds, quarter, index, thick, field]) part.update(state);
       const { kind } = worn(state);
       quarter.element.hidden = kind !== 'quarter-wave';

@@ -23,6 +23,7 @@ export function ghostPanel(app) {
   };
   const tint = h('input', { type: 'color' });
   const hex = (rgb) => `#${rgb.map((part) => Math.round(255 * Math.min(1, part) ** (1 / 2.2)).toString(16).padStart(2, '0')).join('')}`;
+  const white = (rgb) => rgb.every((part) => part === 1);
   tint.addEventListener('change', () => {
     const linear = [1, 3, 5].map((k) => Number(((parseInt(tint.value.slice(k, k + 2), 16) / 255) ** 2.2).toFixed(4)));
     setGhost({ tint: linear });
@@ -42,16 +43,26 @@ export function ghostPanel(app) {
     bar.style.width = `${Math.max(1, 110 * Math.sqrt(ghost.share))}px`;
     const element = h('tr', { class: `${ghost.name === app.ghost ? 'chosen' : ''} ${muted ? 'muted' : ''}`, 'data-ghost': ghost.name, tabindex: 0 },
       h('td', {}, ghost.name), h('td', { style: 'text-align:left' }, bar, ` ${(100 * ghost.share).toPrecision(2) < 0.01 ? '<0.01' : Number((100 * ghost.share).toPrecision(2))} %`), h('td', {}, ghost.size.toFixed(2)),
-      h('td', {}, ghost.muted ? 'muted' : ghost.gain !== 1 ? `× ${Number(ghost.gain.toPrecision(3))}` : ''));
+      h('td', {}, ghost.muted ? 'muted' : ghost.gain !== 1 ? `× ${Number(ghost.gain.toPrecision(3))}` : '', white(ghost.tint) ? null : h('i', { class: 'tint', style: `background:${hex(ghost.tint)}`, title: 'tinted' })));
     element.addEventListener('click', () => app.choose(ghost.name === app.ghost ? null : ghost.name));
-    element.addEventListener('keydown', (event) => { if (event.key === 'Enter') app.choose(ghost.name); });
+    element.addEventListener('keydown', (event) => {
+      if (event.key === 'Enter') app.choose(ghost.name);
+      const next = { ArrowDown: element.nextSibling, ArrowUp: element.previousSibling }[event.key];
+      if (next) { event.preventDefault(); next.focus(); }
+    });
+    // what the mouse shows, the keyboard shows too
+    element.addEventListener('focus', () => { if (element.matches(':focus-visible')) app.view.hoverGhost(ghost.name); });
+    element.addEventListener('blur', () => app.view.hoverGhost(null));
     element.addEventListener('pointerenter', () => { element.classList.add('over'); app.view.hoverGhost(ghost.name); });
     element.addEventListener('pointerleave', () => { element.classList.remove('over'); app.view.hoverGhost(null); });
     return element;
   }
   function draw() {
     heads.forEach((head_, k) => { head_.textContent = COLUMNS[k][1] + (by === COLUMNS[k][0] ? (down ? ' ▾' : ' ▴') : ''); });
+    const held = document.activeElement?.dataset?.ghost;
     body.replaceChildren(...sorted().map(line));
+    // the keyboard goes with the ghost, wherever the order puts it
+    if (held !== undefined) [...body.children].find((each) => each.dataset.ghost === held)?.focus({ preventScroll: true });
     body.querySelector('.chosen')?.scrollIntoView({ block: 'nearest' });
   }
   const self = {

@@ -11,7 +11,7 @@ const COLUMNS = [
   ['semi_diameter', 'Semi', 'Half the clear diameter, mm: rims cut ghosts. In italics: estimated.'],
   ['coating', 'Coating', 'none, quarter-wave:550, film:1.38:96, early-multicoat… What is coated well makes faint ghosts.'],
 ];
-const WIDTHS = ['22px', '57px', '48px', '58px', '50px', '36px', '54px', ''];
+const WIDTHS = ['22px', '57px', '55px', '58px', '50px', '36px', '54px', ''];
 
 export function lensPanel(app) {
   const body = h('tbody');
@@ -92,7 +92,7 @@ export function lensPanel(app) {
   const add = button('Add row', rowDeed('add_row'), { tip: 'A plane surface behind the chosen row, in the middle of its gap.', id: 'add-row' });
   const copy = button('Duplicate', rowDeed('duplicate_row'), { tip: 'The same surface once more behind the chosen row.' });
   const remove = button('Remove', rowDeed('remove_row'), { id: 'remove-row', tip: 'Take the chosen row out; the gap in front of it takes its room.' });
-  const stop = button('Make it the stop', rowDeed('move_stop'), { tip: 'The iris moves there: which ghosts it bounds, and so their size, changes. The old stop is taken out.' });
+  const stop = button('Stop here', rowDeed('move_stop'), { id: 'move-stop', tip: 'The iris moves into the air in front of the chosen row, or behind it where in front is glass. The lens stays as sharp; which rays pass, and so the size of its ghosts, changes.' });
   const own = group('Lens', [
     entry({ label: 'Name', tip: 'Of the lens.', words: true, name: 'lens_name', get: (s) => s.lens.name, set: (name) => name && app.deed('set_lens_facts', { values: { name } }).catch(() => {}) }),
     entry({ label: 'Wide open', tip: 'The smallest f-number: sets how far the stop opens.', name: 'open', get: (s) => s.lens.open, set: (f_number) => f_number && app.deed('set_lens_facts', { values: { f_number } }).catch(() => {}) }),

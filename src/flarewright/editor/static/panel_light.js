@@ -1,11 +1,21 @@
 // Lights, camera, view.
 import { holdoutGroup } from './group_holdout.js';
 import { pathGroup } from './group_path.js';
-import { button, choice, entry, group, h, slider, tick } from './ui.js';
+import { button, choice, entry, group, h, refill, slider, tick } from './ui.js';
 
 const SPECTRA = [['d65', 'Daylight D65'], ['equal-energy', 'Equal energy'], ['black-body:3200', 'Tungsten 3200 K'], ['black-body:5600', 'Black body 5600 K'], ['black-body:2000', 'Candle 2000 K'], ['lines:589.0,589.6', 'Sodium lamp'], ['rgb:1,0.25,0.1', 'Red light'], ['rgb:0.15,0.4,1', 'Blue light']];
-const SENSORS = [['', 'as stated'], ['36x24', 'Full frame 36 × 24'], ['36x20.25', 'Full frame 16:9'], ['24.89x18.66', 'Super 35 4-perf'], ['23.6x15.7', 'APS-C'], ['17.3x13', 'Four Thirds'], ['54.12x25.58', 'Large format 65'], ['43.8x32.9', 'Medium 44 × 33']];
+const SENSORS = [['', '36 mm wide'], ['36x24', 'Full frame 36 × 24'], ['24.89x18.66', 'Super 35 4-perf'], ['23.6x15.7', 'APS-C'], ['17.3x13', 'Four Thirds'], ['54.12x25.58', 'Large format 65'], ['43.8x32.9', 'Medium 44 × 33']];
 const SIZES = [['1280x720', '1280 × 720'], ['1920x1080', '1920 × 1080'], ['2048x1080', '2K DCI'], ['3840x2160', '3840 × 2160'], ['4096x2160', '4K DCI'], ['1500x1000', '3:2 1500 × 1000'], ['1440x1080', '4:3 1440 × 1080'], ['1080x1080', 'Square'], ['2048x858', '2.39:1']];
+
+// As much of a sensor as has the picture's shape, so that pixels are square.
+const cropped = ([width, height], [across, down]) => (width * down > height * across ? [height * across / down, height] : [width, width * down / across]);
+const pair = (text) => text.split('x').map(Number);
+function sensorOf({ sensor_mm: own, size_px: size }) {
+  if (!own) return '';
+  const known = SENSORS.find(([key]) => key && cropped(pair(key), size).every((mm, axis) => Math.abs(mm - own[axis]) < 0.006));
+  return known ? known[0] : own.join(' × ');
+}
+const fitted = (key, size) => cropped(pair(key), size).map((mm) => Number(mm.toFixed(3)));
 
 export function lightPanel(app) {
   const one = (state) => state.lights[app.light];
@@ -34,12 +44,11 @@ export function lightPanel(app) {
     slider({ label: 'Its brightness', tip: 'Stops of the background alone.', min: -8, max: 8, step: 0.1, digits: 1, unit: 'st', get: (s) => s.view.plate_stops, set: (plate_stops) => view({ plate_stops }) }),
   ]);
   const camera = (values, held = '') => app.lively('set_camera', { values }, held, `camera${Object.keys(values)}`);
-  const pair = (text) => text.split('x').map(Number);
   const shot = group('Camera', [
     slider({ label: 'f-number', tip: 'Closing the iris makes the ghosts that it bounds smaller, each with the same brightness; the starburst grows.', min: 0.7, max: 32, step: 0.1, digits: 1, curve: 2, name: 'f_number', get: (s) => s.lens.f_number ?? s.lens.open, set: (value, held) => app.lively('set_fields', { values: { f_number: Math.max(value, app.state.lens.open ?? value) } }, held) }),
     choice({ label: 'Zoom position', tip: 'The positions that the lens file knows: gaps between its groups change.', options: (s) => [['', 'as its rows stand'], ...(s.lens.positions ?? []).map((name) => [name, name])], get: (s) => s.lens.zoom ?? '', set: (zoom) => app.deed('set_fields', { values: { zoom: zoom || null } }).catch(() => {}) }),
-    choice({ label: 'Picture', tip: 'Pixels of the rendered file; the viewport shows its shape.', name: 'size', options: SIZES, get: (s) => s.camera.size_px.join('x'), set: (text) => camera({ size_px: pair(text).map(Math.round) }) }),
-    choice({ label: 'Sensor', tip: 'Millimetres that the picture covers: a smaller sensor sees a smaller part of the same flare.', name: 'sensor', options: SENSORS, get: (s) => (s.camera.sensor_mm ? s.camera.sensor_mm.join('x') : ''), set: (text) => camera({ sensor_mm: text ? pair(text) : null }) }),
+    choice({ label: 'Picture', tip: 'Pixels of the rendered file; the viewport shows its shape.', name: 'size', options: SIZES, get: (s) => s.camera.size_px.join('x'), set: (text) => { const size = pair(text).map(Math.round); const key = sensorOf(app.state.camera); camera({ size_px: size, ...(SENSORS.some(([known]) => known && known === key) ? { sensor_mm: fitted(key, size) } : {}) }); } }),
+    choice({ label: 'Sensor', tip: 'A smaller sensor sees a smaller part of the same flare. As much of it is used as has the shape of the picture.', name: 'sensor', options: SENSORS, get: (s) => sensorOf(s.camera), set: (key) => camera({ sensor_mm: key ? fitted(key, app.state.camera.size_px) : null }) }),
     entry({ label: 'Focus distance', tip: 'Plane in focus in front of the lens; focusing moves the sensor, and the ghosts with it.', unit: 'mm', placeholder: 'infinity', get: (s) => s.camera.focus_distance, set: (focus_distance) => camera({ focus_distance }) }),
     slider({ label: 'Sensor reflects', tip: 'The sensor mirrors light back into the lens, which makes ghosts of its own.', min: 0, max: 0.3, step: 0.005, digits: 3, get: (s) => s.camera.sensor_reflectance, set: (sensor_reflectance, held) => camera({ sensor_reflectance }, held) }),
   ]);
@@ -53,9 +62,9 @@ export function lightPanel(app) {
   return {
     element: h('div', {}, lights.element, path.element, shot.element, seeing.element, hiding.element, work.element),
     update(state) {
-      choose.replaceChildren(...state.lights.map((light, k) => button(light.name === 'light' ? `Light ${k + 1}` : light.name, () => { app.chooseLight(k); app.panels.light.update(app.state); app.view.redraw(); }, { kind: k === app.light ? 'on' : '', tip: 'The light that the controls below, the arrow keys and a drag of the picture move.' })),
+      refill(choose, [...state.lights.map((light, k) => button(light.name === 'light' ? `Light ${k + 1}` : light.name, () => { app.chooseLight(k); app.panels.light.update(app.state); app.view.redraw(); }, { kind: k === app.light ? 'on' : '', tip: 'The light that the controls below, the arrow keys and a drag of the picture move.' })),
         button('+', () => app.deed('add_light', {}).catch(() => {}), { kind: 'quiet', tip: 'Add a light.' }),
-        button('Remove', () => app.deed('remove_light', { light: app.light }).catch(() => {}), { kind: 'quiet', disabled: state.lights.length < 2, tip: 'Take the chosen light away; one always stays.' }));
+        button('Remove', () => app.deed('remove_light', { light: app.light }).catch(() => {}), { kind: 'quiet', disabled: state.lights.length < 2, tip: 'Take the chosen light away; one always stays.' })]);
       for (const part of [lights, path, shot, seeing, hiding, work]) part.update(state);
     },
     moved(angles) {

@@ -1,5 +1,5 @@
 // Annotate and solve: what the ghosts shall be, and the lenses that make them so.
-import { button, choice, entry, group, h, row, slider, tick } from './ui.js';
+import { button, choice, entry, group, h, refill, row, slider, tick } from './ui.js';
 
 const COMPARE = [
   ['physical', 'Physical', 'What the lens does (W walks through these four).'], ['target', 'Target', 'The picture as it is wished for: no lens makes it yet.'],
@@ -56,7 +56,7 @@ export function targetPanel(app) {
       const chosen = app.wish !== null || Boolean(own());
       told.textContent = app.ghost && !own() && app.wish === null ? `Ghost ${app.ghost} reflects on both sides of the stop; design moves those that reflect twice on one side.`
         : chosen ? 'Drag it along the line, or its rim to resize it.' : 'Click a ghost to say what it shall become.';
-      list.replaceChildren(...(state.design?.wishes ?? []).map((wish, number) => button(wish.ghost ?? `new ${number + 1}`, () => (wish.ghost ? app.choose(wish.ghost) : app.chooseWish(number)), { kind: (wish.ghost ? wish.ghost === app.ghost && app.wish === null : number === app.wish) ? 'on' : '' })));
+      refill(list, (state.design?.wishes ?? []).map((wish, number) => button(wish.ghost ?? `new ${number + 1}`, () => (wish.ghost ? app.choose(wish.ghost) : app.chooseWish(number)), { kind: (wish.ghost ? wish.ghost === app.ghost && app.wish === null : number === app.wish) ? 'on' : '' })));
       fields.element.hidden = !chosen;
       if (chosen) fields.update(state);
       drop.classList.toggle('on', mine()?.action === 'remove');

@@ -12,6 +12,13 @@ export function h(tag, attributes = {}, ...children) {
   return element;
 }
 
+// Puts other children in, and leaves the keyboard where it was: on the one that stands in the same place.
+export function refill(parent, children) {
+  const before = [...parent.children].findIndex((child) => child === document.activeElement);
+  parent.replaceChildren(...children);
+  if (before >= 0) parent.children[Math.min(before, parent.children.length - 1)]?.focus({ preventScroll: true });
+}
+
 let strokes = 0;
 export const stroke = () => `s${Date.now().toString(36)}${strokes++}`;
 
@@ -140,14 +147,18 @@ export function menu(anchor, entries) {
   document.querySelector('.menu')?.remove();
   const place = anchor.getBoundingClientRect();
   const box = h('div', { class: 'menu', role: 'menu' }, ...entries.map(([words, work, tip]) =>
-    h('button', { role: 'menuitem', type: 'button', tip, onclick: () => { box.remove(); work(); } }, words)));
+    h('button', { role: 'menuitem', type: 'button', tip, onclick: () => { box.remove(); anchor.focus(); work(); } }, words)));
   box.style.left = `${place.left}px`;
   box.style.top = `${place.bottom + 3}px`;
   document.body.append(box);
   box.firstChild?.focus();
   const shut = (event) => {
-    if (event.type === 'keydown' && event.key !== 'Escape') return;
+    const entry = [...box.children].indexOf(document.activeElement);
+    const step = { ArrowDown: 1, ArrowUp: -1 }[event.key];
+    if (box.isConnected && step) { event.preventDefault(); event.stopPropagation(); box.children[(entry + step + box.children.length) % box.children.length].focus(); return; }
+    if (box.isConnected && event.type === 'keydown' && !['Escape', 'Tab'].includes(event.key)) return;
     if (event.type === 'pointerdown' && box.contains(event.target)) return;
+    if (event.type === 'keydown' && box.isConnected) { anchor.focus(); if (event.key === 'Escape') event.stopPropagation(); }
     box.remove();
     removeEventListener('pointerdown', shut, true);
     removeEventListener('keydown', shut, true);
