@@ -39,18 +39,32 @@ NOISE = 1e-2
 VIEWS = 16
 # views that must show a ghost
 _LEAST_VIEWS = 8
+# every so many constellations tell which ghosts are the brightest
+_GLANCE = 8
 _ROUNDS = 200
+
+
+def brightest(setup: Setup) -> list[str]:
+    """Return the paths that give most light over the constellations and are seen at enough of them."""
+    scale = scale_of(setup)
+    some = poses(setup)[::_GLANCE]
+    light: dict[str, list[float]] = {}
+    for pose in some:
+        for name, image in ghost_layers(setup, pose, scale):
+            light.setdefault(name, []).append(float(image[..., 1].sum()))
+    often = {name: sum(seen) for name, seen in light.items() if np.count_nonzero(seen) * _GLANCE >= 2 * _LEAST_VIEWS}
+    return sorted(often, key=lambda name: -often[name])[:GHOSTS]
 
 
 def pictures_of(setup: Setup) -> tuple[list[Pose], dict[str, list[Floats | None]]]:
     """Return the poses, and of every path its green at each pose; None where it is dark."""
-    scale = scale_of(setup)
+    scale = scale_of(replace(setup, paths=()))
     every = poses(setup)
-    found: dict[str, list[Floats | None]] = {}
+    found: dict[str, list[Floats | None]] = {name: [None] * len(every) for name in setup.paths}
     for pose in every:
         for name, image in ghost_layers(setup, pose, scale):
             lit = image[..., 1].astype(np.float32)
-            found.setdefault(name, [None] * len(every))[pose.number] = lit if lit.any() else None
+            found[name][pose.number] = lit if lit.any() else None
     return every, found
 
 
@@ -70,12 +84,12 @@ def view_of(setup: Setup, pose: Pose, green: Floats | None, noise: float) -> Vie
 def isolated(lens: str, width: int, count: int, f_number: float, tell: Callable[[str], None]) -> list[dict[str, Any]]:
     """Return what came of each of a lens' brightest ghosts."""
     setup = setup_of(lens, width, count, f_number).steady
+    setup = replace(setup, paths=tuple(brightest(setup)))
     every, images = pictures_of(setup)
-    light = {name: sum(float(each.sum()) for each in some if each is not None) for name, some in images.items()}
     rows: list[dict[str, Any]] = []
-    for name in sorted(light, key=lambda each: -light[each]):
+    for name in setup.paths:
         some = images[name]
-        if sum(each is not None for each in some[::2]) < _LEAST_VIEWS or len(rows) == GHOSTS:
+        if sum(each is not None for each in some[::2]) < _LEAST_VIEWS:
             continue
         levels = [seen[2] for each in some if each is not None and (seen := footprint(each)) is not None]
         noise = NOISE * float(np.median(levels))

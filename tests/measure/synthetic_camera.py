@@ -84,6 +84,7 @@ class Setup:
     pitch_wander_deg: float = 0.02
     drift: float = 0.02
     axis_offset_px: tuple[int, int] = (3, -2)
+    paths: tuple[str, ...] = ()  # ghosts of these alone, such as "7-3"; all when empty
     seed: int = 0
 
     @property
@@ -171,6 +172,8 @@ def project_of(setup: Setup, pose: Pose, layers: str) -> fw.Project:
     pixel = setup.sensor_width_mm / width
     iris = {} if setup.blades is None else {"iris": fw.Iris(blades=setup.blades)}
     coating = {} if setup.coating is None else {"coating": _coating(setup.coating)}
+    others = f"not {','.join(setup.paths)}"
+    art = {"art": fw.Art(rules=(fw.Rule(select=others, enable=False),))} if setup.paths else {}
     return fw.Project(
         lens=setup.lens, f_number=setup.f_number, zoom=setup.zoom,
         lights=(fw.Light(field_deg=pose.field_deg, diameter_deg=setup.light_diameter_deg),),
@@ -178,7 +181,7 @@ def project_of(setup: Setup, pose: Pose, layers: str) -> fw.Project:
         quality=fw.Quality(
             mode=setup.quality, wavelengths=setup.wavelengths, tolerance_px=setup.tolerance_px, ringing="off"
         ),
-        output=fw.Output(layers=layers, starburst=layers != "ghosts"), **iris, **coating,
+        output=fw.Output(layers=layers, starburst=layers != "ghosts"), **iris, **coating, **art,
     )  # fmt: skip
 
 

@@ -104,6 +104,7 @@ def test_the_camera_file_is_checked(tmp_path):
         ("{", "not JSON"),
         ('{"gain": 1}', "gain"),
         ('{"electrons_per_unit": -1}', "electrons_per_unit"),
+        ('{"black_level": 512, "white_level": 511}', "white_level 511 is not above black_level 512"),
     ):
         path.write_text(text)
         with pytest.raises(FlarewrightError, match=word):

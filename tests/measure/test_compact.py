@@ -9,11 +9,11 @@ from scipy.interpolate import CubicSpline
 from test_track import ANGLES, drawn, thrice
 
 from flarewright.io.ghost_model_file import read_ghost_model, write_ghost_model
-from flarewright.measure.compact import compact, curves_of, held_error, numbers_in, rounded
+from flarewright.measure.compact import compact, curves_of, held_error, numbers_in, rounded, written_numbers
 from flarewright.measure.curves import Pose, posed, spline_basis, value_at
 from flarewright.measure.fit import Shape, evaluate, free_numbers, patches_of, refine, render
 from flarewright.measure.found import Found
-from flarewright.measure.numbers import channel_of
+from flarewright.measure.numbers import NUMBERS, channel_of
 from flarewright.measure.orders import needed_numbers, parabola
 from flarewright.measure.replay import replay
 from flarewright.measure.smooth import smooth_curve
@@ -131,6 +131,15 @@ def test_numbers_are_written_as_exactly_as_they_are_known():
     assert rounded(123.456789, 2.0) == 123.5
     assert rounded(0.00123456, 1e-4) == 0.001235
     assert rounded(1.0 / 3.0, 0.0) == 0.333333333
+
+
+def test_a_rim_whose_size_nothing_tells_stays_a_rim():
+    held = np.zeros(NUMBERS)
+    held[32] = 200.0
+    rimmed = shape(-50.0, 20.0, 1.0, rim=(0.9, 1.2))
+    assert written_numbers(rimmed, held)[32] == 1.2
+    held[32] = 0.02
+    assert written_numbers(rimmed, held)[32] == 1.2
 
 
 def test_wide_pictures_are_asked_in_small_and_shifts_told_in_full_pixels():

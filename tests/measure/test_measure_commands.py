@@ -92,6 +92,19 @@ def test_photographs_that_cannot_be_used_are_told(listed, tmp_path, capsys):
     assert "2 deg lacks the exposure of 0.125 s" in refused(capsys, *command)
 
 
+def test_pictures_without_light_and_a_list_without_exposures_are_told(listed, tmp_path, capsys):
+    command = ("measure", "merge", listed, "-o", tmp_path / "run")
+    text = listed.read_text()
+    listed.write_text(text.replace("exposure_s", "focal_mm"))
+    assert "does not tell its exposure_s" in refused(capsys, *command)
+    listed.write_text(text)
+    rng = np.random.default_rng(3)
+    for path in tmp_path.glob("*.npy"):
+        dark = rng.normal(CAMERA.black, 4.0, (64, 96, 3))
+        np.save(path, dark.round().clip(0).astype(np.uint16))
+    assert "no light was found" in refused(capsys, *command)
+
+
 def test_folders_and_options_that_cannot_be_used_are_told(listed, tmp_path, capsys):
     (tmp_path / "other").mkdir()
     (tmp_path / "other" / "a.txt").write_text("mine")

@@ -103,6 +103,16 @@ def test_what_is_no_linear_photograph_is_refused(tmp_path, name, content, word):
         open_photo(tmp_path / "other.npy")
 
 
+def test_pixels_that_are_no_numbers_are_refused(tmp_path):
+    pixels = np.ones((4, 5, 3), np.float32)
+    pixels[2, 1, 0] = np.nan
+    np.save(tmp_path / "a.npy", pixels)
+    photo = open_photo(tmp_path / "a.npy")
+    assert photo.rows(0, 2).shape == (2, 5, 3)
+    with pytest.raises(FlarewrightError, match="not a number"):
+        photo.rows(0, 4)
+
+
 def test_an_x_trans_mosaic_is_refused_in_a_sentence(tmp_path, mosaic):
     # Fujifilm's pattern of six by six; 0 red, 1 green, 2 blue
     rows = ("110112", "112110", "201021", "112110", "110112", "021201")

@@ -46,6 +46,9 @@ from . import (
     scene_schema,
 )
 
+# of a file's mistakes so many are listed
+_TOLD = 20
+
 app = typer.Typer(
     name="flarewright",
     help="Lens flare as physics: choose a lens, say where the light is, get a layered linear picture.",
@@ -204,6 +207,8 @@ def _usage(error: Any) -> str:
 def _fail(message: str, problems: Sequence[str] = ()) -> int:
     print(f"flarewright: error: {' '.join(message.split())}", file=sys.stderr)
     if len(problems) > 1:
-        for problem in problems:
+        for problem in problems[:_TOLD]:
             print(f"  - {problem}", file=sys.stderr)
+        if len(problems) > _TOLD:
+            print(f"  - and {len(problems) - _TOLD} more", file=sys.stderr)
     return 2

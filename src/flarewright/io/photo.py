@@ -7,6 +7,7 @@ that the noise of a pixel stays its own. Red and blue then lie a quarter of a pi
 from __future__ import annotations
 
 import struct
+import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -134,7 +135,9 @@ def photo_facts(path: Path) -> dict[str, float]:
     tags: dict[int, Any] = {}
     exif = Image.Exif()
     try:
-        with path.open("rb") as file:
+        # what is wrong with the tags of a damaged file, its decoder says in one sentence
+        with path.open("rb") as file, warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)
             exif.load_from_fp(file)
             tags = {**exif, **exif.get_ifd(_EXIF_IFD)}
     except (OSError, ValueError, SyntaxError, KeyError, TypeError, EOFError, struct.error):
@@ -184,6 +187,8 @@ def _from_array(path: Path, picture: _Picture, white_level: float | None) -> Pho
         part = load()[low:high]
         if part.ndim == 2:
             part = np.broadcast_to(part[..., None], (*part.shape, 3))
+        if dtype.kind == "f" and not np.isfinite(part[..., :3]).all():
+            raise FlarewrightError(f"{path} has pixels that are infinite or not a number: convert it again")
         return np.ascontiguousarray(part[..., :3], dtype=np.float32)
 
     return Photo(path, (shape[1], shape[0]), rows, white_level=white_level, step=0.0 if dtype.kind == "f" else 1.0)

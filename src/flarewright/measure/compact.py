@@ -10,7 +10,7 @@ from math import ceil, isfinite, log10
 
 import numpy as np
 
-from ..kernels.measure_pupil import FIRST_G
+from ..kernels.measure_pupil import DISC_NUMBERS, FIRST_DISC, FIRST_G
 from ..model.ghost_model import AberrationGhost, Channel, Curve, Curves, GhostModel
 from ..model.ghost_tracks import GhostTrack, Tracks
 from .curves import Pose
@@ -232,7 +232,7 @@ def _written(ghost: AberrationGhost, found: Found, span: tuple[float, float], cu
         deviation = None if fit is None else fit.uncertainty
         numbers = shape.numbers
         if deviation is not None:
-            numbers = np.array([rounded(float(a), float(d)) for a, d in zip(numbers, held_error(fit), strict=True)])
+            numbers = written_numbers(shape, held_error(fit))
             deviation = np.array([float(f"{d:.2g}") for d in deviation])
         colours.append(channel_of(numbers, shape.discs, deviation))
     out: AberrationGhost = ghost.replace(
@@ -240,6 +240,15 @@ def _written(ghost: AberrationGhost, found: Found, span: tuple[float, float], cu
         visible_deg=(round(span[0], 4), round(span[1], 4)),
     )  # fmt: skip
     return out
+
+
+def written_numbers(shape: Shape, held: Floats) -> Floats:
+    """Return the numbers of one colour, rounded; a rim that nothing tells the size of stays one."""
+    numbers = np.array([rounded(float(a), float(d)) for a, d in zip(shape.numbers, held, strict=True)])
+    radii = FIRST_DISC + DISC_NUMBERS * np.arange(shape.discs) + 2
+    for at in radii[numbers[radii] <= 0.0]:
+        numbers[at] = rounded(float(shape.numbers[at]), 0.0)
+    return numbers
 
 
 def held_error(fit: Fit | None) -> Floats:

@@ -195,7 +195,10 @@ def fit_transfer(points: Sequence[Transfer], camera: CameraNoise, step: float) -
     # points that scatter more than their count explains widen the errors
     covariance = covariance * max(1.0, float(np.mean((v - fitted) ** 2 * (n - 1.0) / (2.0 * fitted**2))))
     if not slope > 0.0:
-        raise FlarewrightError(f"the photographs' noise does not grow with the light, so it cannot be told; {remedy}")
+        raise FlarewrightError(
+            "the photographs' noise does not grow with the light: either no light was found in them (was the cap on?), "
+            f"or else {remedy}"
+        )
     return _as_camera(float(slope), float(floor), covariance, camera, step)
 
 

@@ -95,6 +95,12 @@ class CameraNoise(Frozen):
     electrons_per_unit_error: float | None = Field(None, ge=0.0)
     read_noise_error: float | None = Field(None, ge=0.0)
 
+    @model_validator(mode="after")
+    def _clips_above_black(self) -> CameraNoise:
+        if self.black_level is not None and self.white_level is not None and self.white_level <= self.black_level:
+            raise ValueError(f"white_level {self.white_level:g} is not above black_level {self.black_level:g}")
+        return self
+
 
 class FrameInfo(Frozen):
     """What is known of one merged frame besides its pixels.
