@@ -18,7 +18,7 @@ from benchmarks.measure.truth import footprint
 from numpy.typing import NDArray
 from synthetic_camera import Pose, Setup, ghost_layers, poses, project_of, scale_of
 
-from flarewright.kernels.measure_pupil import FIRST_I
+from flarewright.kernels.measure_pupil import FIRST_DISC, FIRST_I
 from flarewright.measure.find import rims_of
 from flarewright.measure.fit import Fit, Shape, free_numbers, patches_of, refine, render
 from flarewright.measure.grow import Growth, grow
@@ -142,7 +142,9 @@ def _fitted(start: Shape, rim: Blades | None, views: list[View]) -> Fit | None:
     if grown is None:
         return None
     patches = patches_of(grown.shape, views, 1)
-    free = free_numbers(2, grown.shape.discs, 1)
+    free = free_numbers(2, grown.shape.discs, 1, True)
+    # a rim costs three numbers, and 25 are taken: its centre moves evenly with the field
+    free = free[free != FIRST_DISC + 1]
     return refine(grown.shape, patches, free, width=views[0].size_px[0], steps=30, error=0.0) if patches else None
 
 

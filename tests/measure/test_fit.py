@@ -6,11 +6,13 @@ import numpy as np
 import pytest
 from planted_run import GHOSTS, LARGEST, NOISE, SIZE, shape, views
 
+from flarewright.kernels.measure_pupil import SOFT
 from flarewright.measure.compress import compress
 from flarewright.measure.find import Candidate, candidates, slopes_of
 from flarewright.measure.fit import Shape, free_numbers, patches_of, presence, refine, render
 from flarewright.measure.found import Found
 from flarewright.measure.grow import Growth
+from flarewright.measure.numbers import channel_numbers, channel_of
 from flarewright.measure.pursuit import pursue
 from flarewright.measure.replay import replay
 from flarewright.measure.settle import Settling, settle, to_model
@@ -42,6 +44,28 @@ def test_planted_numbers_come_back_within_their_uncertainty(planted):
     assert np.abs(pulls).max() < 4.0
     # and the uncertainty says something: places are known to a fraction of a pixel
     assert fit.uncertainty[0] < 0.5
+
+
+@pytest.mark.parametrize("variance", [0.3, 2.5])
+def test_softness_comes_back_within_its_uncertainty_and_through_a_model(variance):
+    numbers = GHOSTS[0].numbers.copy()
+    numbers[SOFT] = variance
+    planted = Shape(numbers)
+    shown = views((planted,), angles=FEW)
+    free = free_numbers(1, 0, 1, True)
+    fit = refine(
+        GHOSTS[0], patches_of(planted, shown, 1), free, width=SIZE[0], steps=30, offset=False, error=0.0
+    )  # fmt: skip
+    pulls = (fit.shape.numbers - numbers)[free] / fit.uncertainty[free]
+    assert fit.cost / fit.count == pytest.approx(1.0, abs=0.03)
+    assert np.abs(pulls).max() < 4.0
+    assert fit.uncertainty[SOFT] < 0.1
+    written = channel_of(fit.shape.numbers, 0, fit.uncertainty)
+    assert written.soft_px == pytest.approx(np.sqrt(variance), abs=0.1)
+    assert channel_numbers(written, None) == pytest.approx(fit.shape.numbers)
+    # sharp borders cannot stand in for soft ones
+    sharp = refine(GHOSTS[0], patches_of(planted, shown, 1), free[:-1], width=SIZE[0], steps=30, error=0.0)
+    assert sharp.cost > 2.0 * fit.cost
 
 
 def test_replay_equals_the_fit_at_captured_angles():

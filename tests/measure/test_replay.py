@@ -87,6 +87,15 @@ def test_roll_turns_ghosts_and_the_other_side_is_half_a_turn():
     assert np.allclose(replay(mirrored, -15.0)[0].pixels, replay(mirrored, 15.0, roll_deg=180.0)[0].pixels)
 
 
+def test_what_is_seen_where_the_captures_end_is_seen_a_degree_beyond():
+    model = planted().replace(constellation_deg=(2.0, 20.0), halo=None, star=None)
+    model = model.replace(ghosts=(model.ghosts[0].replace(visible_deg=(2.0, 20.0)),))
+    last = replay(model, 20.0)[0].pixels
+    assert replay(model, 20.5)[0].pixels.sum() == pytest.approx(last.sum(), rel=0.1)
+    with pytest.raises(FlarewrightError, match="measured from 2 to 20"):
+        replay(model, 21.5)
+
+
 def test_light_lies_where_the_tangent_says():
     assert light_px(planted(), 20.0, 90.0) == pytest.approx((80.3, 44.6 - 170.0 * np.tan(np.radians(20.0))))
 

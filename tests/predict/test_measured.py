@@ -42,6 +42,12 @@ def test_its_flare_is_the_replayed_ghosts_per_lux(file):
     assert (flare.sensor.width, flare.sensor.height) == (36.0, 20.25)
 
 
+def test_angles_of_many_digits_are_not_asked_for_beyond_the_last(tmp_path):
+    measured = planted().replace(constellation_deg=(2.0987654321, 25.2003999999))
+    write_ghost_model(tmp_path / "camera.json", measured)
+    assert run(["predict", str(tmp_path / "camera.json"), "--samples", "12", "-o", str(tmp_path / "m.html")]) == 0
+
+
 def test_curves_of_a_measured_flare(file, tmp_path, capsys):
     arguments = ["predict", str(file), "--unit-per-cd-m2", "0.02", "--luminance", "1,100", "--illuminance", "5"]
     assert run([*arguments, "-o", str(tmp_path / "m.html"), "--samples", "20", "--json"]) == 0
@@ -55,6 +61,14 @@ def test_curves_of_a_measured_flare(file, tmp_path, capsys):
     light = next(one for one in layers if one.name == "ghosts").pixels @ luminance_weights("rec709")
     assert data["veil_cd_m2"][k] == pytest.approx(light.mean() / 10.0 * 5.0 / 0.02, rel=1e-3)
     assert data["k_ratio"][k] == pytest.approx(101.0 / (101.0 + 2.0 * data["veil_cd_m2"][k]))
+
+
+def test_an_f_number_that_nobody_told_is_not_made_up(tmp_path, capsys):
+    write_ghost_model(tmp_path / "camera.json", planted(Reference()))
+    page = tmp_path / "m.html"
+    assert run(["predict", str(tmp_path / "camera.json"), "--samples", "12", "-o", str(page)]) == 0
+    assert "f-number not told" in capsys.readouterr().out
+    assert "f/nan" not in page.read_text()
 
 
 def test_without_a_unit_there_is_no_veil_to_tell(file, tmp_path, capsys):

@@ -310,7 +310,7 @@ def _print(found: Occurrence) -> None:
 
     data = occurrence_data(found)
     out = Table(
-        title=f"{found.flare.name} · f/{found.flare.f_number:.3g} · {found.frame.width:g}x{found.frame.height:g} mm",
+        title=f"{found.flare.name} · {found.flare.aperture} · {found.frame.width:g}x{found.frame.height:g} mm",
         caption="Irradiance on the sensor over the light's illuminance; the light's own image is left out.",
     )
     out.add_column("estimator")

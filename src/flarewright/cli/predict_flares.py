@@ -99,6 +99,7 @@ def model_flare(
     """
     from ..measure.replay import BEYOND_DEG, replay
     from ..predict.flare import Flare, Frame
+    from ..predict.table import DECIMALS
 
     remarks = ["star, halo and residual of the measured flare are not counted: the light's own image is in them"]
     reference = model.reference
@@ -116,6 +117,8 @@ def model_flare(
         return [layer for layer in layers if layer.name == "ghosts"]
 
     low, high = model.constellation_deg
+    # angles are asked for with so many digits: none shall lie beyond what is known
+    grid = 10.0**DECIMALS
     return Flare(
         name=name,
         draw=draw,
@@ -125,8 +128,8 @@ def model_flare(
         scene_scale=math.nan if unit_per_cd_m2 is None else unit_per_cd_m2,
         # its frame turns, but what lies beyond the captures' border was not measured
         turns_by_deg=None,
-        least_deg=max(low - BEYOND_DEG, 0.0),
-        reach_deg=high + BEYOND_DEG,
+        least_deg=max(math.ceil((low - BEYOND_DEG) * grid) / grid, 0.0),
+        reach_deg=math.floor((high + BEYOND_DEG) * grid) / grid,
         dark_beyond=False,
         fingerprint=hashlib.sha256(model.model_dump_json().encode() + str((size, unit_per_cd_m2)).encode()).hexdigest(),
         remarks=tuple(remarks),

@@ -18,6 +18,7 @@ from .measure_pupil import (
     FIRST_DISC,
     FIRST_G,
     FIRST_I,
+    SOFT,
     TERMS,
     TURN,
     at_field,
@@ -28,6 +29,7 @@ from .measure_pupil import (
     rims,
     slopes,
 )
+from .measure_soft import add_spreading, reach_of, soften, taps_of
 
 # pixels by which a chord may leave its arc, up to so many spokes
 _CHORD = 0.05
@@ -336,7 +338,20 @@ def draw_ghosts(parameters, disc_counts, visible, sigma, frame, plane):
             _densities(parameters[g], sigma, pupil, spots, densities)
         # the model's irradiance is per pixel of the model: a finer picture keeps it
         densities *= visible[g] * frame[4] * frame[4]
-        _draw_mesh(spots, densities, span, False, 0, 0, width, height, plane)
+        variance = parameters[g, SOFT] * frame[4] * frame[4]
+        if not variance > 0.0:
+            _draw_mesh(spots, densities, span, False, 0, 0, width, height, plane)
+            continue
+        # spread alone, and then laid over the others
+        left, top, w, h = _box(spots, reach_of(variance), width, height)
+        if w == 0:
+            continue
+        own = np.zeros((h, w + 1))
+        _draw_mesh(spots, densities, span, False, left, top, w, h, own)
+        _soften(own.reshape((h, w + 1, 1)), variance, spots, left, top)
+        for y in range(h):
+            for c in range(w):
+                plane[top + y, left + c] += own[y, c]
 
 
 @compiled
@@ -364,16 +379,43 @@ def window_of(parameters, disc_count, sigma, frame, width, height):
     if not _mesh(parameters, disc_count, sigma, frame, spokes, rings, False, pupil, np.empty((0, 0, 0, 0))):
         return 0, 0, 0, 0
     _land(parameters, pupil, sigma, frame, spots)
+    return _box(spots, reach_of(parameters[SOFT] * frame[4] * frame[4]), width, height)
+
+
+@inner
+def _bounds(spots):
+    """Return the least and greatest x and y where a mesh lands."""
     x0, y0, x1, y1 = 1e30, 1e30, -1e30, -1e30
-    for i in range(rings + 1):
-        for j in range(spokes):
+    for i in range(spots.shape[0]):
+        for j in range(spots.shape[1]):
             x0, x1 = min(x0, spots[i, j, 0]), max(x1, spots[i, j, 0])
             y0, y1 = min(y0, spots[i, j, 1]), max(y1, spots[i, j, 1])
-    if not (x1 > 0.0 and y1 > 0.0 and x0 < width and y0 < height):
+    return x0, y0, x1, y1
+
+
+@inner
+def _box(spots, reach, width, height):
+    """Return left, top, width and height of the pixels that a mesh touches when it is spread; width 0: none."""
+    x0, y0, x1, y1 = _bounds(spots)
+    if not (x1 > -reach and y1 > -reach and x0 < width + reach and y0 < height + reach):
         return 0, 0, 0, 0
-    left, top = max(int(floor(x0)) - 1, 0), max(int(floor(y0)) - 1, 0)
-    right, bottom = min(int(ceil(min(x1, width))) + 1, width), min(int(ceil(min(y1, height))) + 1, height)
+    left, top = max(int(floor(x0)) - 1 - reach, 0), max(int(floor(y0)) - 1 - reach, 0)
+    right = min(int(ceil(min(x1, width))) + 1 + reach, width)
+    bottom = min(int(ceil(min(y1, height))) + 1 + reach, height)
     return left, top, right - left, bottom - top
+
+
+@inner
+def _soften(differences, variance, spots, left, top):
+    """Spread a mesh that was drawn into a window, in place."""
+    taps = np.empty(reach_of(variance) + 1)
+    taps_of(variance, taps)
+    x0, y0, x1, y1 = _bounds(spots)
+    far = 1 << 20
+    soften(
+        differences, taps, int(floor(max(x0, -far))) - left - 1, int(floor(max(y0, -far))) - top - 1,
+        int(ceil(min(x1, far))) - left + 2, int(ceil(min(y1, far))) - top + 2,
+    )  # fmt: skip
 
 
 @inner
@@ -388,7 +430,9 @@ def _spot_changes(parameters, sigma, free, frame, pupil, pupil_by, spots_by):
             _, _, a_xi, a_eta, c_xi, c_eta = place(parameters, xi, eta, sigma)
             for q in range(free.size):
                 n = free[q]
-                if n < FIRST_G:
+                if n == SOFT:
+                    along, across = 0.0, 0.0
+                elif n < FIRST_G:
                     along, across = sigma * terms[n], 0.0
                 elif n < FIRST_I:
                     along, across = xi * terms[n - FIRST_G], eta * terms[n - FIRST_G]
@@ -436,6 +480,9 @@ def _triangle_changes(parameters, sigma, free, pupil, pupil_by, spots, spots_by,
     for q in range(free.size):
         n = free[q]
         flux_change = 0.0
+        if n == SOFT:
+            out[q] = 0.0
+            continue
         if FIRST_I <= n < FIRST_DISC:
             # what is below 0 is drawn as 0; its way up must show
             out[q] = -terms[n - FIRST_I] * part / area if not dark else 0.0
@@ -540,9 +587,9 @@ def draw_with_changes(parameters, disc_count, sigma, free, frame, left, top, pla
     left, top : int
         First pixel of the window.
     plane : ndarray, shape (h, w + 1), float64
-        Added to: differences along rows.
+        Zeros, and then differences along rows.
     out : ndarray, shape (h, w + 1, Q), float64
-        Added to: differences along rows of the derivatives.
+        Zeros, and then differences along rows of the derivatives.
 
     Notes
     -----
@@ -580,3 +627,11 @@ def draw_with_changes(parameters, disc_count, sigma, free, frame, left, top, pla
     changes *= frame[4] * frame[4]
     _draw_mesh(spots, densities, span, True, left, top, width, height, plane)
     _draw_changes(spots, spots_by, densities, changes, span, left, top, width, height, out)
+    variance = parameters[SOFT] * frame[4] * frame[4]
+    if variance > 0.0:
+        _soften(plane.reshape((height, width + 1, 1)), variance, spots, left, top)
+        if free.size > 0:
+            _soften(out, variance, spots, left, top)
+    for q in range(free.size):
+        if free[q] == SOFT:
+            add_spreading(plane, frame[4] * frame[4], out[:, :, q])

@@ -6,11 +6,11 @@ import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from math import ceil, isfinite, log10
+from math import ceil, floor, isfinite, log10
 
 import numpy as np
 
-from ..kernels.measure_pupil import DISC_NUMBERS, FIRST_DISC, FIRST_G
+from ..kernels.measure_pupil import DISC_NUMBERS, FIRST_DISC, FIRST_G, SOFT
 from ..model.ghost_model import AberrationGhost, Channel, Curve, Curves, GhostModel
 from ..model.ghost_tracks import GhostTrack, Tracks
 from .curves import Pose
@@ -134,9 +134,11 @@ def _fewer(
 
 def _fitted_numbers(ghost: AberrationGhost) -> Indices:
     """Return which numbers of a ghost the fit was free to choose."""
-    known = np.flatnonzero(np.array(ghost.green.uncertainty) > 0.0) if ghost.green.uncertainty else np.array([])
+    told = np.array(ghost.green.uncertainty)
+    end = FIRST_DISC + DISC_NUMBERS * len(ghost.green.discs)
+    known = np.flatnonzero(told[:end] > 0.0)
     if known.size:
-        return known.astype(np.int64)
+        return np.concatenate([known, [SOFT][: told.size - end]]).astype(np.int64)
     return free_numbers(2, len(ghost.green.discs), 2)
 
 
@@ -237,7 +239,7 @@ def _written(ghost: AberrationGhost, found: Found, span: tuple[float, float], cu
         colours.append(channel_of(numbers, shape.discs, deviation))
     out: AberrationGhost = ghost.replace(
         red=colours[0], green=colours[1], blue=colours[2], curves=curves,
-        visible_deg=(round(span[0], 4), round(span[1], 4)),
+        visible_deg=(floor(1e4 * span[0]) / 1e4, ceil(1e4 * span[1]) / 1e4),
     )  # fmt: skip
     return out
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..kernels.measure_edges import sum_along_rows, sum_changes_along_rows
 from ..kernels.measure_mesh import draw_with_changes, window_of
-from ..kernels.measure_pupil import DISC_NUMBERS, FIRST_DISC, FIRST_G, FIRST_I
+from ..kernels.measure_pupil import DISC_NUMBERS, FIRST_DISC, FIRST_G, FIRST_I, SOFT
 from .normal import inverse, solution
 from .numbers import NUMBERS, Floats
 from .views import View, halved
@@ -24,6 +24,8 @@ AREA = 7000
 MODEL_ERROR = 0.03
 # standard deviations beyond which a pixel counts less and less
 OUTLIER = 4.0
+# what softness is usual, part of the picture's width
+_SOFTNESS = 0.005
 _NONE = np.zeros(0, np.int64)
 
 
@@ -33,7 +35,7 @@ class Shape:
 
     Attributes
     ----------
-    numbers : ndarray, shape (44,)
+    numbers : ndarray, shape (45,)
         See `kernels.measure_pupil`.
     discs : int
     """
@@ -67,7 +69,7 @@ class Fit:
 
     @property
     def uncertainty(self) -> Floats:
-        """Standard deviation of all 44 numbers; 0 for those that were not fitted."""
+        """Standard deviation of all 45 numbers; 0 for those that were not fitted."""
         deviation = np.zeros(NUMBERS)
         # pixels that the model misses by more than noise make all numbers less certain
         excess = max(1.0, self.cost / max(self.count - self.free.size, 1))
@@ -87,7 +89,7 @@ class Patch:
     weight: Floats
 
 
-def free_numbers(order: int, discs: int, intensity_order: int) -> Indices:
+def free_numbers(order: int, discs: int, intensity_order: int, soft: bool = False) -> Indices:
     """Return which numbers to fit.
 
     Parameters
@@ -97,11 +99,14 @@ def free_numbers(order: int, discs: int, intensity_order: int) -> Indices:
     discs : int
     intensity_order : int
         0: even; 1: first order in u, v, w; 2: all.
+    soft : bool
+        Also how soft the borders are.
     """
     geometry = {0: (0, 3), 1: (0, 1, 2, 3), 2: tuple(range(10))}[order]
     light = {0: (0,), 1: (0, 1, 2, 3), 2: tuple(range(10))}[intensity_order]
     picked = [*geometry, *(FIRST_G + k for k in geometry), *(FIRST_I + k for k in light)]
     picked += [FIRST_DISC + k for k in range(DISC_NUMBERS * discs)]
+    picked += [SOFT] if soft else []
     return np.array(picked, dtype=np.int64)
 
 
@@ -213,6 +218,7 @@ def priors(shape: Shape, free: Indices, width: int) -> Floats:
     spread[FIRST_I:FIRST_DISC] = 0.5 * max(float(np.abs(shape.numbers[FIRST_I])), 1e-12)
     spread[FIRST_I] *= 20.0
     spread[FIRST_DISC:] = 3.0
+    spread[SOFT] = (_SOFTNESS * width) ** 2
     return np.asarray(1.0 / spread[free] ** 2)
 
 
@@ -294,12 +300,14 @@ def refine(
 
 
 def stepped(shape: Shape, free: Indices, step: Floats) -> Shape:
-    """Return a shape moved by a step; a disc never shrinks below a twentieth."""
+    """Return a shape moved by a step; a disc never shrinks below a twentieth, and softness not below 0."""
     numbers = shape.numbers.copy()
     numbers[free] += step
     for k in range(shape.discs):
         at = FIRST_DISC + DISC_NUMBERS * k + 2
         numbers[at] = max(numbers[at], 0.05)
+    # softer than half as wide as it is, a ghost would be a blot
+    numbers[SOFT] = min(max(numbers[SOFT], 0.0), 0.25 * numbers[FIRST_G] ** 2)
     return replace(shape, numbers=numbers)
 
 

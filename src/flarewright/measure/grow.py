@@ -30,12 +30,15 @@ class Growth:
         At most.
     error : float
         Part of the light that the model may miss.
+    soft : bool
+        Whether borders may be soft, once place and size are known.
     """
 
     order: int = 2
     intensity_order: int = 1
     discs: int = 2
     error: float = MODEL_ERROR
+    soft: bool = True
 
 
 def grow(
@@ -69,7 +72,7 @@ def grow(
         patches = patches_of(start, views, channel)
         if not patches:
             return None
-        free = free_numbers(order, start.discs, light)
+        free = free_numbers(order, start.discs, light, most.soft and order > 0)
         return refine(start, patches, free, width=width, steps=steps, error=most.error, pool=pool), patches
 
     found = polish(shape, 0, 0, 8)

@@ -187,7 +187,7 @@ def _try(
     few = run[np.unique(np.linspace(0, run.size - 1, min(run.size, _FEW)).round().astype(int))]
     shown = _alone(views, rest, list(few))
     start = beginning(trial, shown, [rest[k] for k in few])
-    fit = grow(start, shown, 1, most=Growth(order=1, discs=1, error=0.05), pool=pool)
+    fit = grow(start, shown, 1, most=Growth(order=1, discs=1, error=0.05, soft=False), pool=pool)
     if fit is None or fit.shape.numbers[FIRST_I] <= 0.0:
         return None
     shape = fit.shape

@@ -169,6 +169,12 @@ def pack(model: GhostModel) -> Packed:
     return meshes, numbers, counts, curves
 
 
+def _there(model: GhostModel, ghosts: Sequence[AberrationGhost | BezierGhost], constellation_deg: float) -> Floats:
+    """Return which ghosts are seen: beyond what was measured those that are seen where that ends."""
+    low, high = model.constellation_deg
+    return visible(ghosts, min(max(constellation_deg, low), high))
+
+
 def draw_packed(
     packed: Packed, model: GhostModel, constellation_deg: float, roll_deg: float, size_px: tuple[int, int]
 ) -> Floats:
@@ -179,13 +185,13 @@ def draw_packed(
     placed = _frame(model, constellation_deg, roll_deg, size_px)
     sigma = abs(field(constellation_deg, model.largest_deg))
     if meshes:
-        there = visible(meshes, constellation_deg)
+        there = _there(model, meshes, constellation_deg)
         numbers = _posed(meshes, numbers, constellation_deg, sigma)
         planes = np.zeros((3, height, width + 1))
         for m in range(3):
             draw_ghosts(numbers[m], counts[m], there, sigma, placed, planes[m])
         sum_into(planes, pixels)
-    for ghost, there_is in zip(curves, visible(curves, constellation_deg), strict=True):
+    for ghost, there_is in zip(curves, _there(model, curves, constellation_deg), strict=True):
         if there_is:
             left, top, w, h = bezier_window(bezier_numbers(ghost, constellation_deg), placed, width, height)
             if w:
@@ -195,7 +201,7 @@ def draw_packed(
 
 
 def _posed(meshes: Sequence[AberrationGhost], numbers: Floats, constellation_deg: float, sigma: float) -> Floats:
-    """Return the numbers, shape (3, G, 44), as the ghosts' curves bend them at a constellation."""
+    """Return the numbers, shape (3, G, 45), as the ghosts' curves bend them at a constellation."""
     out = numbers
     for k, ghost in enumerate(meshes):
         if ghost.curves != Curves():
@@ -211,7 +217,7 @@ def _single(
 ) -> Sequence[Layer]:
     """Draw each visible ghost on a layer of its own, cropped to what it touches."""
     layers = []
-    for ghost, there in zip(model.ghosts, visible(model.ghosts, constellation_deg), strict=True):
+    for ghost, there in zip(model.ghosts, _there(model, model.ghosts, constellation_deg), strict=True):
         if not there:
             continue
         alone = cast(GhostModel, model.replace(ghosts=(ghost,)))

@@ -205,7 +205,7 @@ def _refined(
     patches = patches_of(start, alone, channel)
     if not patches:
         return None
-    free = like.free if like is not None and like.shape.discs == start.discs else free_numbers(1, start.discs, 1)
+    free = like.free if like is not None and like.shape.discs == start.discs else free_numbers(1, start.discs, 1, True)
     return refine(start, patches, free, width=alone[0].size_px[0], steps=8, pool=pool)
 
 

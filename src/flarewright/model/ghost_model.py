@@ -46,21 +46,26 @@ class Channel(Frozen):
     intensity : tuple of 10 float
         Radiance times pixels per area of the pupil; below 0 counts as 0.
     discs : tuple of Disc
+    soft_px : float
+        Standard deviation of the Gaussian that spreads its light, pixels: borders are soft, for the light has a size
+        and every wavelength draws the ghost in its own.
     uncertainty : tuple of float
-        Standard deviation of f, g, intensity and each disc's three numbers, in this order; 0 for numbers that were
-        not fitted. Empty: unknown.
+        Standard deviation of f, g, intensity and each disc's three numbers, in this order, and of soft_px where that
+        was fitted; 0 for numbers that were not fitted. Empty: unknown.
     """
 
     f: Ten
     g: Ten
     intensity: Ten
     discs: tuple[Disc, ...] = Field((), max_length=4)
+    soft_px: float = Field(0.0, ge=0.0, le=1000.0)
     uncertainty: tuple[float, ...] = ()
 
     @model_validator(mode="after")
     def _count(self) -> Channel:
-        if len(self.uncertainty) not in (0, 30 + 3 * len(self.discs)):
-            raise ValueError(f"uncertainty needs {30 + 3 * len(self.discs)} numbers, or none")
+        numbers = 30 + 3 * len(self.discs)
+        if len(self.uncertainty) not in (0, numbers, numbers + 1):
+            raise ValueError(f"uncertainty needs {numbers} numbers, one more with that of soft_px, or none")
         return self
 
 

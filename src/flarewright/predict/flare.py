@@ -86,6 +86,11 @@ class Flare:
     remarks: tuple[str, ...] = ()
 
     @property
+    def aperture(self) -> str:
+        """The f-number in words."""
+        return f"f/{self.f_number:.3g}" if np.isfinite(self.f_number) else "f-number not told"
+
+    @property
     def pitch_mm(self) -> float:
         """Side of a pixel, of the same area as its pixels when those are oblong."""
         width, height = self.size_px

@@ -42,7 +42,7 @@ def occurrence_page(found: Occurrence) -> str:
     flare, curves = found.flare, found.curves
     efl = "" if flare.efl is None else f"{flare.efl:.4g} mm, "
     lead = (
-        f"{flare.name}, {efl}f/{flare.f_number:.3g}, sensor {found.frame.width:g} x {found.frame.height:g} mm, "
+        f"{flare.name}, {efl}{flare.aperture}, sensor {found.frame.width:g} x {found.frame.height:g} mm, "
         f"{found.quality} quality, {len(curves.constellation_deg)} constellations. Values are irradiance on the sensor "
         "over the illuminance that the light gives on a plane facing it; the light's own direct image is left out."
     )
