@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from scipy.special import ive
-from test_measure_mesh import FRAME, SIZE, draw, draw_finely, ghost
+from test_measure_mesh import FRAME, SIZE, bladed, draw, draw_finely, even, ghost
 
 from flarewright.kernels._jit import for_python
 from flarewright.kernels.measure_edges import sum_along_rows, sum_changes_along_rows
@@ -42,21 +42,42 @@ def test_taps_are_the_discrete_gaussian(variance):
     assert 2.0 * (taps[1:] * n**2).sum() == pytest.approx(variance, rel=1e-2)
 
 
+def finely(numbers: np.ndarray, discs: int, frame: np.ndarray) -> np.ndarray:
+    plane = np.zeros((SIZE[1], SIZE[0] + 1))
+    draw_with_changes(numbers, discs, 0.5, np.zeros(0, np.int64), frame, 0, 0, plane, np.zeros((1, 1, 0)))
+    sum_along_rows(plane)
+    return plane[:, :-1]
+
+
 @pytest.mark.parametrize("variance", [0.05, 0.8, 6.0])
 # in the picture, and cut by its left, upper and right borders
 @pytest.mark.parametrize("axis", [(100.3, 60.7), (-60.0, 20.0), (180.0, 130.0)])
 def test_a_soft_ghost_is_a_sharp_one_blurred(variance, axis):
     frame = FRAME.copy()
     frame[:2] = axis
-    sharp = draw(ghost(), 1, frame=frame)
+    sharp = finely(ghost(), 1, frame)
     assert sharp.any()
-    assert np.allclose(draw(soft_ghost(variance), 1, frame=frame), blurred(sharp, variance), atol=2e-5 * sharp.max())
+    expected = blurred(sharp, variance)
+    assert np.allclose(finely(soft_ghost(variance), 1, frame), expected, atol=1e-3 * sharp.max())
+
+
+@pytest.mark.parametrize("kind", [ghost, even, bladed])
+@pytest.mark.parametrize("variance", [0.3, 1.5, 8.0])
+def test_a_replay_is_nearly_as_soft(kind, variance):
+    numbers = kind(1)
+    numbers[SOFT] = variance
+    fitted, replayed = finely(numbers, 1, FRAME), draw(numbers, 1)
+    # sharp ones of a replay differ by 1.5 %, their cells are larger; and moved corners are no blurred ones
+    assert np.sqrt(np.mean((replayed - fitted) ** 2)) < (0.018 + 0.001 * variance) * np.sqrt(np.mean(fitted**2))
+    assert replayed.sum() == pytest.approx(fitted.sum(), rel=5e-3)
+    # nothing is left beside it
+    assert np.abs(replayed[:, -3:]).max() < 1e-9
 
 
 def test_pictures_of_fits_are_as_soft_and_windows_hold_what_is_spread():
     numbers = soft_ghost(2.0, 2)
     whole = draw_finely(numbers, 2)
-    assert np.allclose(whole, blurred(draw_finely(ghost(2), 2), 2.0), atol=2e-5 * whole.max())
+    assert np.allclose(whole, blurred(draw_finely(ghost(2), 2), 2.0), atol=1e-3 * whole.max())
     left, top, width, height = window_of(numbers, 2, 0.5, FRAME, *SIZE)
     plane = np.zeros((height, width + 1))
     draw_with_changes(numbers, 2, 0.5, np.zeros(0, np.int64), FRAME, left, top, plane, np.zeros((1, 1, 0)))

@@ -41,6 +41,8 @@ _LEAST_RINGS, _MOST_RINGS = 3, 16
 _EVEN, _STEP = 4.0, 0.05
 _ROUND, _AROUND = 16, 16
 _RINGS = (2, 3, 4, 6, 8, 12, 16)
+# of a replay's soft ghosts: from how many standard deviations of softness a radius is wide, and what weight is none
+_WIDE, _FAINT = 5.0, 5e-4
 
 
 @inner
@@ -225,8 +227,11 @@ def _cell_areas(spots, i, j, spokes):
 
 
 @inner
-def _draw_mesh(spots, densities, span, fine, left, top, width, height, plane):
-    """Draw every edge once, with the step in density across it; unless fine, one between rings spans several spokes."""
+def _draw_mesh(spots, densities, span, fine, rim, left, top, width, height, plane):
+    """Draw every edge once, with the step in density across it; unless fine, one between rings spans several spokes.
+
+    Without `rim` the outline is left out.
+    """
     rings, spokes = densities.shape[0], densities.shape[1]
     for i in range(rings):
         wide = max(span, 1) if fine else _span_of(i, span, spokes, rings)
@@ -241,6 +246,8 @@ def _draw_mesh(spots, densities, span, fine, left, top, width, height, plane):
                 cx, cy = spots[i + 1, k, 0], spots[i + 1, k, 1]
                 step = densities[i, j, 1] - densities[i, j, 0]
                 add_edge(ax, ay, cx, cy, step, left, top, width, height, plane)
+        if i + 1 == rings and not rim:
+            continue
         chord = _chord_of(span, spokes) if i + 1 < rings and not fine else 1
         for j in range(0, spokes, chord):
             k = j + chord if j + chord < spokes else 0
@@ -249,6 +256,63 @@ def _draw_mesh(spots, densities, span, fine, left, top, width, height, plane):
                 spots[i + 1, j, 0], spots[i + 1, j, 1], spots[i + 1, k, 0], spots[i + 1, k, 1],
                 densities[i, j, 0] - outer, left, top, width, height, plane,
             )  # fmt: skip
+
+
+@inner
+def _least_radius(spots):
+    """Return how far the nearest point of a mesh's outline is from its middle."""
+    rings = spots.shape[0] - 1
+    least = 1e300
+    for j in range(spots.shape[1]):
+        dx, dy = spots[rings, j, 0] - spots[0, 0, 0], spots[rings, j, 1] - spots[0, 0, 1]
+        least = min(least, dx * dx + dy * dy)
+    return sqrt(least)
+
+
+@inner
+def _draw_soft_rim(spots, densities, variance, width, height, plane):
+    """Draw an outline many times, moved outwards and inwards by whole pixels, by the weights of its spread."""
+    rings, spokes = densities.shape[0], densities.shape[1]
+    taps = np.empty(reach_of(variance) + 1)
+    taps_of(variance, taps)
+    # the unit normals of the sides, and of each corner the way that moves both of its sides by one
+    sides, away = np.empty((spokes, 2)), np.empty((spokes, 2))
+    turn = 0.0
+    for j in range(spokes):
+        k = j + 1 if j + 1 < spokes else 0
+        ax, ay, bx, by = spots[rings, j, 0], spots[rings, j, 1], spots[rings, k, 0], spots[rings, k, 1]
+        turn += ax * by - ay * bx
+        length = max(sqrt((bx - ax) ** 2 + (by - ay) ** 2), 1e-12)
+        sides[j, 0], sides[j, 1] = (by - ay) / length, (ax - bx) / length
+    if turn < 0.0:
+        sides *= -1.0
+    for j in range(spokes):
+        before = j - 1 if j > 0 else spokes - 1
+        x, y = sides[j, 0] + sides[before, 0], sides[j, 1] + sides[before, 1]
+        stretch = 2.0 / max(x * x + y * y, 1.0)
+        away[j, 0], away[j, 1] = stretch * x, stretch * y
+    # what is too faint to be drawn is shared by the others: the steps shall add up to the whole
+    last = 0
+    total = taps[0]
+    while last + 1 < taps.size and taps[last + 1] >= _FAINT:
+        last += 1
+        total += 2.0 * taps[last]
+    for n in range(-last, last + 1):
+        weight = taps[abs(n)] / total
+        for j in range(spokes):
+            k = j + 1 if j + 1 < spokes else 0
+            before = j - 1 if j > 0 else spokes - 1
+            x, y = spots[rings, j, 0] + n * away[j, 0], spots[rings, j, 1] + n * away[j, 1]
+            add_edge(
+                x, y, spots[rings, k, 0] + n * away[k, 0], spots[rings, k, 1] + n * away[k, 1],
+                weight * densities[rings - 1, j, 0], 0, 0, width, height, plane,
+            )  # fmt: skip
+            # the border between two cells goes on to where the outline is now
+            step = densities[rings - 1, j, 0] - densities[rings - 1, before, 0]
+            if step != 0.0 and n != 0:
+                add_edge(
+                    spots[rings, j, 0], spots[rings, j, 1], x, y, weight * step, 0, 0, width, height, plane
+                )  # fmt: skip
 
 
 @inner
@@ -340,14 +404,19 @@ def draw_ghosts(parameters, disc_counts, visible, sigma, frame, plane):
         densities *= visible[g] * frame[4] * frame[4]
         variance = parameters[g, SOFT] * frame[4] * frame[4]
         if not variance > 0.0:
-            _draw_mesh(spots, densities, span, False, 0, 0, width, height, plane)
+            _draw_mesh(spots, densities, span, False, True, 0, 0, width, height, plane)
+            continue
+        if span > 0 and _least_radius(spots) > _WIDE * sqrt(variance):
+            # without folds, and wide: only the outline's step is steep enough to be seen spread
+            _draw_mesh(spots, densities, span, False, False, 0, 0, width, height, plane)
+            _draw_soft_rim(spots, densities, variance, width, height, plane)
             continue
         # spread alone, and then laid over the others
         left, top, w, h = _box(spots, reach_of(variance), width, height)
         if w == 0:
             continue
         own = np.zeros((h, w + 1))
-        _draw_mesh(spots, densities, span, False, left, top, w, h, own)
+        _draw_mesh(spots, densities, span, False, True, left, top, w, h, own)
         _soften(own.reshape((h, w + 1, 1)), variance, spots, left, top)
         for y in range(h):
             for c in range(w):
@@ -625,7 +694,7 @@ def draw_with_changes(parameters, disc_count, sigma, free, frame, left, top, pla
     # the model's irradiance is per pixel of the model, whatever the picture's scale
     densities *= frame[4] * frame[4]
     changes *= frame[4] * frame[4]
-    _draw_mesh(spots, densities, span, True, left, top, width, height, plane)
+    _draw_mesh(spots, densities, span, True, True, left, top, width, height, plane)
     _draw_changes(spots, spots_by, densities, changes, span, left, top, width, height, out)
     variance = parameters[SOFT] * frame[4] * frame[4]
     if variance > 0.0:
