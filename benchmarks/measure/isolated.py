@@ -126,7 +126,9 @@ def _alone(views: list[View], iris: Blades | None) -> dict[str, Any]:
         part = (views[k].constellation_deg - a.constellation_deg) / (b.constellation_deg - a.constellation_deg)
         line = (1.0 - part) * a.pixels[..., 1] + part * b.pixels[..., 1]
         true = views[k].pixels[..., 1]
-        drawn = render(best.shape, views[k]) if first - 1 <= k <= last + 1 else np.zeros(true.shape)
+        # halfway between a constellation that shows it and one that does not, half of it is there as far as one knows
+        there_is = 1.0 if first <= k <= last else 0.5 if first - 1 <= k <= last + 1 else 0.0
+        drawn = render(best.shape, views[k], there_is) if there_is else np.zeros(true.shape)
         between += float(((line - true) ** 2).sum())
         mine += float(((drawn - true) ** 2).sum())
         whole += float((true**2).sum())
