@@ -42,7 +42,7 @@ _EVEN, _STEP = 4.0, 0.05
 _ROUND, _AROUND = 16, 16
 _RINGS = (2, 3, 4, 6, 8, 12, 16)
 # of a replay's soft ghosts: from how many standard deviations of softness a radius is wide, and what weight is none
-_WIDE, _FAINT = 5.0, 5e-4
+_WIDE, _FAINT = 12.0, 5e-4
 
 
 @inner
