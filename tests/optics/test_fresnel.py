@@ -94,6 +94,32 @@ def test_grids_of_a_picture_leave_out_the_finest_ripples_only():
     assert unlike_slits(700.0, 9.0)[0] < 0.5 * unlike_slits(700.0, 1.0)[0] + 0.002
 
 
+def test_a_grid_as_fine_as_pixels_show_holds_what_pixels_see():
+    """Second method: two analytic slits, averaged over texels of four samples: half a fringe, and two fringes wide."""
+    for texels_a_scale in (2.0, 0.5):
+        area = RADIUS**2 / 200.0
+        scale = math.sqrt(area / 2.0)
+        shown = scale / texels_a_scale / 4.0
+        grid = fresnel_grid(square(1.5), 1.5, RADIUS, (area, area), (area, area), shown)
+        fine = fresnel_grid(square(1.5), 1.5, RADIUS, (area, area), (area, area))
+        assert grid.step == pytest.approx(max(shown, fine.step))
+        found = fresnel_intensity(grid, (area, area), white=True)
+        assert grid.light * grid.step**2 == pytest.approx(9.0, rel=1e-3)
+        # each texel of the slit from 16 places within it, along a line through the middle
+        count = len(grid.at[0]) // 4 * 4
+        at = (grid.at[0][:count, None] + grid.step * (np.arange(4) - 1.5) / 4.0).reshape(-1, 16).mean(axis=1)
+        inside = (grid.at[0][:count, None] + grid.step * (np.arange(4) - 1.5) / 4.0).reshape(-1, 16)
+        expected = (np.abs(slit_field(inside, 1.5, scale)) ** 2).mean(axis=1)
+        middle = len(grid.at[1]) // 2
+        row = found[middle - 8 : middle + 8, :count].mean(axis=0).reshape(-1, 4).mean(axis=1)
+        row /= row[np.abs(at) < 0.7].mean() / expected[np.abs(at) < 0.7].mean()
+        seen = np.abs(at) < 1.5 + 3.0 * scale
+        assert math.sqrt(np.mean((row - expected)[seen] ** 2)) < 0.008
+        # a step there would miss the rings by far more
+        step = np.clip((1.5 - np.abs(at)) / (4.0 * grid.step) + 0.5, 0.0, 1.0)
+        assert math.sqrt(np.mean((step - expected)[seen] ** 2)) > 0.035
+
+
 def test_edge_of_a_wide_opening_is_the_analytic_knife_edge():
     grid, found, scale = diffracted(square(RADIUS), 2000.0, RADIUS)
     middle = len(grid.at[1]) // 2

@@ -45,6 +45,9 @@ SHADOW = 6.0
 FADE = (5.0, 7.0)
 """White light's fringes end between these distances from an edge, in sqrt(lambda L / 2): the sixth and the twelfth."""
 
+FINEST_PART = 0.875
+"""They begin to end at this part of the finest frequency of a grid; `SAMPLES_A_FRINGE` hold all of `FADE` below it."""
+
 RIPPLES = (
     (0.1, 0.25, 0.5, 0.8, 1.0, 1.4, 2.0, 3.0, 4.0, 6.0, 8.0),
     (0.37, 0.362, 0.335, 0.28, 0.23, 0.14, 0.095, 0.061, 0.046, 0.03, 0.023),
@@ -204,6 +207,7 @@ def fresnel_grid(
     radius: float,
     least: tuple[float, float],
     most: tuple[float, float],
+    shown: float = 0.0,
 ) -> FresnelGrid:
     """Sample an opening for Fresnel diffraction.
 
@@ -218,6 +222,8 @@ def fresnel_grid(
         The opening's radius, mm.
     least, most : tuple of float
         Least and largest |lambda L| in x and in y, mm^2.
+    shown : float
+        Samples need not lie closer than this, mm.
 
     Returns
     -------
@@ -235,7 +241,7 @@ def fresnel_grid(
         (width + math.sqrt(width**2 + 2.0 * large * MOST_SAMPLES)) / (2.0 * MOST_SAMPLES)
         for width, large in zip(open_part, most, strict=True)
     ]
-    step = max(finest, *coarsest)
+    step = max(finest, shown, *coarsest)
     counts = [
         fast_size(math.ceil((width + 0.5 * large / step) / step), even=True)
         for width, large in zip(open_part, most, strict=True)
@@ -260,7 +266,7 @@ def fresnel_intensity(grid: FresnelGrid, area: tuple[float, float], *, white: bo
     area : tuple of float
         lambda L in x and in y, mm^2; of either sign.
     white : bool
-        Leave out the fine fringes that no band of colours leaves: those between `FADE`.
+        Leave out the fine fringes that no band of colours leaves, those between `FADE`, and what the grid cannot hold.
 
     Returns
     -------
@@ -281,6 +287,10 @@ def fresnel_intensity(grid: FresnelGrid, area: tuple[float, float], *, white: bo
             np.float32
         )
         fade = np.clip((FADE[1] - np.sqrt(w, dtype=np.float32)) / (FADE[1] - FADE[0]), 0.0, 1.0)
+        turn *= fade * fade * (3.0 - 2.0 * fade)
+        # a grid that pixels or samples limit ends before that: softly, or edges would ring of its own
+        per_finest = 2.0 * grid.step * np.hypot(fx, fy[:, None]).astype(np.float32)
+        fade = np.clip((1.0 - per_finest) / (1.0 - FINEST_PART), 0.0, 1.0)
         turn *= fade * fade * (3.0 - 2.0 * fade)
     shape = (len(grid.at[1]), len(grid.at[0]))
     real = np.fft.irfft2(grid.spectrum * turn.real, shape)

@@ -70,7 +70,7 @@ OCTAVES = 1.5
 """A grid serves Fresnel areas up to this many octaves apart: those of one ghost at all colours."""
 
 TEXEL_PX = 0.7
-"""Patterns are no finer than this on the sensor, in pixels."""
+"""Patterns are no finer than this on the sensor, in pixels, and the wave of white light no finer than half of it."""
 
 KEPT_BYTES = 400_000_000
 KEPT_GRID_BYTES = 100_000_000
@@ -169,27 +169,28 @@ class Ringing:
         wave = resampled(np.sqrt(opening.mask), opening.half, x, y[:, 0])
         return light * wave, light * resampled(opening.mask, opening.half, x, y[:, 0])
 
-    def grid(self, octaves: Octaves) -> FresnelGrid:
-        """Return the grid for Fresnel areas from 2 ** low to 2 ** high mm^2, in x and in y."""
-        found = self._grids.get(octaves)
+    def grid(self, octaves: Octaves, shown: float) -> FresnelGrid:
+        """Return the grid of areas from 2 ** low to 2 ** high mm^2, in x and in y; `shown` as `fresnel_grid`."""
+        found = self._grids.get((octaves, shown))
         if found is None:
             least, most = (tuple(2.0 ** pair[end] for pair in octaves) for end in (0, 1))
             found = fresnel_grid(
-                self.sample, self.opening.radius, self.radius, (least[0], least[1]), (most[0], most[1])
+                self.sample, self.opening.radius, self.radius, (least[0], least[1]), (most[0], most[1]), shown
             )
-            self._grids.put(octaves, found, found.spectrum.nbytes)
+            self._grids.put((octaves, shown), found, found.spectrum.nbytes)
         kept: FresnelGrid = found
         return kept
 
-    def pattern(
-        self, octaves: Octaves, area: tuple[float, float], half: tuple[float, float], *, white: bool
-    ) -> Pattern:
-        """Return the opening's pattern at a Fresnel area, over a part of the stop at least as wide as asked for."""
-        key = (octaves, area, half, white)
+    def pattern(self, item: _Crossing, area: tuple[float, float], *, white: bool) -> Pattern:
+        """Return the opening's pattern at a Fresnel area, over a part of the stop at least as wide as asked for.
+
+        What is kept has its resolution halved already, which may leave a sixteenth of it.
+        """
+        key = (item.octaves, item.shown, area, item.half, item.halvings, white)
         found = self._patterns.get(key)
         if found is None:
-            grid = self.grid(octaves)
-            found = crop(grid, fresnel_intensity(grid, area, white=white), half)
+            grid = self.grid(item.octaves, item.shown)
+            found = halved(*crop(grid, fresnel_intensity(grid, area, white=white), item.half), item.halvings)
             self._patterns.put(key, found, found[0].nbytes)
         kept: Pattern = found
         return kept
@@ -231,14 +232,19 @@ class _Crossing:
     ----------
     area : ndarray, shape (W, 2)
         lambda L at the traced wavelengths, mm^2.
-    octaves, half
-        As `Ringing.pattern`.
+    octaves : tuple of (float, float)
+        From which to which power of 2 Fresnel areas may lie, in x and in y.
+    shown : float
+        The finest step that pixels show, mm in the stop; 0 for lines, whose fringes are all kept.
+    half : tuple of float
+        Half the sides of the part of the stop that is lit, mm.
     halvings : tuple of int
         How often its resolution may be halved in x and in y.
     """
 
     area: Floats
     octaves: Octaves
+    shown: float
     half: tuple[float, float]
     halvings: tuple[int, int]
 
@@ -308,10 +314,10 @@ class Rings:
         total: Singles | None = None
         half = item.half
         for area, share in parts.items():
-            values, half = self.ringing.pattern(item.octaves, area, item.half, white=white)
+            values, half = self.ringing.pattern(item, area, white=white)
             total = values * np.float32(share) if total is None else total + values * np.float32(share)
         assert total is not None
-        return halved(total, half, item.halvings)
+        return total, half
 
 
 @dataclass(frozen=True)
@@ -449,7 +455,9 @@ def _crossing(
     octaves = ((low[0] - finer, high[0]), (low[1] - finer, high[1]))
     # no finer than pixels show
     enough = TEXEL_PX / np.maximum(magnified, 1e-9)
-    halvings = [int(np.clip(math.log2(side / ringing.grid(octaves).step), 0, 6)) for side in enough]
+    # half octaves of this too
+    shown = 0.0 if finer else 2.0 ** (0.5 * math.floor(2.0 * math.log2(0.5 * float(enough.min()))))
+    halvings = [int(np.clip(math.log2(side / ringing.grid(octaves, shown).step), 0, 6)) for side in enough]
     widest = WIDEST_RADII * ringing.radius
     half = [ringing.opening.radius + min(SHADOW * math.sqrt(0.5 * 2.0**top), widest) for top in high]
-    return _Crossing(area, octaves, (half[0], half[1]), (halvings[0], halvings[1]))
+    return _Crossing(area, octaves, shown, (half[0], half[1]), (halvings[0], halvings[1]))
