@@ -105,8 +105,11 @@ MISTAKES = [
     ("thickness = 11.05", "thicknes = 11.05", "row 1: 'thicknes' is not a known key; did you mean 'thickness'?"),
     ("thickness = 2.78", "thickness = -2.78", "row 2: thickness is -2.78: glass cannot be thinner than 0 mm"),
     ("semi_diameter = 12.5", "semi_diameter = -12.5", "row 2: semi_diameter is -12.5: it must be above 0 in mm"),
-    ("semi_diameter = 12.5", "semi_diameter = 55.7", "row 2: a semi_diameter of 55.7 mm does not fit the surface, "
-     "which turns back 55.65 mm from the axis"),
+    (
+        "semi_diameter = 12.5",
+        "semi_diameter = 55.7",
+        "row 2: a semi_diameter of 55.7 mm does not fit the surface, which turns back 55.65 mm from the axis",
+    ),
     ("n_d = 1.649", "n_d = 0.9", "row 2: n_d is 0.9: it must be above 1"),
     ("n_d = 1.649, ", "", "row 2: v_d alone is no glass"),
     ("v_d = 33.8", "v_d = 0", "row 2: v_d is 0: it must be above 5"),

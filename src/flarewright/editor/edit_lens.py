@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 from math import atan, degrees, isfinite, radians, tan
 from typing import Any
 
@@ -14,11 +15,14 @@ from ..io.coating_text import UNCOATED, coating_from, format_coating
 from ..io.media import attach
 from ..model import AsLens, CoatingChoice, Iris, Lens, PerRow, Position, Preset, Project, Row, Stop, Surface
 from ..model.art import Art
+from ..optics.image_height import image_heights
+from ..optics.paraxial import FirstOrder
 from ..optics.shape import sag
 from ..render.prepare import as_lens, first_order
 
 COLUMNS = ("radius", "thickness", "glass", "n_d", "v_d", "semi_diameter", "coating")
 MOST_ROWS = 200
+DISTORTION_STEP_DEG, DISTORTION_TO_DEG = 2.0, 80.0
 
 
 def own_lens(project: Project) -> Lens:
@@ -391,11 +395,15 @@ class Prescription:
         efl, bfl, f_number and the like, mm; empty when the lens makes no image.
     problem : str
         Why it makes none; empty otherwise.
+    distortion : tuple of float
+        Height of a distant light's image against efl tan(angle), at `DISTORTION_STEP_DEG`, twice that and so on, as
+        far as there is one.
     """
 
     rows: tuple[dict[str, Any], ...]
     facts: dict[str, float]
     problem: str
+    distortion: tuple[float, ...] = ()
 
 
 def prescription(project: Project) -> Prescription:
@@ -405,9 +413,11 @@ def prescription(project: Project) -> Prescription:
     from .lens_notes import notes
 
     problem, facts = "", {}
+    distortion: tuple[float, ...] = ()
     try:
         settled = settle(project)
         order = settled.order
+        distortion = _distortion(settled.lens, order)
         facts = {
             "efl": order.efl, "bfl": order.bfl, "f_number": order.f_number, "sensor_distance": order.sensor_distance,
             "entrance_pupil": order.entrance_pupil_diameter, "stop": 2.0 * order.stop_semi_diameter,
@@ -426,7 +436,20 @@ def prescription(project: Project) -> Prescription:
         coats = tuple(None for _ in lens.rows)
     told = notes(lens)
     rows = tuple(_row(k, row, coats[k], told.get(k, {})) for k, row in enumerate(lens.rows))
-    return Prescription(rows, facts, problem)
+    return Prescription(rows, facts, problem, distortion)
+
+
+@lru_cache(maxsize=8)
+def _distortion(lens: Lens, order: FirstOrder) -> tuple[float, ...]:
+    angles = np.arange(DISTORTION_STEP_DEG, DISTORTION_TO_DEG + 0.5, DISTORTION_STEP_DEG)
+    heights = image_heights(lens, order, angles)
+    out: list[float] = []
+    for height, nearer, ideal in zip(heights, (0.0, *heights), order.efl * np.tan(np.radians(angles)), strict=False):
+        # farther out must be farther out, or a hand could not find the way back
+        if not height > nearer:
+            break
+        out.append(round(float(height / ideal), 5))
+    return tuple(out)
 
 
 def _row(k: int, row: Row, coat: Any, told: dict[str, str]) -> dict[str, Any]:

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 SOON_S = 0.35
 # one whose final picture takes more is first traced as well as a screen can show, which takes a third of the time
 LATE_S = 0.4
+# and one that takes so long is not waited for by whoever clicks on a ghost
+SEEN_FIRST_S = 2.5
 # what is done sooner than WAIT_S needs no progress told
 WAIT_S, TELL_S = 0.6, 0.12
 
@@ -60,9 +62,12 @@ def sharpen(screen: Screen, project: Project, view: View, check: Check) -> None:
             stops = studio.exposure_of(draft, Match()) - screen.match.exposure_stops
             screen.match = replace(screen.match, grey=2.0**stops)
         screen.show(draft)
+    seen_first = not working and screen.final_s > SEEN_FIRST_S
     if not working:
         if screen.final_s > LATE_S:
             screen.show(studio.take(project, "soon", view, progress=_progress(screen, "traced picture", check)))
+        if seen_first:
+            _look(screen, project, "final", check)
         final = studio.take(project, "final", view, progress=_progress(screen, "final picture", check))
         check()
         screen.final_s = final.seconds
@@ -75,15 +80,20 @@ def sharpen(screen: Screen, project: Project, view: View, check: Check) -> None:
             draft = studio.take(project, "draft", view, levels=screen.match.levels)
             check()
         screen.match = studio.matched(draft, final, screen.match)
-    grade: studio.Grade = "draft" if working else "final"
-    screen.seen = see(project, grade, _progress(screen, "ghosts", check))
-    check()
-    screen.session.tell({"type": "ghosts"})
-    if not working:
+    if not seen_first:
+        _look(screen, project, "draft" if working else "final", check)
+    if not working and screen.seen is not None:
         _match_ghosts(screen, project, view, screen.seen, check)
     check()
     if screen.idle is not None:
         screen.idle()
+
+
+def _look(screen: Screen, project: Project, grade: studio.Grade, check: Check) -> None:
+    """Find out which ghosts are where, and tell."""
+    screen.seen = see(project, grade, _progress(screen, "ghosts", check))
+    check()
+    screen.session.tell({"type": "ghosts"})
 
 
 def _match_ghosts(screen: Screen, project: Project, view: View, seen: Seen, check: Check) -> None:

@@ -43,7 +43,8 @@ def state_of(screen: Screen, solver: Solver) -> dict[str, Any]:
         "undo": history.undo_label,
         "redo": history.redo_label,
         "steps": {"at": history.at, "count": len(history.moments)},
-        "lens": _lens(project, table.facts, table.problem) | {"rows": list(table.rows)},
+        "lens": _lens(project, table.facts, table.problem)
+        | {"rows": list(table.rows), "distortion": list(table.distortion)},
         "lights": [_light(project, k) for k in range(len(project.lights))],
         "camera": project.camera.model_dump(mode="json") | {"sensor": list(project.camera.sensor)},
         "iris": _iris(project),

@@ -27,6 +27,8 @@ function take(state) {
   app.state = state;
   app.light = Math.min(app.light, state.lights.length - 1);
   const shot = (s) => JSON.stringify([s.lights, s.lens, s.camera, s.iris, s.dirt, s.coating, s.pass_gain, s.by_hand, s.view.grey, s.view.unclipped]);
+  // another lens has other ghosts
+  if (old && old.lens.name !== state.lens.name) Object.assign(app, { ghost: null, wish: null });
   const moved = !old || shot(old) !== shot(state);
   if (moved) {
     app.view.outline = null;

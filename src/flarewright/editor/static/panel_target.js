@@ -43,7 +43,7 @@ export function targetPanel(app) {
   const films = button('…with free films', () => app.ask('/api/colors', { kind: 'film' }), { tip: 'Films of any index and thickness: more colours, less like real lenses.' });
   const stop = button('Stop', () => app.ask('/api/stop'), { id: 'stop', tip: 'End the search and keep the best.' });
   const clear = button('Take all back', () => app.deed('clear_wishes', {}).catch(() => {}), { kind: 'quiet', tip: 'Forget all wishes; the lens stays.' });
-  const add = button('Add a ghost', () => app.deed('add_ghost', { place_mm: 5, radius_mm: 1.5 }).then(() => app.chooseWish(wishes().length - 1)).catch(() => {}), { tip: 'One that the lens has not; drag it along the line.', id: 'wish-add' });
+  const add = button('Add a ghost', () => app.deed('add_ghost', { place_mm: 5 - 4 * (wishes().filter((wish) => !wish.ghost).length % 5), radius_mm: 1.5 }).then(() => app.chooseWish(wishes().length - 1)).catch(() => {}), { tip: 'One that the lens has not; drag it along the line.', id: 'wish-add' });
   const progress = h('p', { class: 'quietly', id: 'solve-words' });
   const found = h('div', { class: 'candidates' });
 
@@ -73,7 +73,7 @@ export function targetPanel(app) {
       if (found.dataset.number !== String(run.number)) {
         found.dataset.number = String(run.number);
         found.replaceChildren(...run.found.map((words, k) => h('figure', {}, h('img', { src: `/api/candidate/${k}?n=${run.number}`, alt: `Lens ${k + 1}` }), h('figcaption', {}, words,
-          button('Accept', () => app.ask('/api/accept', { number: k }), { kind: 'main', disabled: run.running, 'data-accept': k })))));
+          button('Accept', async () => { if (await app.ask('/api/accept', { number: k })) see('physical'); }, { kind: 'main', disabled: run.running, 'data-accept': k })))));
       }
     },
   };

@@ -127,8 +127,13 @@ export function choice({ label, tip, get, set, options, name }) {
 
 export function tick({ label, tip, get, set, name }) {
   const box = h('input', { type: 'checkbox', name });
-  box.addEventListener('change', () => set(box.checked));
-  return row(label, tip, [box], (state) => { box.checked = Boolean(get(state)); });
+  // until the server has answered, it stays as the hand left it
+  let asked = 0;
+  box.addEventListener('change', async () => {
+    asked += 1;
+    try { await set(box.checked); } finally { asked -= 1; }
+  });
+  return row(label, tip, [box], (state) => { if (!asked) box.checked = Boolean(get(state)); });
 }
 
 export const button = (words, work, { tip, kind = '', ...rest } = {}) =>
@@ -182,6 +187,12 @@ export function tips() {
     if (panel.contains(element) && !element.closest('#tabs')) {
       box.style.left = `${panel.getBoundingClientRect().left - own.width - 8}px`;
       box.style.top = `${Math.min(place.top, innerHeight - own.height - 8)}px`;
+      return;
+    }
+    if (element.closest('.menu')) {
+      // beside its entries, which all must be read
+      box.style.left = `${place.right + 10}px`;
+      box.style.top = `${place.top}px`;
       return;
     }
     const left = Math.min(place.left, innerWidth - own.width - 8);

@@ -7,6 +7,7 @@ const FADE_MS = 160;
 const NEAR_PX = 16;
 const CLICK_PX = 4;
 const STEEPEST = 80;
+const DISTORTION_STEP = 2;
 const INK = 'rgba(240,176,84,.95)';
 
 export function viewport(canvas, app) {
@@ -35,10 +36,31 @@ export function viewport(canvas, app) {
   const toPage = (x, y, f = frame()) => [f.x + f.w / 2 + x * f.mm, f.y + f.h / 2 - y * f.mm * stretch(f)];
   const stretch = (f) => (f.h / app.state.frame.sensor[1]) / f.mm;
   const toMm = (px, py, f = frame()) => [(px - f.x - f.w / 2) / f.mm, -(py - f.y - f.h / 2) / (f.mm * stretch(f))];
-  const angle = (mm) => Math.max(-STEEPEST, Math.min(STEEPEST, Math.atan(mm / efl()) * 180 / Math.PI));
-  const place = (light) => light.field_deg.map((deg) => efl() * Math.tan(deg * Math.PI / 180));
+  // Where a light is seen: its ray through the middle of the stop, with the lens' distortion; near lights as the matrices say.
+  const distortion = (slope, light) => {
+    const known = light.distance ? [] : app.state.lens.distortion ?? [];
+    if (!known.length) return 1;
+    const at = Math.min(Math.atan(slope) * 180 / Math.PI / DISTORTION_STEP, known.length);
+    const k = Math.min(Math.floor(at), known.length - 1);
+    const before = k ? known[k - 1] : 1;
+    return before + (at - k) * (known[k] - before);
+  };
+  const place = (light) => {
+    const slopes = light.field_deg.map((deg) => Math.tan(deg * Math.PI / 180));
+    const part = efl() * distortion(Math.hypot(...slopes), light);
+    return slopes.map((slope) => part * slope);
+  };
+  function anglesAt(mm, light) {
+    const reach = Math.hypot(...mm) / efl();
+    let [near, far] = [0, Math.tan(STEEPEST * Math.PI / 180)];
+    for (let k = 0; k < 40; k++) {
+      const middle = (near + far) / 2;
+      if (middle * distortion(middle, light) < reach) near = middle; else far = middle;
+    }
+    return mm.map((each) => (reach ? Math.atan(each / efl() * far / reach) * 180 / Math.PI : 0));
+  }
   const lightAt = (k) => (self.mover.live && self.mover.lights?.[k]) || app.state.lights[k].field_deg;
-  const lightPage = (k) => toPage(...place({ field_deg: lightAt(k) }));
+  const lightPage = (k) => toPage(...place({ ...app.state.lights[k], field_deg: lightAt(k) }));
   // a handle far outside is held at the border, so that it can always be taken
   function handle(k) {
     const [x, y] = lightPage(k);
@@ -165,7 +187,7 @@ export function viewport(canvas, app) {
     app.state.lights.forEach((light, k) => {
       if (light.keys.length < 1) return;
       pen.globalAlpha = k === app.light ? 1 : 0.4;
-      const at = (deg) => toPage(...place({ field_deg: deg }), f);
+      const at = (deg) => toPage(...place({ ...light, field_deg: deg }), f);
       pen.beginPath();
       light.keys.forEach((key, n) => {
         const before = light.keys[n - 1]?.field_deg ?? key.field_deg;
@@ -243,7 +265,7 @@ export function viewport(canvas, app) {
   function moveLight(px, py, time) {
     const drag = self.drag;
     const [mx, my] = toMm(px - drag.offX, py - drag.offY);
-    drag.now = [angle(mx), angle(my)];
+    drag.now = anglesAt([mx, my], app.state.lights[drag.light]);
     // the handle moves with the picture: painting costs more than all else here
     self.mover.want({ light: drag.light, x: drag.now[0].toFixed(4), y: drag.now[1].toFixed(4) }, time);
     if (!self.mover.busy()) redraw();

@@ -1,0 +1,67 @@
+"""Where a lens puts the direct image of a distant light: the height of its chief ray, distortion and all."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..model import Lens
+from .paraxial import FirstOrder
+from .shape import symmetric
+from .trace import trace_polylines
+
+Floats = NDArray[np.float64]
+
+_RAYS = 81
+
+
+def image_heights(lens: Lens, order: FirstOrder, angles_deg: Floats) -> Floats:
+    """Trace the rays of distant lights that pass the middle of the stop.
+
+    Parameters
+    ----------
+    lens : Lens
+        Complete.
+    order : FirstOrder
+        Of the lens as it is focused.
+    angles_deg : ndarray, shape (N,)
+        Field angles.
+
+    Returns
+    -------
+    ndarray, shape (N,)
+        Distance from the axis on the sensor, mm; NaN where no such ray exists, and of lenses that are not round.
+
+    Notes
+    -----
+    The paraxial height is efl tan(angle), to which these tend (tests/optics/test_image_height.py); the rest is the
+    lens' distortion.
+    """
+    angles = np.asarray(angles_deg, dtype=np.float64)
+    if not symmetric(lens):
+        return np.full(angles.shape, np.nan)
+    return np.array([_height(lens, order, float(angle)) for angle in angles])
+
+
+def _height(lens: Lens, order: FirstOrder, angle_deg: float) -> float:
+    tilt = np.radians(angle_deg)
+    first = lens.rows[0]
+    semi = getattr(first, "semi_diameter", None) or order.entrance_pupil_diameter
+    reach = semi + abs(order.entrance_pupil_z) * abs(np.tan(tilt))
+    low, high = -reach, reach
+    at_stop, on_sensor = np.zeros(2), np.zeros(2)
+    # the second round looks closely at where the first one found the middle of the stop
+    for _ in range(2):
+        y = np.linspace(low, high, _RAYS)
+        hits = trace_polylines(lens, None, np.zeros_like(y), y, -tilt, sensor_distance=order.sensor_distance)
+        # the start comes before the hits
+        stop, sensor = hits[:, lens.stop_row + 1, 1], hits[:, -1, 1]
+        whole = np.isfinite(stop) & np.isfinite(sensor)
+        crossing = np.flatnonzero(whole[:-1] & whole[1:] & (stop[:-1] * stop[1:] <= 0.0))
+        if not len(crossing):
+            return float("nan")
+        # the one nearest to the axis where a front that bends strongly has more
+        k = min(crossing, key=lambda each: abs(y[each]))
+        (low, high), at_stop, on_sensor = y[k : k + 2], stop[k : k + 2], sensor[k : k + 2]
+    part = at_stop[0] / (at_stop[0] - at_stop[1]) if at_stop[0] != at_stop[1] else 0.0
+    return float(abs(on_sensor[0] + part * (on_sensor[1] - on_sensor[0])))
