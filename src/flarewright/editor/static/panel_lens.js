@@ -11,7 +11,7 @@ const COLUMNS = [
   ['semi_diameter', 'Semi', 'Half the clear diameter, mm: rims cut ghosts. In italics: estimated.'],
   ['coating', 'Coating', 'none, quarter-wave:550, film:1.38:96, early-multicoat… What is coated well makes faint ghosts.'],
 ];
-const WIDTHS = ['22px', '57px', '55px', '58px', '50px', '36px', '54px', ''];
+const WIDTHS = ['22px', '57px', '52px', '58px', '50px', '36px', '50px', ''];
 
 export function lensPanel(app) {
   const body = h('tbody');
