@@ -15,14 +15,14 @@ from flarewright.cli.common import remembered
 from flarewright.errors import ProjectError
 from flarewright.io.flare_cache import read_cache, write_cache
 from flarewright.io.scene_file import EXAMPLE, scene_from_data
-from flarewright.model.scene import Scene
+from flarewright.model.scene import Lamp, LampKey, Scene
 from flarewright.optics.constellation import brightness_scale
 from flarewright.predict.flare import Frame
 from flarewright.predict.photometry import beam, disc_illuminance, exposure_level, point_illuminance
 from flarewright.predict.plan import plan_scene, ranking
 from flarewright.predict.search import best_position
 from flarewright.predict.switching import shots_of, switching
-from flarewright.predict.tracks import camera_track, moments, sightings
+from flarewright.predict.tracks import camera_track, lamp_places, moments, sightings
 
 FRAME = Frame(36.0, 24.0)
 
@@ -453,6 +453,13 @@ def test_command_plans_a_scene_and_its_veil_is_that_of_a_final_render(tmp_path, 
     # once more from the kept pictures: the same to the last digit
     assert run(arguments) == 0
     assert capsys.readouterr().out == first
+
+
+def test_a_lamp_moves_on_straight_lines_and_stays_where_its_last_keyframe_puts_it():
+    keys = (LampKey(at_s=10.0, position_m=(4.0, 0.0, 1.0)),)
+    lamp = Lamp(name="car", position_m=(-4.0, 0.0, 1.0), intensity_cd=1.0, keyframes=keys)
+    places = lamp_places(lamp, np.array([0.0, 5.0, 10.0, 20.0]))
+    assert places.tolist() == [[-4.0, 0.0, 1.0], [0.0, 0.0, 1.0], [4.0, 0.0, 1.0], [4.0, 0.0, 1.0]]
 
 
 def test_scene_init_is_a_scene_that_checks(tmp_path, capsys):

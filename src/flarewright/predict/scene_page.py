@@ -17,6 +17,7 @@ from .plan import Plan, Ranked
 from .scene_data import found_words, time_words
 from .search import Found
 from .switching import Shot
+from .tracks import lamp_places
 from .worst import Worst
 
 Floats = NDArray[np.float64]
@@ -170,7 +171,10 @@ def _map(plan: Plan, found: Found | None) -> Figure:
     """Draw the plan from above: cameras with their views, lamps, directions of distant lights, tried positions."""
     size, edge = 560.0, 40.0
     spots = [track.position_m[:, :2] for track in plan.tracks] + [track.aim_m[:, :2] for track in plan.tracks]
-    spots += [np.array([light.position_m[:2]]) for light in plan.scene.lights if isinstance(light, Lamp)]
+    lamps = {
+        k: lamp_places(light, plan.times_s) for k, light in enumerate(plan.scene.lights) if isinstance(light, Lamp)
+    }
+    spots += [places[:, :2] for places in lamps.values()]
     if found is not None:
         spots.append(plan.tracks[found.camera].position_m[0, :2] + found.offsets_m[:, :2])
     whole = np.concatenate(spots)
@@ -194,7 +198,9 @@ def _map(plan: Plan, found: Found | None) -> Figure:
         marks.append(Text(at[0] + 7.0, at[1] + 4.0, camera.name, 11.0, colour))
     for k, light in enumerate(plan.scene.lights):
         if isinstance(light, Lamp):
-            x, y = place(np.array(light.position_m))
+            x, y = place(lamps[k][0])
+            if np.ptp(lamps[k], axis=0).any():
+                marks.append(Line([place(spot) for spot in lamps[k]], "#b06d10", 1.0))
             marks += [
                 Line([(x - 4.0, y), (x + 4.0, y)], "#b06d10", 2.5),
                 Line([(x, y - 4.0), (x, y + 4.0)], "#b06d10", 2.5),

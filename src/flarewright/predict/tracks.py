@@ -186,9 +186,14 @@ def _far(track: CameraTrack, direction: Floats, lux: Floats, across: float) -> S
     return Sighting(constellation, roll, np.broadcast_to(lux, (count,)), np.full(count, across), np.full(count, np.inf))
 
 
+def lamp_places(light: Lamp, times_s: Floats) -> Floats:
+    """Return where a lamp is over time, metres, shape (T, 3)."""
+    return _moving(light.position_m, [(key.at_s, key.position_m) for key in light.keyframes], times_s)
+
+
 def _lamp(light: Lamp, track: CameraTrack, times_s: Floats, where: str) -> Sighting:
     keys = light.keyframes
-    position = _moving(light.position_m, [(key.at_s, key.position_m) for key in keys], times_s)
+    position = lamp_places(light, times_s)
     away = position - track.position_m
     distance = np.linalg.norm(away, axis=1)
     touching = np.asarray(distance < 1e-6)
