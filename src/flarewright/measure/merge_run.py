@@ -155,7 +155,7 @@ def _folder(output: Path, frames: int, size_px: tuple[int, int]) -> Path:
     needed = max(missing, 0) * size_px[0] * size_px[1] * 6 * 4
     if needed > free:
         raise OutputError(
-            f"{output} has {free / 1e9:.1f} GB left, and {missing} frames may need {needed / 1e9:.1f} GB: free some "
+            f"{output} has {free / 1e9:.2g} GB left, and {missing} frames may need {needed / 1e9:.2g} GB: free some "
             "space, choose another folder, or average pixels with --block 2"
         )
     return output
