@@ -167,6 +167,14 @@ def test_dirt_in_ghosts_diffracts_too():
     assert found.sum() == pytest.approx(sharp.sum(), rel=0.01)
 
 
+def test_what_makes_rings_slow_is_told():
+    small = Camera(size_px=(32, 18))
+    dirt = Dirt(dust_per_mm2=0.3, dust_um=(200.0, 400.0), seed=2, in_ghosts=True)
+    for ringing, wanted, slow in (("collins", dirt, True), ("off", dirt, False), ("collins", Dirt(), False)):
+        told = render(project("2-1", ringing, dirt=wanted, camera=small)).remarks
+        assert any("--ringing off leaves them out" in remark for remark in told) is slow
+
+
 def test_draft_says_that_it_has_no_rings():
     quality = Quality(mode="draft", ringing="frft")
     assert any("quality.ringing" in told for told in render(project(quality=quality)).remarks)

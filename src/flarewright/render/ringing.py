@@ -72,7 +72,7 @@ OCTAVES = 1.5
 TEXEL_PX = 0.7
 """Patterns are no finer than this on the sensor, in pixels, and the wave of white light no finer than half of it."""
 
-KEPT_BYTES = 400_000_000
+KEPT_BYTES = 150_000_000
 KEPT_GRID_BYTES = 100_000_000
 KEPT_JOINED_BYTES = 20_000_000
 # a crossing is lit where rays come as near to its edge as this part of the circle within it
