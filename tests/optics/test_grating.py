@@ -90,7 +90,7 @@ def frame(grating, fill=0.7):
             cover_glass=Plate(glass="N-BK7", thickness=1.0, gap=1.5),
             sensor_grating=None if grating is None else SensorGrating(period_um=grating, fill=fill, orders=2),
         ),
-        quality=Quality(wavelengths=1),
+        quality=Quality(wavelengths=1, ringing="off"),
         output=Output(layers="ghosts", starburst=False),
     )  # fmt: skip
 

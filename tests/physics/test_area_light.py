@@ -153,6 +153,7 @@ def test_a_light_beside_the_frame_has_its_ghosts_in_it():
     assert np.abs(picture(made) - points).sum() < 0.02 * points.sum()
 
 
+@pytest.mark.slow
 def test_final_quality_agrees_with_the_reference_on_an_area_light():
     judged = judge(
         project(light((7.0, 4.0), diameter_deg=3.0), f_number=5.6, layers="ghosts", starburst=False, step=1.0),

@@ -20,7 +20,7 @@ def picture(lens, field, mode="draft", blades=0, rotation=0.0, f_number=None, di
     project = Project(
         lens=lens, lights=(Light(field_deg=field),), f_number=f_number,
         camera=Camera(size_px=SIZE, sensor_mm=(36.0, 36.0), sensor_distance=distance),
-        quality=Quality(mode=mode, wavelengths=3), output=Output(starburst=False, layers="beauty"),
+        quality=Quality(mode=mode, wavelengths=3, ringing="off"), output=Output(starburst=False, layers="beauty"),
         iris=Iris(blades=blades, rotation_deg=rotation),
     )  # fmt: skip
     return render(project).layers[0].pixels.sum(axis=2, dtype=np.float64)

@@ -328,7 +328,7 @@ def test_no_flux_is_lost_where_the_core_is_smaller_than_a_pixel(mode, lights):
             lights=(Light(field_deg=(0.0, 0.0)),) * lights,
             iris=Iris(),
             camera=Camera(size_px=size),
-            quality=Quality(mode=mode, wavelengths=3),
+            quality=Quality(mode=mode, wavelengths=3, ringing="off"),
             output=Output(layers="passes"),
         )
         (layer,) = (layer for layer in render(project).layers if layer.name == "starburst")
