@@ -112,6 +112,24 @@ def check_place(path: Path, suffix: str | tuple[str, ...]) -> None:
         raise OutputError(f"cannot write {path}: it is a folder; give a file name")
 
 
+def check_free(path: Path, force: bool) -> None:
+    """Refuse to replace a file that a person may have written, unless asked to.
+
+    Parameters
+    ----------
+    path : path
+    force : bool
+        The command's --force.
+
+    Raises
+    ------
+    OutputError
+        When there is something of this name already.
+    """
+    if path.exists() and not force:
+        raise OutputError(f"{path} exists already; choose another name, or replace it with --force")
+
+
 def console() -> Console:
     """Return where tables go: the terminal's width, or 140 columns in a file or pipe."""
     from rich.console import Console

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ..errors import OutputError, ProjectError
-from .common import check_place, field_angles, print_json, tell, write_text
+from ..errors import ProjectError
+from .common import check_free, check_place, field_angles, print_json, tell, write_text
 
 if TYPE_CHECKING:
     from ..design.seen import SeenGhost
@@ -44,8 +44,7 @@ def target(
 ) -> None:
     """Write a project that wants the ghosts which a picture shows; look through it before `design solve`."""
     check_place(output, ".toml")
-    if output.exists() and not force:
-        raise OutputError(f"{output} exists already; choose another name, or replace it with --force")
+    check_free(output, force)
     if not 0.1 <= sensor_width <= 10000.0:
         raise ProjectError(f"--sensor-width {sensor_width:g} is no width of a sensor; give millimetres above 0.1")
     if focal is not None and not 0.5 <= focal <= 10000.0:

@@ -226,24 +226,18 @@ def _print_table(table: GhostTable, name: str, angles: tuple[float, float], brig
     console().print(out)
 
 
-def _of_direct(row: GhostRow, direct: GhostRow) -> str:
-    if row.first_reflection is None:
-        return "1"
-    # light that no lens takes in directly may still make ghosts
-    return f"{row.throughput_mm2 / direct.throughput_mm2:.2e}" if direct.throughput_mm2 > 0.0 else "-"
-
-
 def _cells(row: GhostRow, direct: GhostRow) -> tuple[str, ...]:
     if row.throughput_mm2 == 0.0:
         return ("0", "-", "-", "-", "-", row.bounded_by, "-")
     ghost = row.first_reflection is not None
-    peak = f"{row.peak_irradiance:.3g}" if ghost and direct.throughput_mm2 > 0.0 else "-"
+    # light that no lens takes in directly may still make ghosts
+    compared = ghost and direct.throughput_mm2 > 0.0
     return (
         f"{row.throughput_mm2:.4g}",
-        _of_direct(row, direct),
+        f"{row.throughput_mm2 / direct.throughput_mm2:.2e}" if compared else "-" if ghost else "1",
         f"{row.centroid_mm[0]:.2f}, {row.centroid_mm[1]:.2f}",
         f"{row.rms_radius_mm:.3g}",
-        peak,
+        f"{row.peak_irradiance:.3g}" if compared else "-",
         row.bounded_by if ghost else "-",
         "-" if row.focus_distance_mm is None or not ghost else f"{row.focus_distance_mm:.1f}",
     )

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from ..errors import OutputError
-from .common import check_place, tell
+from .common import check_free, check_place, tell
 
 EPILOG = (
     "Examples:\n\nflarewright lens convert old/tessar.lens tessar.toml\n\nflarewright lens convert double-gauss.zmx "
@@ -25,8 +25,7 @@ def convert(
     check_place(target, ".toml")
     if target.exists() and Path(source).exists() and target.samefile(source):
         raise OutputError(f"{target} is the file to convert; give another name for the output")
-    if target.exists() and not force:
-        raise OutputError(f"{target} exists already; choose another name, or replace it with --force")
+    check_free(target, force)
     from ..io.lens_writer import write_lens
     from ..render.prepare import load_lens
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..errors import ProjectError
-from .common import check_place, chosen_fstop, console, field_angles, print_json, tell
+from .common import check_place, chosen_fstop, console, field_angles, print_json, tell, write_text
 
 if TYPE_CHECKING:
     from ..model import Lens, Surface
@@ -52,7 +52,6 @@ def show(
     prescription = build(load_lens(lens, remarks=remarks), zoom=zoom).lens
     order = first_order(prescription, f_number)
     if plot is not None:
-        from ..io.atomic import write_atomically
         from ..render.cross_section import cross_section
 
         ghost_rows = None
@@ -60,17 +59,13 @@ def show(
             ghost_rows = (len(prescription.rows) if mirrors[0] is None else mirrors[0], mirrors[1])
         picture = cross_section(prescription, order, field_deg=angles, ghost=ghost_rows)
         remarks += picture.remarks
-        write_atomically(plot, lambda temporary: _write_text(temporary, picture.svg))
+        write_text(plot, picture.svg)
     tell(remarks)
     data = as_data(prescription, order)
     if as_json:
         print_json({**data, "remarks": remarks})
     else:
         _print(data)
-
-
-def _write_text(path: Path, text: str) -> None:
-    path.write_text(text, "utf-8")
 
 
 def _mirrors(text: str) -> tuple[int | None, int]:

@@ -8,8 +8,7 @@ from typing import Annotated
 
 import typer
 
-from ..errors import OutputError
-from .common import check_place, field_angles, tell
+from .common import check_free, check_place, field_angles, tell, write_text
 
 EPILOG = (
     "Example:\n\nflarewright project init heliar-tronnier -o shot.toml\n\n"
@@ -29,9 +28,7 @@ def init(
     angles = field_angles(light)
     if output is not None:
         check_place(output, ".toml")
-        if output.exists() and not force:
-            raise OutputError(f"{output} exists already; choose another name, or replace it with --force")
-    from ..io.atomic import write_atomically
+        check_free(output, force)
     from ..io.library import lens_path, shipped
     from ..io.project_file import project_text
     from ..model import Light, Project
@@ -48,9 +45,5 @@ def init(
     if output is None:
         print(text, end="")
         return
-    write_atomically(output, lambda temporary: _write_text(temporary, text))
+    write_text(output, text)
     tell([*remarks, f"wrote {output}"])
-
-
-def _write_text(path: Path, text: str) -> None:
-    path.write_text(text, "utf-8")

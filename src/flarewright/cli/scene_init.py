@@ -7,8 +7,7 @@ from typing import Annotated
 
 import typer
 
-from ..errors import OutputError
-from .common import check_place, tell, write_text
+from .common import check_free, check_place, tell, write_text
 
 EPILOG = "Example:\n\nflarewright scene init -o match.toml\n\nflarewright predict match.toml -o match.html"
 
@@ -26,7 +25,6 @@ def init(
         print(EXAMPLE, end="")
         return
     check_place(output, ".toml")
-    if output.exists() and not force:
-        raise OutputError(f"{output} exists already; choose another name, or replace it with --force")
+    check_free(output, force)
     write_text(output, EXAMPLE)
     tell([f"wrote {output}"])

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from .blade_form import BladeForm, to_corner
 from .fft_size import fast_size
 from .iris import coverage, softened
-from .ringing import FADE
+from .ringing import FADE, ending
 
 Floats = NDArray[np.float64]
 Singles = NDArray[np.float32]
@@ -246,10 +246,9 @@ def _spectrum(normals: Floats, blade: tuple[float, float], x: Floats, y: Floats)
     amplitude = softened(coverage(edges, x, y[:, None], 2.0 / _WAVE_SAMPLES))
     f = np.fft.fftfreq(len(x), 1.0 / _WAVE_SAMPLES)
     squared = f**2 + f[:, None] ** 2
-    fade = np.clip((FADE[1] - 2.0 * np.sqrt(squared)) / (FADE[1] - FADE[0]), 0.0, 1.0)
     # the border was averaged over a triangle two samples wide, which took sinc^2 of the frequencies across it
     soft = np.sinc(np.minimum(np.sqrt(squared) / _WAVE_SAMPLES, 0.5)) ** 2
-    turn = np.exp(-2j * math.pi * squared) * (fade * fade * (3.0 - 2.0 * fade) / soft)
+    turn = np.exp(-2j * math.pi * squared) * (ending(2.0 * np.sqrt(squared), *FADE) / soft)
     return np.asarray(np.fft.fft2(amplitude) * turn)
 
 

@@ -290,7 +290,7 @@ def _finish(rows: list[RawRow], draft: Lens, per_mm: float, remarks: list[str]) 
         if not semi:
             remarks.append(f"line {row.line}: no aperture is given; it will be estimated")
             semi = None
-        elif semi * abs(row.curvature) > 1.0:
+        elif semi > drafted.equator:
             remarks.append(
                 f"line {row.line}: a rim of {semi:g} mm does not fit a radius of {1 / row.curvature:g}; "
                 "it will be estimated"

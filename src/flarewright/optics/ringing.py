@@ -15,6 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +27,7 @@ from .paths import LightPath
 
 Floats = NDArray[np.float64]
 Singles = NDArray[np.float32]
+Kind = TypeVar("Kind", np.float32, np.float64)
 
 # a few dozen steps: Python has them done before a compiled kernel would be loaded
 _path_matrices = getattr(matrix.path_matrices, "py_func", matrix.path_matrices)
@@ -64,6 +66,7 @@ __all__ = [
     "FresnelGrid",
     "StopToSensor",
     "crop",
+    "ending",
     "fresnel_grid",
     "fresnel_intensity",
     "frft_fresnel_number",
@@ -256,6 +259,13 @@ def fresnel_grid(
     return FresnelGrid((x, y), spectrum, float(light.sum()))
 
 
+def ending(at: NDArray[Kind], first: float, last: float) -> NDArray[Kind]:
+    """Fall smoothly from 1 up to the first place to 0 from the last."""
+    fade = np.clip((last - at) / (last - first), 0.0, 1.0)
+    found: NDArray[Kind] = fade * fade * (3.0 - 2.0 * fade)
+    return found
+
+
 def fresnel_intensity(grid: FresnelGrid, area: tuple[float, float], *, white: bool = False) -> Singles:
     """Diffract an opening.
 
@@ -286,12 +296,10 @@ def fresnel_intensity(grid: FresnelGrid, area: tuple[float, float], *, white: bo
         w = np.abs(2.0 * area[1]) * (fy**2)[:, None].astype(np.float32) + np.abs(2.0 * area[0]) * (fx**2).astype(
             np.float32
         )
-        fade = np.clip((FADE[1] - np.sqrt(w, dtype=np.float32)) / (FADE[1] - FADE[0]), 0.0, 1.0)
-        turn *= fade * fade * (3.0 - 2.0 * fade)
+        turn *= ending(np.sqrt(w, dtype=np.float32), *FADE)
         # a grid that pixels or samples limit ends before that: softly, or edges would ring of its own
         per_finest = 2.0 * grid.step * np.hypot(fx, fy[:, None]).astype(np.float32)
-        fade = np.clip((1.0 - per_finest) / (1.0 - FINEST_PART), 0.0, 1.0)
-        turn *= fade * fade * (3.0 - 2.0 * fade)
+        turn *= ending(per_finest, FINEST_PART, 1.0)
     shape = (len(grid.at[1]), len(grid.at[0]))
     real = np.fft.irfft2(grid.spectrum * turn.real, shape)
     imaginary = np.fft.irfft2(grid.spectrum * turn.imag, shape)
