@@ -33,7 +33,7 @@ def compiled(function: Callable[..., Any]) -> Any:
         return _njit(function, **_OPTIONS)
 
 
-def inner(function: Callable[..., Any]) -> Any:
+def inner(function: Callable[..., Any], **options: Any) -> Any:
     """Compile a kernel that only kernels call; from Python it raises TypeError.
 
     It has neither what Python needs to call it, nor machine code, nor a cache of its own, for its callers hold its
@@ -43,12 +43,21 @@ def inner(function: Callable[..., Any]) -> Any:
     def refuse(*_: Any, **__: Any) -> None:
         raise TypeError(f"{function.__name__} is for kernels; Python may call its py_func")
 
-    kernel = _njit(function, **_INNER, **_OPTIONS)
+    kernel = _njit(function, **_INNER, **_OPTIONS, **options)
     if hasattr(kernel, "_insert"):
         # Numba itself would jump to the code that is not there
         kernel._insert = lambda *_: None
         kernel._compile_for_args = refuse
     return kernel
+
+
+def borrowing(function: Callable[..., Any]) -> Any:
+    """Compile an `inner` kernel that makes and returns no arrays: those that it is given are its callers' to keep.
+
+    Numba else counts, with a lock, how often each array is held, at every call: of a frame's small triangles and cells
+    that was a twelfth of the time. To make an array here does not compile.
+    """
+    return inner(function, _nrt=False)
 
 
 def for_python(kernel: Any) -> Any:

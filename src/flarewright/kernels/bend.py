@@ -85,11 +85,35 @@ def bend_at(gx, gy, gz, dx, dy, dz, root, heading, eta, mirror):
     """
     inv_norm = 1.0 / sqrt(gx * gx + gy * gy + gz * gz)
     cos_in = root * inv_norm
-    inside = 1.0 - eta * eta * (1.0 - cos_in * cos_in)
+    nx, ny, nz, cos_out, inside = bend_about(
+        gx, gy, gz, dx, dy, dz, cos_in, cos_in * cos_in, heading * inv_norm, eta, mirror
+    )
+    return nx, ny, nz, cos_in, cos_out, inside
+
+
+@inlined
+def bend_about(gx, gy, gz, dx, dy, dz, cos_in, square, unit, eta, mirror):
+    """Refract or reflect a ray where its angle is known too.
+
+    Parameters
+    ----------
+    gx, gy, gz, dx, dy, dz, eta, mirror
+        As in `bend_at`.
+    cos_in, square : float
+        Cosine before the surface, and its square: on a sphere both are known without each other.
+    unit : float
+        What makes the gradient a unit vector against the ray.
+
+    Returns
+    -------
+    nx, ny, nz, cos_out, inside
+        As `bend_at`.
+    """
+    inside = 1.0 - eta * eta * (1.0 - square)
     cos_out = sqrt(max(inside, 0.0))
-    along = (2.0 * cos_in if mirror > 0.0 else eta * cos_in - cos_out) * heading * inv_norm
+    along = (2.0 * cos_in if mirror > 0.0 else eta * cos_in - cos_out) * unit
     scale = 1.0 if mirror > 0.0 else eta
-    return scale * dx + along * gx, scale * dy + along * gy, scale * dz + along * gz, cos_in, cos_out, inside
+    return scale * dx + along * gx, scale * dy + along * gy, scale * dz + along * gz, cos_out, inside
 
 
 @inlined

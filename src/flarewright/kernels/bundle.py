@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ._jit import compiled, inner
+from ._jit import borrowing, compiled
 from .clip import (
     MAX_VERTICES,
     PP,
@@ -30,7 +30,7 @@ SHARED = np.int64(1 << SHARED_BIT)
 ROUGH = 5e-3
 
 
-@inner
+@borrowing
 def _triangle_flux(data, pupil, a, b, c):
     """Return the flux entering a triangle of the pupil times its mean weight, and its signed area on the sensor."""
     spread = (data[b, X] - data[a, X]) * (data[c, Y] - data[a, Y])
@@ -209,7 +209,7 @@ def draw_bundle(
             start = end
 
 
-@inner
+@borrowing
 def _put_in_stop(data, node, mirror, axes, stops, m):
     """Fill in where a node crosses the stop, in the upright frame, as the m-th place."""
     for k in range(stops.shape[0]):
@@ -217,7 +217,7 @@ def _put_in_stop(data, node, mirror, axes, stops, m):
         stops[k, m, 0], stops[k, m, 1] = u * axes[0, 0] + v * axes[1, 0], u * axes[0, 1] + v * axes[1, 1]
 
 
-@inner
+@borrowing
 def _even_over_cell(data, triangles, start, end, mirror, crossings, axes, mask):
     """Return what a mask lets through of a cell where it is even at all crossings, 0 where it is dark, else -1."""
     alike = 1.0
@@ -235,7 +235,7 @@ def _even_over_cell(data, triangles, start, end, mirror, crossings, axes, mask):
     return alike
 
 
-@inner
+@borrowing
 def _gather_cell(spots, blocked, triangles, start, end, width, height, polygon):
     """Collect the border of a cell; return its vertices, 0 when it cannot be drawn as one polygon.
 
@@ -268,7 +268,7 @@ def _gather_cell(spots, blocked, triangles, start, end, width, height, polygon):
     return count
 
 
-@inner
+@borrowing
 def _plane_over_cell(spots, densities, triangles, start, end, mean, unit, drawn):
     """Fit a linear density to the nodes of a cell: whether it fits, its value at the origin, gradient, bounds.
 
@@ -313,7 +313,7 @@ def _plane_over_cell(spots, densities, triangles, start, end, mean, unit, drawn)
     return True, base, gx, gy, (average + low) * ratio, (average + high) * ratio
 
 
-@inner
+@borrowing
 def _place_nodes(data, mirror, crossings, blades, axes, to_pixels, spots, blocked):
     """Fill the nodes' places in pixels and a bit for every edge that blocks them: 0 is none, -1 a ray that ended."""
     # most rays pass within all blades
@@ -341,14 +341,14 @@ def _place_nodes(data, mirror, crossings, blades, axes, to_pixels, spots, blocke
         blocked[k] = found
 
 
-@inner
+@borrowing
 def _pupil_area(pupil, a, b, c):
     """Area of a triangle of the pupil; its nodes run counter-clockwise."""
     area = (pupil[b, 0] - pupil[a, 0]) * (pupil[c, 1] - pupil[a, 1])
     return 0.5 * (area - (pupil[b, 1] - pupil[a, 1]) * (pupil[c, 0] - pupil[a, 0]))
 
 
-@inner
+@borrowing
 def _plane_through(corner, mean, unit, drawn):
     """Return the linear density through three nodes, scaled to a mean: value at the origin, gradient, bounds.
 
@@ -368,7 +368,7 @@ def _plane_through(corner, mean, unit, drawn):
     return base, gx, gy, min(min(d0, d1), d2), max(max(d0, d1), d2)
 
 
-@inner
+@borrowing
 def _splat_polygon(polygon, count, flux, rgb, plane):
     """Draw a polygon without area as the line between its two farthest vertices."""
     best, a, b = -1.0, 0, 0

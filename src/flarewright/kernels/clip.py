@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ._jit import inlined, inner
+from ._jit import borrowing, inlined
 from .trace import REL, STOP_X, WEIGHT, X, Y
 
 # columns of a polygon's vertex; then u, v for each crossing of the stop
@@ -19,7 +19,7 @@ def slope_over(x1, y1, x2, y2, inverse, rise1, rise2):
     return (rise1 * y2 - rise2 * y1) * inverse, (rise2 * x1 - rise1 * x2) * inverse
 
 
-@inner
+@borrowing
 def _cut(polygon, count, values, other):
     """Keep the part of a convex polygon where linearly interpolated values are <= 0 (Sutherland and Hodgman 1974)."""
     kept = 0
@@ -42,14 +42,14 @@ def _cut(polygon, count, values, other):
     return kept
 
 
-@inner
+@borrowing
 def blade_value(blades, b, u, v):
     """Evaluate a blade's edge: <= 0 on the open side, its gradient 1 on the border (`optics.iris.blade_edges`)."""
     qx, qy = u - blades[b, 2] * blades[b, 0], v - blades[b, 2] * blades[b, 1]
     return blades[b, 0] * qx + blades[b, 1] * qy + 0.5 * blades[b, 3] * (qx * qx + qy * qy)
 
 
-@inner
+@borrowing
 def cut_by_blades(polygon, count, crossings, blades, other, values):
     """Cut a polygon by every blade at every crossing of the stop; return its vertices, 0 when nothing passes."""
     for c in range(crossings):
@@ -63,7 +63,7 @@ def cut_by_blades(polygon, count, crossings, blades, other, values):
     return count if count >= 3 else 0
 
 
-@inner
+@borrowing
 def clip_triangle(data, pupil, triangle, mirror, crossings, blades, axes, polygon, other, values):
     """Cut one triangle by rims and blades.
 
@@ -116,7 +116,7 @@ def clip_triangle(data, pupil, triangle, mirror, crossings, blades, axes, polygo
     return cut_by_blades(polygon, count, crossings, blades, other, values)
 
 
-@inner
+@borrowing
 def polygon_area(polygon, count, a, b):
     """Signed area of a polygon in two of its columns."""
     area = 0.0
@@ -126,7 +126,7 @@ def polygon_area(polygon, count, a, b):
     return 0.5 * area
 
 
-@inner
+@borrowing
 def cut_to_rectangle(polygon, count, other, values, width, height):
     """Cut a polygon whose first two columns are pixels to the picture [0, width] x [0, height]."""
     for side in range(4):

@@ -71,6 +71,39 @@ def intersect_conic(curvature, conic, x, y, z, dx, dy, dz, heading):
     return t, root, discriminant
 
 
+# 1/mm; the roundings of a sphere this flat or flatter, times its radius, would be seen in the step to it
+FLATTEST = 1e-4
+
+
+@inlined
+def intersect_sphere(curvature, radius, x, y, z, dx, dy, dz, heading):
+    """Step from a point to a sphere, not flatter than `FLATTEST`, whose vertex is the origin.
+
+    Parameters
+    ----------
+    curvature, radius : float
+        1/radius in 1/mm, and the radius.
+    x, y, z, dx, dy, dz, heading
+        As in `intersect_conic`.
+
+    Returns
+    -------
+    t, root, discriminant
+        As `intersect_conic`.
+
+    Notes
+    -----
+    A = c does not depend on the ray, so the same root of A t^2 + 2 B t + C = 0 is -(B + heading sqrt(B^2 - A C)) R: no
+    division, which takes the processor as long as a dozen products. B and the root nearly cancel: t is known to 2e-16
+    R, 2e-12 mm at most. The gradient c (x, y, z) - (0, 0, 1) at the hit is a unit vector.
+    """
+    b = curvature * (x * dx + y * dy + z * dz) - dz
+    c = curvature * (x * x + y * y + z * z) - 2.0 * z
+    discriminant = b * b - curvature * c
+    root = sqrt(max(discriminant, 0.0))
+    return -(b + heading * root) * radius, root, discriminant
+
+
 @inner
 def _asphere(shapes, row, x, y):
     """Return the even asphere's sum A4 r^4 + A6 r^6 + ... and its gradient; tangential beyond the rim's neighbourhood.

@@ -9,7 +9,7 @@ from math import floor, log2
 
 import numpy as np
 
-from ._jit import inner
+from ._jit import borrowing, inner
 from .clip import PSTOP, cut_to_rectangle, slope_over
 from .pattern import (
     AT_X,
@@ -36,7 +36,7 @@ from .raster import fill_polygon, plane_size
 LEVEL = 0.58
 
 
-@inner
+@borrowing
 def mask_value(mask, half, u, v):
     """Interpolate a mask that spans [-half, half] squared, row 0 at +v; 0 outside."""
     rows, columns = mask.shape
@@ -63,7 +63,7 @@ def mask_texture(mask, crossings, width):
     )  # fmt: skip
 
 
-@inner
+@borrowing
 def even_value(mask, u_low, u_high, v_low, v_high):
     """Return the mask's value where it does not vary over a rectangle of the stop, else -1."""
     values, levels, changes = mask
@@ -80,7 +80,7 @@ def even_value(mask, u_low, u_high, v_low, v_high):
     return float(values[r0 * columns + c0])
 
 
-@inner
+@borrowing
 def place_mask(polygon, count, crossings, corner, stops, mask, texture):
     """Fill in how the mask is looked up over a polygon; return what is alike over all of it, 0 where it is dark.
 
@@ -135,7 +135,7 @@ def place_mask(polygon, count, crossings, corner, stops, mask, texture):
     return alike
 
 
-@inner
+@borrowing
 def take_level(mask, table, c, covered):
     """Fill the table's row of a crossing with the level for pixels that cover so many samples of the mask."""
     level = 0
@@ -147,7 +147,7 @@ def take_level(mask, table, c, covered):
     table[c, CORNERS] = -1.0
 
 
-@inner
+@borrowing
 def fill_through_mask(
     polygon, count, crossings, corner, stops, mask, texture, density, gx, gy, density_low, density_high, rgb, plane,
     other, values,
@@ -185,7 +185,7 @@ def fill_through_mask(
         )  # fmt: skip
 
 
-@inner
+@borrowing
 def masked_point(polygon, crossings, mask, texture):
     """Return what the mask lets through at the first vertex of a polygon."""
     part = 1.0

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ._jit import compiled, inlined, inner
+from ._jit import borrowing, compiled, inlined, inner
 from .prepass import rejected
 from .trace import ALIVE, REL, STOP_X, WEIGHT, X, Y, trace_lanes
 
@@ -16,12 +16,12 @@ FRINGE_CELL = 128.0
 SLIVER_LEVEL = 3
 
 
-@inner
+@borrowing
 def _judge(
     data, nodes, crossings, iris_radius, iris_inner, level, rim_level, max_level, h, tolerance, flux_tolerance,
-    fringe_tolerance, faint_radius, scale, view_radius,
+    fringe_tolerance, faint_radius, scale, view_radius, values,
 ):  # fmt: skip
-    """Decide whether a cell of 3 x 3 nodes is EMPTY, to be SPLIT, a LEAF, or a FLAT one.
+    """Decide whether a cell of 3 x 3 nodes is EMPTY, to be SPLIT, a LEAF, or a FLAT one; `values`, shape (9,), is room.
 
     The fan of a LEAF uses the middles of its edges, which leaves a quarter of the measured error.
     """
@@ -46,7 +46,7 @@ def _judge(
     at_rim, at_fringes = False, False
     # the rim of the bundle decides its flux, so it is resolved however small the ghost is
     for limit in range(crossings, -1, -1):
-        low, high, bend = _limit_range(data, nodes, limit, iris_radius)
+        low, high, bend = _limit_range(data, nodes, limit, iris_radius, values)
         # between the circles in and around the iris run its blades
         if limit > 0 and low * iris_radius > faint_radius:
             return FLAT
@@ -83,7 +83,7 @@ def _judge(
     return LEAF if error > 1.0 else FLAT
 
 
-@inner
+@borrowing
 def _ends_differ(data, nodes):
     """Tell whether all rays of a cell end, and not all at the same surface."""
     low, high = np.inf, -np.inf
@@ -94,10 +94,9 @@ def _ends_differ(data, nodes):
     return low < high
 
 
-@inner
-def _limit_range(data, nodes, limit, iris_radius):
+@borrowing
+def _limit_range(data, nodes, limit, iris_radius, values):
     """Return a limit's least and largest value over a cell and how much it bends: 0 the rims, then each crossing."""
-    values = np.empty(9)
     low, high = np.inf, -np.inf
     for m in range(9):
         k = nodes[m]
@@ -115,7 +114,7 @@ def _limit_range(data, nodes, limit, iris_radius):
     return low, high, bend
 
 
-@inner
+@borrowing
 def _bend(data, nodes, column):
     """Return the largest departure of a quantity from its bilinear interpolation between the corners."""
     a, b, c, d = data[nodes[0], column], data[nodes[2], column], data[nodes[6], column], data[nodes[8], column]
@@ -131,7 +130,7 @@ def _around(m):
     return (0x012587630 >> (4 * m)) & 15
 
 
-@inner
+@borrowing
 def _fan_areas(data, nodes):
     """Return the least and largest signed area on the sensor of the eight triangles around a cell's centre."""
     cx, cy = data[nodes[4], X], data[nodes[4], Y]
@@ -204,7 +203,7 @@ def build_mesh(
     data = np.empty((n_gap.shape[0], 2048, columns))
     # a bare 0 would be a type of its own and compile what it is given to twice
     n_nodes = np.int64(0)
-    nodes = np.empty(9, dtype=np.int64)
+    nodes, values = np.empty(9, dtype=np.int64), np.empty(9)
     cells = np.empty(nx * ny, dtype=np.int64)
     for k in range(nx * ny):
         cells[k] = k
@@ -229,7 +228,7 @@ def build_mesh(
             for v in range(n_gap.shape[0]):
                 found = _judge(
                     data[v], nodes, crossings, iris_radius, iris_inner, level, rim_level, max_level, h,
-                    tolerance, flux_tolerance, fringe_tolerance, faint_radius, scale, view_radius,
+                    tolerance, flux_tolerance, fringe_tolerance, faint_radius, scale, view_radius, values,
                 )  # fmt: skip
                 if found == SPLIT:
                     verdict = SPLIT
@@ -280,7 +279,7 @@ def _deeper(lattice, state, cells):
     return finer, longer
 
 
-@inner
+@borrowing
 def _cell_nodes(lattice, a, b, level, depth, nodes):
     """Look up the 3 x 3 nodes of a cell, row by row in x."""
     half = 1 << (depth - level)
@@ -353,7 +352,7 @@ def _leaves(state, offsets, level):
     return found
 
 
-@inner
+@borrowing
 def _balance(state, offsets, nx, ny, depth):
     """Split leaves until neighbours differ by one level at most, from the finest cells up."""
     for level in range(depth - 1, 0, -1):
@@ -369,7 +368,7 @@ def _balance(state, offsets, nx, ny, depth):
                     _ensure(state, offsets, ny, level, i, j)
 
 
-@inner
+@borrowing
 def _ensure(state, offsets, ny, level, a, b):
     """Make a cell exist by splitting the leaf that covers it, if there is one."""
     # find the ancestor that is settled, then split downwards

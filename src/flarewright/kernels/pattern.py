@@ -4,7 +4,7 @@ from math import sqrt
 
 import numpy as np
 
-from ._jit import inlined, inner
+from ._jit import borrowing, inlined
 from .vectors import LANES, multiply_between, multiply_taken
 
 # columns of a table of patterns, one row a crossing of the stop; lengths in mm, places as seen from the middle
@@ -85,7 +85,7 @@ def _edge_value(patterns, first, last, at):
     return patterns[np.uint64(first + np.int64(np.int32(min(max(at, np.float32(0.0)), last) + np.float32(0.5))))]
 
 
-@inner
+@borrowing
 def pattern_value(patterns, table, corners, k, x, y):
     """Return the k-th pattern at a place in the stop, mm."""
     if table[k, CORNERS] < 0.0:
@@ -108,7 +108,7 @@ def pattern_value(patterns, table, corners, k, x, y):
     return _edge_value(patterns, np.int64(table[k, EDGE]), np.float32(table[k, EDGE_COUNT] - 1.0), np.float32(at))
 
 
-@inner
+@borrowing
 def place_in_pattern(table, corners, k, stops, count):
     """Change a polygon's places in the stop, shape (>= count, 2), mm, into what its pattern is looked up by.
 
@@ -172,7 +172,7 @@ def _normal(table, corners, k, blade):
     return cosine * cx - sine * cy, sine * cx + cosine * cy
 
 
-@inner
+@borrowing
 def _near_corner(table, corners, k, blade, stops, count):
     """Tell whether a polygon comes into the table of a corner of a blade."""
     for side in range(2):
@@ -295,7 +295,7 @@ def weave(patterns, table, corners, places, light, where, beside, below, row, fi
                 multiply_between(light, begin + np.uint64(m), patterns, columns, where, beside, below, m)
 
 
-@inner
+@borrowing
 def is_dark(table, corners, k, stops, count):
     """Tell whether a pattern is dark over a polygon, shape (>= count, 2), mm."""
     left, right, low, high = np.inf, -np.inf, np.inf, -np.inf

@@ -6,7 +6,7 @@ symmetric in x and only x >= 0 is traced (Hullin 2011, section 4.2, "Symmetries"
 
 import numpy as np
 
-from ._jit import compiled, inner
+from ._jit import borrowing, compiled, inner
 from .trace import ALIVE, REL, STOP, STOP_X, WEIGHT, X, Y, trace_lanes
 
 # paths seen by fewer cells of the pre-pass than this are searched for spots between its samples, at most so many a side
@@ -16,13 +16,13 @@ PROBES = 8
 HALVINGS = 5
 
 
-@inner
+@borrowing
 def _outside(value_low, value_high, slack):
     """Tell whether a quantity stays above 1 between samples, allowing for `slack` of its range below the least."""
     return value_low - slack * (value_high - value_low) > 1.0
 
 
-@inner
+@borrowing
 def _stop_outside(data, nodes, crossing, iris_radius, slack):
     """Tell whether a patch misses the iris at one crossing: its widened box in the stop plane lies outside."""
     u_low, u_high, v_low, v_high = np.inf, -np.inf, np.inf, -np.inf
@@ -38,7 +38,7 @@ def _stop_outside(data, nodes, crossing, iris_radius, slack):
     return du * du + dv * dv > iris_radius * iris_radius
 
 
-@inner
+@borrowing
 def rejected(data, nodes, crossings, iris_radius, slack):
     """Tell whether no ray of a patch can pass: all samples dead, all beyond a rim, or all beside the iris."""
     low, high, alive = np.inf, -np.inf, 0
@@ -172,14 +172,14 @@ def _nowhere():
     return box
 
 
-@inner
+@borrowing
 def _cell_corners(a, b, width, nodes):
     """Fill in the four samples at the corners of a cell, row by row in x."""
     nodes[0], nodes[1] = a * width + b, a * width + b + 1
     nodes[2], nodes[3] = nodes[0] + width, nodes[1] + width
 
 
-@inner
+@borrowing
 def _doubtful(data, nodes, nx, ny, crossings, iris_radius):
     """Tell whether a rejected cell may still hold a spot: limits change so fast around it that they may dip below 1."""
     low, change, alive = np.inf, 0.0, 0
@@ -207,7 +207,7 @@ def _doubtful(data, nodes, nx, ny, crossings, iris_radius):
     return True
 
 
-@inner
+@borrowing
 def _passes(data, k, crossings, iris_radius):
     """Tell whether a ray passes every rim, and the circle around the iris at each crossing."""
     if data[k, ALIVE] == 0.0 or data[k, REL] > 1.0:
@@ -219,7 +219,7 @@ def _passes(data, k, crossings, iris_radius):
     return True
 
 
-@inner
+@borrowing
 def _widen(spots, sums, data, k, x, y, hx, hy, share):
     """Note a passing ray found between the samples: it stands for `share` of both halves of the pupil, mm^2."""
     spots[0], spots[1] = min(spots[0], x - hx), max(spots[1], x + hx)
@@ -228,7 +228,7 @@ def _widen(spots, sums, data, k, x, y, hx, hy, share):
     sums[3] += 1.0
 
 
-@inner
+@borrowing
 def _probes(step, finest):
     """Into how many samples to divide a cell's side: no more than needed, and at most PROBES."""
     return min(max(int(np.ceil(step / finest)), 1), PROBES)
@@ -318,7 +318,7 @@ def _halve(
         n_gaps = count
 
 
-@inner
+@borrowing
 def _apart(data, a, b, before, iris_radius):
     """Tell whether two rays end at different surfaces, and not both far beyond a rim or beside the iris."""
     if data[a, ALIVE] > 0.0 or data[b, ALIVE] > 0.0 or data[a, X] == data[b, X]:
@@ -332,7 +332,7 @@ def _apart(data, a, b, before, iris_radius):
     return not _outside(min(ra, rb), max(ra, rb), 0.5)
 
 
-@inner
+@borrowing
 def _weigh(data, nodes, share, view_radius, sums):
     """Add a pre-pass cell's flux, seen flux, flux times irradiance and visibility, for both halves of the pupil."""
     weight, alive = 0.0, 0

@@ -9,15 +9,17 @@ from math import floor, sqrt
 
 import numpy as np
 
-from ._jit import compiled, inlined, inner
+from ._jit import borrowing, compiled, inlined
 from .clip import PX, PY
 from .pattern import OPEN, WAY, weave
-from .vectors import LANES, add_colored
+from .vectors import LANES, add_colored, fetch
 
 # a row of the picture is kept in blocks of this many pixels, each channel by itself: one vector to the compiler
 BLOCK = LANES
 # floats of a block: three channels
 _FLOATS = 3 * BLOCK
+# so many rows ahead what will be added to is brought near: rows lie too far apart for the processor to foresee it
+_AHEAD = 3
 
 
 def blank_plane(width, height):
@@ -72,14 +74,14 @@ def plane_size(plane):
     return plane.shape[0], plane.shape[1] if plane.ndim == 3 else BLOCK * plane.shape[1]
 
 
-@inner
+@borrowing
 def _step(k, way, count):
     """Walk around a polygon."""
     k += way
     return k - count if k >= count else k
 
 
-@inner
+@borrowing
 def _fill_rows(
     flat, blocks, lanes, row, rows, depth, xl0, xl1, left_slope, xr0, xr1, right_slope, start, gx, gy,
     density_low, density_high, rgb,
@@ -94,11 +96,15 @@ def _fill_rows(
     l_inverse, r_inverse = np.float32(1.0 / max(lb - la, 1e-6)), np.float32(1.0 / max(rb - ra, 1e-6))
     red, green, blue = np.float32(rgb[0] * depth), np.float32(rgb[1] * depth), np.float32(rgb[2] * depth)
     slope, low, high = np.float32(gx), np.float32(density_low), np.float32(density_high)
+    ahead = np.uint64(_AHEAD * blocks * _FLOATS)
     for _ in range(rows):
         place = np.uint64((row * blocks + int(la) // BLOCK) * _FLOATS)
         for block in range(int(la) // BLOCK, min(int(rb) // BLOCK, blocks - 1) + 1):
             x0 = float(BLOCK * block)
             first = np.float32(start + gx * (x0 + 0.5))
+            # a block takes two lines of the cache
+            fetch(flat, place + ahead)
+            fetch(flat, place + ahead + np.uint64(16))
             if x0 >= lb and x0 + BLOCK <= ra:
                 # inside, where no edge comes; the compiler would take a loop of known length apart
                 for m in range(lanes):
@@ -124,7 +130,7 @@ def _fill_rows(
         row += 1
 
 
-@inner
+@borrowing
 def _fill_woven(flat, blocks, row, depth, xl0, xl1, xr0, xr1, start, gx, density_low, density_high, rgb, light):
     """Add a strip of a polygon as `_fill_rows` does, multiplied by `light`, which is used up."""
     la, lb = min(xl0, xl1), max(xl0, xl1)
@@ -157,7 +163,7 @@ def _strip(width, xl0, xl1, xr0, xr1):
     return first, count, la, lb, ra, rb, l_inverse, r_inverse, int(lb) + 1, int(ra)
 
 
-@inner
+@borrowing
 def _mark_strip(flat, width, row, depth, xl0, xl1, xr0, xr1, density, rgb):
     """Add a strip of even density to a picture of differences along its rows: only the pixels at its edges change."""
     first, count, la, lb, ra, rb, l_inverse, r_inverse, whole, rest = _strip(width, xl0, xl1, xr0, xr1)
@@ -182,7 +188,7 @@ def _mark_strip(flat, width, row, depth, xl0, xl1, xr0, xr1, density, rgb):
             before = here
 
 
-@inner
+@borrowing
 def _mark_woven(flat, width, row, depth, xl0, xl1, xr0, xr1, density, rgb, light):
     """Add a strip as `_mark_strip` does, multiplied by `light`."""
     first, count, la, lb, ra, rb, l_inverse, r_inverse, whole, rest = _strip(width, xl0, xl1, xr0, xr1)
@@ -221,7 +227,7 @@ def sum_rows(differences):
             differences[row, c, 0], differences[row, c, 1], differences[row, c, 2] = red, green, blue
 
 
-@inner
+@borrowing
 def fill_polygon(polygon, count, density, gx, gy, density_low, density_high, rgb, plane, texture=None):
     """Add a convex polygon with linearly varying density to a picture.
 
@@ -328,7 +334,7 @@ def fill_polygon(polygon, count, density, gx, gy, density_low, density_high, rgb
         y = y_next
 
 
-@inner
+@borrowing
 def add_to_pixel(plane, row, column, light, rgb):
     """Add light to one pixel of a picture in blocks."""
     block, m = column // BLOCK, column % BLOCK
@@ -337,7 +343,7 @@ def add_to_pixel(plane, row, column, light, rgb):
     plane[row, block, 2, m] += rgb[2] * light
 
 
-@inner
+@borrowing
 def splat_line(x0, y0, x1, y1, flux, rgb, plane):
     """Spread flux along a segment, each sample over its four nearest pixels: for slivers without area.
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ._jit import compiled, inner
+from ._jit import borrowing, compiled
 from .bundle import (
     SLIVER,
     _gather_cell,
@@ -171,7 +171,7 @@ def draw_ringing(
             start = end
 
 
-@inner
+@borrowing
 def _find_deep(data, crossings, table, deep):
     """Tell which nodes lie so far within the iris at all crossings that the patterns are 1 there."""
     for k in range(data.shape[0]):
@@ -182,14 +182,14 @@ def _find_deep(data, crossings, table, deep):
         deep[k] = inside
 
 
-@inner
+@borrowing
 def _place_in_stop(data, triangles, t, mirror, axes, stops):
     """Fill in where a triangle's corners cross the stop."""
     for m in range(3):
         _put_in_stop(data, triangles[t, m], mirror, axes, stops, m)
 
 
-@inner
+@borrowing
 def _gather_stops(data, triangles, start, end, mirror, axes, stops):
     """Fill in where a cell's middle and the nodes around it cross the stop."""
     _put_in_stop(data, triangles[start, 0], mirror, axes, stops, 0)
@@ -197,7 +197,7 @@ def _gather_stops(data, triangles, start, end, mirror, axes, stops):
         _put_in_stop(data, triangles[t, 1], mirror, axes, stops, t - start + 1)
 
 
-@inner
+@borrowing
 def _places_over_triangle(corner, stops, table, corners, places):
     """Fill in how a triangle's patterns are looked up, linear in the picture's pixels (`pattern.weave`)."""
     x1, y1 = corner[1, 0] - corner[0, 0], corner[1, 1] - corner[0, 1]
@@ -213,7 +213,7 @@ def _places_over_triangle(corner, stops, table, corners, places):
             places[k, 6 + 2 * q], places[k, 7 + 2 * q] = min(d0, d1, d2), max(d0, d1, d2)
 
 
-@inner
+@borrowing
 def _places_over_cell(spots, triangles, start, end, stops, table, corners, places):
     """Fill in how a cell's patterns are looked up; False where its places in the stop are not linear in the picture.
 

@@ -5,8 +5,8 @@ from math import sqrt
 import numpy as np
 
 from ._jit import compiled, inner
-from .bend import ALIVE, LANES, REFLECT, REFRACT, REL, STOP, STOP_X, WEIGHT, X, Y, bend, ray_from_near
-from .intersect import intersect_conic
+from .bend import ALIVE, LANES, REFLECT, REFRACT, REL, STOP, STOP_X, WEIGHT, X, Y, bend, bend_about, ray_from_near
+from .intersect import FLATTEST, intersect_conic, intersect_sphere
 from .shape_lanes import trace_shapes
 from .shapes import hit_shapes
 
@@ -63,7 +63,7 @@ def trace_lanes(
         return
     n_rays = px.shape[0]
     samples = reflectance.shape[1]
-    last_cell = samples - 2
+    last_place, last_cell = float(samples - 1), np.int32(samples - 2)
     x = np.empty(LANES)
     y = np.empty(LANES)
     z = np.empty(LANES)
@@ -75,6 +75,7 @@ def trace_lanes(
     alive = np.empty(LANES)
     passed = np.empty(LANES)
     cos_low = np.empty(LANES)
+    where = np.empty(LANES, dtype=np.int32)
     for start in range(0, n_rays, LANES):
         count = min(LANES, n_rays - start)
         # the few rays of a cell that is halved do not take the time of a full set
@@ -123,41 +124,76 @@ def trace_lanes(
             eta = n_in / n_out
             mirror = 1.0 if action == REFLECT else 0.0
             low_in = 1.0 if n_in <= n_out else 0.0
-            for m in range(lanes):
-                zl = z[m] - vertex
-                t, root, discriminant = intersect_conic(c, kappa, x[m], y[m], zl, dx[m], dy[m], dz[m], heading)
-                hx = x[m] + t * dx[m]
-                hy = y[m] + t * dy[m]
-                hz = zl + t * dz[m]
-                nx, ny, nz, cos_in, cos_out, inside = bend(
-                    c, kappa, hx, hy, hz, dx[m], dy[m], dz[m], root, heading, eta, mirror
-                )
-                ok = alive[m]
-                ok = ok if discriminant >= 0.0 else 0.0
-                ok = ok if (mirror > 0.0 or inside >= 0.0) else 0.0
-                ok = ok if nz * heading * (1.0 - 2.0 * mirror) > 0.0 else 0.0
-                r2 = (hx * hx + hy * hy) * inv2
-                alive[m] = ok
-                passed[m] += ok
-                rel2[m] = max(rel2[m], r2)
-                cos_low[m] = cos_in if low_in > 0.0 else cos_out
-                x[m] = hx
-                y[m] = hy
-                z[m] = hz + vertex
-                dx[m] = nx
-                dy[m] = ny
-                dz[m] = nz
+            forth = heading * (1.0 - 2.0 * mirror)
+            if kappa == 0.0 and abs(c) > FLATTEST:
+                radius = 1.0 / c
+                for m in range(lanes):
+                    zl = z[m] - vertex
+                    t, root, discriminant = intersect_sphere(c, radius, x[m], y[m], zl, dx[m], dy[m], dz[m], heading)
+                    hx = x[m] + t * dx[m]
+                    hy = y[m] + t * dy[m]
+                    hz = zl + t * dz[m]
+                    square = max(discriminant, 0.0)
+                    nx, ny, nz, cos_out, inside = bend_about(
+                        c * hx, c * hy, c * hz - 1.0, dx[m], dy[m], dz[m], root, square, heading, eta, mirror
+                    )
+                    ok = alive[m]
+                    ok = ok if discriminant >= 0.0 else 0.0
+                    ok = ok if (mirror > 0.0 or inside >= 0.0) else 0.0
+                    ok = ok if nz * forth > 0.0 else 0.0
+                    r2 = (hx * hx + hy * hy) * inv2
+                    alive[m] = ok
+                    passed[m] += ok
+                    rel2[m] = max(rel2[m], r2)
+                    cos_low[m] = root if low_in > 0.0 else cos_out
+                    x[m] = hx
+                    y[m] = hy
+                    z[m] = hz + vertex
+                    dx[m] = nx
+                    dy[m] = ny
+                    dz[m] = nz
+            else:
+                for m in range(lanes):
+                    zl = z[m] - vertex
+                    t, root, discriminant = intersect_conic(c, kappa, x[m], y[m], zl, dx[m], dy[m], dz[m], heading)
+                    hx = x[m] + t * dx[m]
+                    hy = y[m] + t * dy[m]
+                    hz = zl + t * dz[m]
+                    nx, ny, nz, cos_in, cos_out, inside = bend(
+                        c, kappa, hx, hy, hz, dx[m], dy[m], dz[m], root, heading, eta, mirror
+                    )
+                    ok = alive[m]
+                    ok = ok if discriminant >= 0.0 else 0.0
+                    ok = ok if (mirror > 0.0 or inside >= 0.0) else 0.0
+                    ok = ok if nz * forth > 0.0 else 0.0
+                    r2 = (hx * hx + hy * hy) * inv2
+                    alive[m] = ok
+                    passed[m] += ok
+                    rel2[m] = max(rel2[m], r2)
+                    cos_low[m] = cos_in if low_in > 0.0 else cos_out
+                    x[m] = hx
+                    y[m] = hy
+                    z[m] = hz + vertex
+                    dx[m] = nx
+                    dy[m] = ny
+                    dz[m] = nz
             living = 0.0
             for m in range(lanes):
                 living += alive[m]
             if living == 0.0:
                 break
             table = reflectance[row]
+            # where to look is found for several rays at once; the rest would keep the compiler from it
             for m in range(lanes):
-                place = min(cos_low[m], 1.0) * (samples - 1)
-                cell = min(np.int64(place), last_cell)
+                place = min(cos_low[m] if alive[m] > 0.0 else 0.0, 1.0) * last_place
+                cell = min(np.int32(place), last_cell)
+                where[m] = cell
+                cos_low[m] = place - cell
+            for m in range(lanes):
+                # an unsigned place needs no check for counting from the end
+                cell = np.uint64(where[m])
                 low = table[cell]
-                r = low + (place - cell) * (table[cell + 1] - low)
+                r = low + cos_low[m] * (table[cell + np.uint64(1)] - low)
                 weight[m] *= r if mirror > 0.0 else 1.0 - r
             if mirror > 0.0:
                 heading = -heading

@@ -82,6 +82,21 @@ def add_colored(_, flat, at, light, first, red, green, blue):
 
 
 @_intrinsic
+def fetch(_, flat, at):
+    """Have the memory around `flat[at]`, float32, brought near, for it will be added to; it need not exist."""
+    signature = types.void(flat, at)
+
+    def lower(context, builder, signature, arguments):
+        place = builder.gep(_data(context, builder, signature.args[0], arguments[0]), [arguments[1]])
+        kind = ir.FunctionType(ir.VoidType(), [place.type, _LANE, _LANE, _LANE])
+        prefetch = builder.module.declare_intrinsic("llvm.prefetch", [place.type], kind)
+        builder.call(prefetch, [place, _LANE(1), _LANE(3), _LANE(1)])
+        return context.get_dummy_value()
+
+    return signature, lower
+
+
+@_intrinsic
 def multiply_taken(_, light, first, values, where, m):
     """Multiply `light[first:]`, float32, by the values at the places `where[m:]`, int32 and not below 0."""
     signature = types.void(light, first, values, where, m)
