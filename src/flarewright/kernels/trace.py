@@ -191,9 +191,9 @@ def trace_lanes(
                 cos_low[m] = place - cell
             for m in range(lanes):
                 # an unsigned place needs no check for counting from the end
-                cell = np.uint64(where[m])
-                low = table[cell]
-                r = low + cos_low[m] * (table[cell + np.uint64(1)] - low)
+                at = np.uint64(where[m])
+                low = table[at]
+                r = low + cos_low[m] * (table[at + np.uint64(1)] - low)
                 weight[m] *= r if mirror > 0.0 else 1.0 - r
             if mirror > 0.0:
                 heading = -heading
