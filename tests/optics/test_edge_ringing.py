@@ -15,15 +15,14 @@ from flarewright.optics.edge_ringing import (
     CORNER_SAMPLES,
     EDGE_SAMPLES,
     PROFILE_SAMPLES,
-    REACH,
     Corner,
     averaged,
     corner_of,
     edge_tables,
     gain,
 )
+from flarewright.optics.fresnel import REACH, band_intensity, fresnel_grid
 from flarewright.optics.iris import blade_edges, coverage, softened
-from flarewright.optics.ringing import fresnel_grid, fresnel_intensity
 from flarewright.render.edge_rings import SHORTEST, edge_crossing
 
 RADIUS = 2.0
@@ -69,7 +68,7 @@ def own(iris, areas, shares):
         return light, light
 
     grid = fresnel_grid(opening, blade_form(edges).distance, RADIUS, (areas.min() / 6.0,) * 2, (areas.max(),) * 2)
-    return grid, sum(h * fresnel_intensity(grid, (a, a), white=True) for a, h in zip(areas, shares, strict=True))
+    return grid, sum(h * band_intensity(grid, [(a, a)], np.ones(1)) for a, h in zip(areas, shares, strict=True))
 
 
 @pytest.mark.parametrize("iris", IRISES)

@@ -6,27 +6,18 @@ import math
 
 import numpy as np
 import pytest
+from scipy.interpolate import RectBivariateSpline
 from scipy.ndimage import uniform_filter
 from scipy.special import fresnel, j1
 
 from flarewright.model import Iris
 from flarewright.model.light import BlackBody, Lines
+from flarewright.optics.fresnel import SHADOW, band_intensity, crop, fresnel_grid, fresnel_intensity, halved
 from flarewright.optics.iris import blade_edges, coverage, resampled, softened
 from flarewright.optics.pack import pack_lens
 from flarewright.optics.paraxial import first_order, flare_matrices
 from flarewright.optics.paths import ghost_paths
-from flarewright.optics.ringing import (
-    FRFT_FILL,
-    FRFT_SAMPLES,
-    SHADOW,
-    crop,
-    fresnel_grid,
-    fresnel_intensity,
-    frft_fresnel_number,
-    halved,
-    ripple_height,
-    stop_to_sensor,
-)
+from flarewright.optics.ringing import FRFT_FILL, FRFT_SAMPLES, frft_fresnel_number, ripple_height, stop_to_sensor
 from flarewright.optics.spectrum import band_contents
 from flarewright.render.prepare import load_lens
 
@@ -61,6 +52,11 @@ def diffracted(opening, fresnel_number, reach=1.7 * RADIUS, finer=9.0):
     area = RADIUS**2 / fresnel_number
     grid = fresnel_grid(opening, reach, RADIUS, (abs(area) / finer,) * 2, (abs(area),) * 2)
     return grid, fresnel_intensity(grid, (area, area)), math.sqrt(abs(area) / 2.0)
+
+
+def white(grid, area):
+    """The few fringes that white light leaves, at one Fresnel area."""
+    return band_intensity(grid, [(area, area)], np.ones(1))
 
 
 def slit_field(at, half, scale):
@@ -103,7 +99,7 @@ def test_a_grid_as_fine_as_pixels_show_holds_what_pixels_see():
         grid = fresnel_grid(square(1.5), 1.5, RADIUS, (area, area), (area, area), shown)
         fine = fresnel_grid(square(1.5), 1.5, RADIUS, (area, area), (area, area))
         assert grid.step == pytest.approx(max(shown, fine.step))
-        found = fresnel_intensity(grid, (area, area), white=True)
+        found = white(grid, area)
         assert grid.light * grid.step**2 == pytest.approx(9.0, rel=1e-3)
         # each texel of the slit from 16 places within it, along a line through the middle
         count = len(grid.at[0]) // 4 * 4
@@ -174,17 +170,23 @@ def test_parseval_and_what_is_kept(iris, fresnel_number):
     assert found.sum(dtype=float) == pytest.approx(again.sum(dtype=float), rel=1e-5)
     assert light.sum() * grid.step**2 == pytest.approx(math.pi * RADIUS**2, rel=2e-3)
     reach = 1.7 * RADIUS + min(SHADOW * scale, 2.0 * RADIUS)
-    kept, half = crop(grid, found, (reach, reach))
+    kept, box = crop(grid, found, ((-reach, reach),) * 2)
     # what the crop leaves out, it gives back; little of it
     assert kept.sum(dtype=float) == pytest.approx(light.sum(), rel=1e-5)
-    assert half[0] >= reach or half[0] >= 0.5 * len(grid.at[0]) * grid.step * (1 - 1e-9)
+    assert box[0][1] >= min(reach, 0.5 * len(grid.at[0]) * grid.step) - 0.51 * grid.step
+    assert box[0][0] == pytest.approx(-box[0][1])
     middle = len(kept) // 2, len(found) // 2
     assert kept[middle[0], middle[0]] / found[middle[1], middle[1]] == pytest.approx(
         1.0, abs=0.06 if fresnel_number < 2 else 0.02
     )
     for times in ((1, 0), (2, 3)):
-        coarse, wide = halved(kept, half, times)
-        cell = 4.0 * wide[0] * wide[1] / coarse.size
+        coarse, wide = halved(kept, box, times)
+        cell = math.prod(high - low for low, high in wide) / coarse.size
+        at = [
+            low + (np.arange(n) + 0.5) * (high - low) / n
+            for (low, high), n in zip(wide, coarse.shape[::-1], strict=True)
+        ]
+        assert abs(coarse.sum(axis=0) @ at[0]) + abs(coarse.sum(axis=1) @ at[1]) < 2e-2 * RADIUS * coarse.sum()
         assert coarse.sum(dtype=float) * cell == pytest.approx(light.sum() * grid.step**2, rel=1e-5)
         assert max(coarse[0].max(), coarse[-1].max(), coarse[:, 0].max(), coarse[:, -1].max()) == 0.0
 
@@ -195,8 +197,8 @@ def test_large_fresnel_numbers_tend_to_the_geometric_shadow():
     for number in (30.0, 300.0, 3000.0):
         grid, found, _ = diffracted(opening, number)
         _, light = opening(grid.at[0], grid.at[1][:, None])
-        kept, _ = crop(grid, found, (3.0 * RADIUS,) * 2)
-        shadow, _ = crop(grid, np.asarray(light, dtype=np.float32), (3.0 * RADIUS,) * 2)
+        kept, _ = crop(grid, found, ((-3.0 * RADIUS, 3.0 * RADIUS),) * 2)
+        shadow, _ = crop(grid, np.asarray(light, dtype=np.float32), ((-3.0 * RADIUS, 3.0 * RADIUS),) * 2)
         look = [uniform_filter(pattern, round(0.2 * RADIUS / grid.step)) for pattern in (kept, shadow)]
         errors.append(float(np.abs(look[0] - look[1]).mean()) / float(look[1].mean()))
     # what is moved about in fringes of width 1 / sqrt(N_F) is of that order
@@ -211,18 +213,79 @@ def test_white_patterns_are_the_fringes_that_a_band_of_colours_leaves():
     row = len(grid.at[1]) // 2
     areas = RADIUS**2 / 60.0 * np.linspace(0.87, 1.13, 53)
     weights = 1.0 - np.abs(np.linspace(-1.0, 1.0, 53))
-    band = [
-        sum(w * fresnel_intensity(grid, (a, a), white=white)[row] for w, a in zip(weights, areas, strict=True))
-        / weights.sum()
-        for white in (False, True)
+    shares = weights / weights.sum()
+    found = [
+        sum(w * pattern(a)[row] for w, a in zip(shares, areas, strict=True))
+        for pattern in (lambda a: fresnel_intensity(grid, (a, a)), lambda a: white(grid, a))
     ]
-    assert np.abs(band[1] - band[0]).max() < 0.02
+    assert np.abs(found[1] - found[0]).max() < 0.02
     # of one colour the fringes near an edge stay, those far from it go
-    one, faded = (fresnel_intensity(grid, (areas[26],) * 2, white=white)[row] for white in (False, True))
+    one, faded = fresnel_intensity(grid, (areas[26],) * 2)[row], white(grid, areas[26])[row]
     near = np.abs(np.abs(grid.at[0]) - 1.5) < 2.0 * scale
     assert np.sqrt(np.mean((faded - one)[near] ** 2)) < 0.25 * np.std(one[near])
     middle = np.abs(grid.at[0]) < 3.0 * scale
     assert np.std(faded[middle]) < 0.6 * np.std(one[middle])
+
+
+def band(number, width, ratio=1.0):
+    """Fresnel areas and shares of a band whose light rises and falls evenly, `width` of its mean wide."""
+    at = np.linspace(-1.0, 1.0, 41)
+    areas = RADIUS**2 / number * (1.0 + 0.5 * width * at)
+    return np.column_stack([areas, ratio * areas]), (1.0 - np.abs(at)) / (1.0 - np.abs(at)).sum()
+
+
+@pytest.mark.parametrize("ratio", [1.0, 2.5, -1.0])
+@pytest.mark.parametrize("width", [0.1, 0.16])
+def test_one_transform_holds_the_light_of_a_band(width, ratio):
+    """Second method: every colour of the band transformed by itself, and their intensities summed."""
+    areas, shares = band(400.0, width, ratio)
+    sides = tuple(np.abs(areas).min(axis=0)), tuple(np.abs(areas).max(axis=0))
+    grid = fresnel_grid(blades(Iris(blades=3)), RADIUS, RADIUS, *sides)
+    found = band_intensity(grid, areas, shares)
+    each = [band_intensity(grid, areas[k : k + 1], np.ones(1)) * shares[k] for k in range(len(shares))]
+    expected = np.sum(each, axis=0, dtype=float)
+    _, light = blades(Iris(blades=3))(grid.at[0], grid.at[1][:, None])
+    edge = (
+        uniform_filter((np.abs(light - 0.5) < 0.49).astype(float), round(8.0 * math.sqrt(areas.max() / 2) / grid.step))
+        > 0
+    )
+    error = found - expected
+    assert math.sqrt(np.mean(error[edge] ** 2)) < 3e-3
+    assert np.abs(error).max() < 0.025
+    assert expected[edge].std() > 0.3
+    # what the shadow loses is little of what it has, and of all light nearly nothing
+    shadow = light == 0.0
+    assert expected[shadow].sum() * 0.9 < found[shadow].sum() < expected[shadow].sum()
+    assert found.sum(dtype=float) == pytest.approx(expected.sum(), rel=2e-3)
+
+
+@pytest.mark.parametrize("window", [((-0.9, 0.5), (-2.3, -1.1)), ((0.6, 2.4), (-0.4, 0.8)), ((0.9, 2.2), (0.2, 2.4))])
+def test_a_window_shows_what_all_of_the_opening_makes_there(window):
+    """Second method: the whole opening, sampled as finely; of white light alone, whose fringes are few."""
+    areas, shares = band(500.0, 0.15)
+    # 20 samples a fringe: with eight, where they lie changes 0.03 at worst
+    sides = (areas[:, 0].min() / 6.0,) * 2, (areas[:, 0].max(),) * 2
+    opening = blades(Iris(blades=5, rotation_deg=11))
+    whole, part = (fresnel_grid(opening, RADIUS, RADIUS, *sides, 0.0, place) for place in (None, window))
+    assert part.spectrum.size < 0.6 * whole.spectrum.size
+    assert whole.whole
+    assert not part.whole
+    patterns = [crop(grid, band_intensity(grid, areas, shares), window) for grid in (whole, part)]
+    # the whole's samples lie elsewhere: compare along lines, between which cubics run
+    lines = [np.linspace(low + 0.1, high - 0.1, 400) for low, high in window]
+    seen = []
+    for values, box in patterns:
+        at = [
+            low + (np.arange(n) + 0.5) * (high - low) / n
+            for (low, high), n in zip(box, values.shape[::-1], strict=True)
+        ]
+        seen.append(RectBivariateSpline(at[1], at[0], values)(lines[1], lines[0]))
+    assert seen[0].std() > 0.01
+    # crops give back the light that they leave out, which for the whole is more than its fringes lose
+    scale = float((seen[0] * seen[1]).sum() / (seen[1] ** 2).sum())
+    error = seen[1] * scale - seen[0]
+    assert np.abs(error).max() < 0.015
+    assert math.sqrt(np.mean(error**2)) < 2.5e-3
 
 
 def test_either_sign_is_the_same_light():

@@ -14,7 +14,7 @@ from flarewright.optics.paths import ghost_paths
 from flarewright.render.edge_rings import edge_crossing
 from flarewright.render.prepare import settle
 from flarewright.render.render import render
-from flarewright.render.ringing import Ringing
+from flarewright.render.ringing import Ringing, _Crossing
 
 LENS, WAVE = "heliar-tronnier", 560.0
 GREEN = Lines(lines=((WAVE, 1.0),))
@@ -167,6 +167,35 @@ def test_dirt_in_ghosts_diffracts_too():
     assert found.sum() == pytest.approx(sharp.sum(), rel=0.01)
 
 
+@pytest.mark.parametrize(
+    ("lens", "ghost", "dirt", "sensor"),
+    [
+        (LENS, "2-1", Dirt(dust_per_mm2=0.3, dust_um=(200.0, 400.0), seed=2, in_ghosts=True), (6.0, 4.5)),
+        ("anamorphic-heliar-2x", "9-8", Dirt(), (24.0, 12.0)),
+    ],
+)
+def test_a_part_of_an_opening_rings_as_all_of_it_does(lens, ghost, dirt, sensor, monkeypatch):
+    """A ghost larger than the picture: through dirt, and between cylinders."""
+    wanted = project(
+        ghost, lens=lens, dirt=dirt, lights=(Light(field_deg=(3.0, 2.0)),), iris=Iris(blades=6, rotation_deg=10.0),
+        quality=Quality(ringing="collins", wavelengths=3), camera=Camera(size_px=(120, 90), sensor_mm=sensor),
+    )  # fmt: skip
+    sharp, part = picture(wanted.replace(quality=Quality(ringing="off", wavelengths=3))), picture(wanted)
+    asked = []
+    chosen = _Crossing.window
+
+    def never(crossing, seen):
+        asked.append(chosen(crossing, seen) is not None)
+
+    monkeypatch.setattr(_Crossing, "window", never)
+    whole = picture(wanted)
+    assert asked == [True]
+    assert np.abs(whole - sharp).sum() > 0.01 * whole.sum()
+    # samples of both lie elsewhere
+    assert np.abs(part - whole).sum() < 0.08 * np.abs(whole - sharp).sum()
+    assert part.sum() == pytest.approx(whole.sum(), rel=2e-3)
+
+
 def test_what_makes_rings_slow_is_told():
     small = Camera(size_px=(32, 18))
     dirt = Dirt(dust_per_mm2=0.3, dust_um=(200.0, 400.0), seed=2, in_ghosts=True)
@@ -203,6 +232,8 @@ def test_rings_of_shared_tables_are_those_of_the_ghosts_own_pattern(iris, size, 
         served.append(edge_crossing(*known) is not None)
 
     monkeypatch.setattr("flarewright.render.ringing.edge_crossing", none_served)
+    # colour by colour, so that nothing is wrong but the tables
+    monkeypatch.setattr("flarewright.render.ringing.BAND_SPREAD", 0.01)
     own = picture(wanted)
     assert served == [True]
     assert shared.sum() == pytest.approx(own.sum(), rel=3e-4)

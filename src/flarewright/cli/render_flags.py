@@ -193,7 +193,8 @@ def build_project(flags: Flags) -> Project:
     try:
         return Project.model_validate(fields)
     except ValidationError as error:
-        findings = [in_flags(sentence) for sentence in explain(error, fields)]
+        # one flag may set more than one field
+        findings = list(dict.fromkeys(in_flags(sentence) for sentence in explain(error, fields)))
         if len(findings) == 1:
             raise ProjectError(findings[0]) from None
         message = f"{len(findings)} settings cannot be used, the first: {findings[0]}"

@@ -18,14 +18,11 @@ from numpy.typing import NDArray
 
 from .blade_form import BladeForm, to_corner
 from .fft_size import fast_size
+from .fresnel import FADE, REACH, ending
 from .iris import coverage, softened
-from .ringing import FADE, ending
 
 Floats = NDArray[np.float64]
 Singles = NDArray[np.float32]
-
-REACH = FADE[1] + 0.5
-"""How far from a border a pattern knows of it, in s."""
 
 CORNER_SAMPLES = 16
 """Samples per s of the table around a corner."""
@@ -57,7 +54,6 @@ __all__ = [
     "CORNER_SAMPLES",
     "EDGE_SAMPLES",
     "PROFILE_SAMPLES",
-    "REACH",
     "EdgeTables",
     "averaged",
     "edge_tables",
@@ -148,7 +144,7 @@ def edge_tables(corner: Corner, margin: float = REACH) -> EdgeTables:
 
     Notes
     -----
-    The Fresnel integral as in `ringing.fresnel_intensity`, with lambda L = 2 s^2, over squares so wide that their
+    The Fresnel integral as in `fresnel.fresnel_intensity`, with lambda L = 2 s^2, over squares so wide that their
     borders do not come into what is kept. The tables of curved blades are straight in s between powers of two: what a
     curvature adds is of the order of fringes over radii, and this errs by the square of that.
     """

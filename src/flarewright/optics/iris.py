@@ -183,18 +183,18 @@ def resampled(image: NDArray[np.floating], half: float, x: Floats, y: Floats) ->
 
     Parameters
     ----------
-    image : ndarray, shape (rows, columns)
-        Row 0 up; it spans [-half, half] squared, is linear between its pixels' centres and dark outside.
+    image : ndarray, shape (..., rows, columns)
+        Row 0 up; it spans [-half, half] squared, is linear between its pixels' centres and dark outside. Or several.
     half : float
     x, y : ndarray, shapes (Nx,) and (Ny,)
         Evenly spaced, rising.
 
     Returns
     -------
-    ndarray, shape (Ny, Nx)
+    ndarray, shape (..., Ny, Nx)
     """
-    across = _triangles(x / half, image.shape[1])
-    down = _triangles(y / half, image.shape[0])[:, ::-1]
+    across = _triangles(x / half, image.shape[-1])
+    down = _triangles(y / half, image.shape[-2])[:, ::-1]
     mean: Floats = down @ np.asarray(image, dtype=np.float64) @ across.T
     return mean
 

@@ -189,7 +189,7 @@ def resolve_art(settled: Settled, fours: tuple[LightPath, ...] | None = None) ->
     across = project.camera.size_px[0] / project.camera.sensor[0]
     down = project.camera.size_px[1] / project.camera.sensor[1]
     for k, rule in enumerate(art.rules):
-        for name in _chosen(facts, rule.select, f"art.rules[{k}].select"):
+        for name in _chosen(facts, rule.select, f"art.rules[{k}], {rule.select!r}"):
             found[name] = _with(found[name], rule, across, down)
     widest = WIDEST_BLUR * project.camera.sensor[0]
     for name, changed in found.items():

@@ -15,13 +15,12 @@ from ..optics.edge_ringing import (
     CORNER_SAMPLES,
     EDGE_SAMPLES,
     PROFILE_SAMPLES,
-    REACH,
     EdgeTables,
     averaged,
     gain,
     sharp_tables,
 )
-from ..optics.ringing import SHADOW
+from ..optics.fresnel import REACH, SHADOW, Box
 
 Floats = NDArray[np.float64]
 Singles = NDArray[np.float32]
@@ -173,15 +172,15 @@ def edge_piece(form: BladeForm, tables: EdgeTables, scale: float, margin: float,
     return Piece(tables.values, np.array(row), brighter)
 
 
-def picture_piece(values: Singles, half: tuple[float, float]) -> Piece:
+def picture_piece(values: Singles, box: Box) -> Piece:
     """Lay a picture of the stop out as the kernel reads it.
 
     Parameters
     ----------
     values : ndarray, shape (rows, columns), float32
         0 along its border, its first row the lowest.
-    half : tuple of float
-        Half its width and height, mm.
+    box : Box
+        Where it lies, mm.
 
     Returns
     -------
@@ -189,11 +188,12 @@ def picture_piece(values: Singles, half: tuple[float, float]) -> Piece:
     """
     found = np.zeros(columns.TABLE_COLUMNS)
     found[columns.ROWS], found[columns.COLUMNS] = values.shape
-    found[columns.PER_MM_X], found[columns.PER_MM_Y] = (
-        0.5 * count / side for count, side in zip(values.shape[::-1], half, strict=True)
-    )
-    found[columns.AT_X], found[columns.AT_Y] = 0.5 * values.shape[1] - 0.5, 0.5 * values.shape[0] - 0.5
-    found[columns.OUTSIDE], found[columns.CORNERS] = max(half), -1.0
+    for count, (low, high), per_mm, at in zip(
+        values.shape[::-1], box, (columns.PER_MM_X, columns.PER_MM_Y), (columns.AT_X, columns.AT_Y), strict=True
+    ):
+        found[per_mm] = count / (high - low)
+        found[at] = -low * found[per_mm] - 0.5
+    found[columns.OUTSIDE], found[columns.CORNERS] = float(np.abs(box).max()), -1.0
     found[columns.FINE] = 0.5 / max(found[columns.PER_MM_X], found[columns.PER_MM_Y])
     return Piece(values.ravel(), found)
 

@@ -35,6 +35,7 @@ from .sources import NARROW_PX, halvings, motion, spread_border
 from .spread import shape_kernel, spread_within
 
 if TYPE_CHECKING:
+    from ..optics.fresnel import Box
     from .ringing import Rings
     from .surroundings import Surroundings
 
@@ -275,7 +276,9 @@ def draw_final(
         pieces = _bridges(traced, limit, item.view_radius, scale, visibility, step_px)
     steps = [(w, k / n) for w, n in enumerate(pieces) for k in range(n)] + [(count - 1, 0.0)]
     fine_nm = np.interp([w + part for w, part in steps], np.arange(count), shot.packed.wavelengths_nm)
-    patterns = None if rings is None else rings.textures(fine_nm)
+    patterns = None
+    if rings is not None:
+        patterns = rings.textures(fine_nm, _seen(item, rings, bundle, traced, to_pixels, canvas, detail))
     for k, ((w, part), rgb) in enumerate(zip(steps, shot.weights(fine_nm, bend) * item.art.rgb, strict=True)):
         if stop is not None and stop.is_set():
             return
@@ -358,6 +361,21 @@ def _with_shadow(item: FinalPass, rings: Rings, quality: Quality, scale: float) 
         fringe_px=max(quality.tolerance_px, FRINGE_PART * rings.fringe_px),
         faint_radius=opening.radius + FAINT_SHADOW * shadow,
     )  # fmt: skip
+
+
+def _seen(
+    item: FinalPass, rings: Rings, bundle: Bundle, traced: list[Floats], to_pixels: Floats, canvas: Canvas, detail: int
+) -> list[Box | None]:
+    """Tell which part of the stop comes into the picture at each crossing, where that saves anything."""
+    if not rings.local:
+        return [None] * item.path.stop_crossings
+    # only here: few ghosts need it
+    from .seen_stop import seen_in_stop
+
+    places = [place for w in range(len(traced)) for place, _ in _places(item, to_pixels, w, 0.0)]
+    size = tuple(-(-side // 2**detail) for side in canvas.size_px)
+    crossings = item.path.stop_crossings
+    return seen_in_stop(item.shot, bundle, traced, crossings, places if item.orders else places[:1], (size[0], size[1]))
 
 
 def draw_alone(

@@ -24,20 +24,20 @@ from ..kernels.trace import ALIVE, REL, STOP_X
 from ..model import Light
 from ..model.light import Lines
 from ..optics.blade_form import BladeForm, blade_form
-from ..optics.iris import coverage, resampled, softened
-from ..optics.pack import PackedLens
-from ..optics.paths import LightPath
-from ..optics.ringing import (
+from ..optics.fresnel import (
     SHADOW,
+    Box,
     FresnelGrid,
-    StopToSensor,
+    band_intensity,
     crop,
     fresnel_grid,
     fresnel_intensity,
-    frft_fresnel_number,
     halved,
-    stop_to_sensor,
 )
+from ..optics.iris import coverage, resampled, softened
+from ..optics.pack import PackedLens
+from ..optics.paths import LightPath
+from ..optics.ringing import StopToSensor, frft_fresnel_number, stop_to_sensor
 from ..optics.spectrum import band_contents
 from .edge_rings import EdgeCrossing, Piece, edge_crossing, joined, picture_piece, sharp_piece
 
@@ -48,7 +48,7 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 Singles = NDArray[np.float32]
-Pattern = tuple[Singles, tuple[float, float]]
+Pattern = tuple[Singles, Box]
 Octaves = tuple[tuple[float, float], tuple[float, float]]
 
 LEAST_FRESNEL_NUMBER = 1.0
@@ -60,17 +60,20 @@ LEAST_FRINGE_PX = 0.15
 WIDEST_RADII = 2.0
 """A shadow is not followed farther than this from the opening."""
 
-NODE_STEP = 0.08
-"""Patterns are computed at Fresnel areas this part apart and shared by all ghosts; cubics run between them.
-
-The first fringe errs by a thousandth of its height then, the third by a tenth at worst; a line's are exact.
-"""
-
 OCTAVES = 1.5
 """A grid serves Fresnel areas up to this many octaves apart: those of one ghost at all colours."""
 
 TEXEL_PX = 0.7
 """Patterns are no finer than this on the sensor, in pixels, and the wave of white light no finer than half of it."""
+
+BAND_SPREAD = 0.045
+"""A band whose wavelengths have a larger standard deviation, over their mean, is diffracted in parts."""
+
+WINDOW_PART = 0.7
+"""A window as large as this part of the pattern is not worth having: a whole one serves other ghosts and lights too."""
+
+WINDOW_TEXELS = 3.0
+"""A window reaches this many of a pattern's texels farther than what is seen through it."""
 
 KEPT_BYTES = 150_000_000
 KEPT_GRID_BYTES = 100_000_000
@@ -166,31 +169,39 @@ class Ringing:
         light = softened(coverage(opening.blades, x, y, 2.0 * float(x[1] - x[0])))
         if opening.mask is None:
             return light, light
-        wave = resampled(np.sqrt(opening.mask), opening.half, x, y[:, 0])
-        return light * wave, light * resampled(opening.mask, opening.half, x, y[:, 0])
+        wave, power = resampled(np.stack([np.sqrt(opening.mask), opening.mask]), opening.half, x, y[:, 0])
+        return light * wave, light * power
 
-    def grid(self, octaves: Octaves, shown: float) -> FresnelGrid:
-        """Return the grid of areas from 2 ** low to 2 ** high mm^2, in x and in y; `shown` as `fresnel_grid`."""
-        found = self._grids.get((octaves, shown))
+    def grid(self, octaves: Octaves, shown: float, window: Box | None) -> FresnelGrid:
+        """Return the grid of areas from 2 ** low to 2 ** high mm^2, in x and in y; the rest as `fresnel_grid`."""
+        key = (octaves, shown, window)
+        found = self._grids.get(key)
         if found is None:
             least, most = (tuple(2.0 ** pair[end] for pair in octaves) for end in (0, 1))
             found = fresnel_grid(
-                self.sample, self.opening.radius, self.radius, (least[0], least[1]), (most[0], most[1]), shown
+                self.sample, self.opening.radius, self.radius, (least[0], least[1]), (most[0], most[1]), shown, window
             )
-            self._grids.put((octaves, shown), found, found.spectrum.nbytes)
+            self._grids.put(key, found, found.spectrum.nbytes)
         kept: FresnelGrid = found
         return kept
 
-    def pattern(self, item: _Crossing, area: tuple[float, float], *, white: bool) -> Pattern:
-        """Return the opening's pattern at a Fresnel area, over a part of the stop at least as wide as asked for.
+    def pattern(self, item: _Crossing, window: Box | None, areas: Floats, shares: Floats | None) -> Pattern:
+        """Return the opening's pattern, of a window of the stop or of all that is lit.
 
+        Of white light of these Fresnel areas, shape (K, 2), and shares, or of one wavelength where there are no shares.
         What is kept has its resolution halved already, which may leave a sixteenth of it.
         """
-        key = (item.octaves, item.shown, area, item.half, item.halvings, white)
+        grid = self.grid(item.octaves, item.shown, window)
+        halvings = [int(np.clip(math.log2(side / grid.step), 0, 6)) for side in item.texel]
+        times = (halvings[0], halvings[1])
+        key = (item.octaves, item.shown, window, times, areas.tobytes(), None if shares is None else shares.tobytes())
         found = self._patterns.get(key)
         if found is None:
-            grid = self.grid(item.octaves, item.shown)
-            found = halved(*crop(grid, fresnel_intensity(grid, area, white=white), item.half), item.halvings)
+            if shares is None:
+                light = fresnel_intensity(grid, (float(areas[0, 0]), float(areas[0, 1])))
+            else:
+                light = band_intensity(grid, areas, shares)
+            found = halved(*crop(grid, light, item.whole if window is None else window), times)
             self._patterns.put(key, found, found[0].nbytes)
         kept: Pattern = found
         return kept
@@ -221,7 +232,7 @@ class Ringing:
         at = np.asarray((np.arange(count) - 0.5 * (count - 1)) * step, dtype=np.float64)
         _, light = self.sample(at, at[:, None])
         light[0], light[-1], light[:, 0], light[:, -1] = 0.0, 0.0, 0.0, 0.0
-        return picture_piece(np.ascontiguousarray(light, dtype=np.float32), (reach, reach))
+        return picture_piece(np.ascontiguousarray(light, dtype=np.float32), ((-reach, reach),) * 2)
 
 
 @dataclass(frozen=True)
@@ -236,22 +247,40 @@ class _Crossing:
         From which to which power of 2 Fresnel areas may lie, in x and in y.
     shown : float
         The finest step that pixels show, mm in the stop; 0 for lines, whose fringes are all kept.
-    half : tuple of float
-        Half the sides of the part of the stop that is lit, mm.
-    halvings : tuple of int
-        How often its resolution may be halved in x and in y.
+    whole : Box
+        The part of the stop that is lit.
+    texel : tuple of float
+        The coarsest step that a pattern may have, in x and in y, mm in the stop.
     """
 
     area: Floats
     octaves: Octaves
     shown: float
-    half: tuple[float, float]
-    halvings: tuple[int, int]
+    whole: Box
+    texel: tuple[float, float]
 
     @property
     def reach(self) -> float:
         """How far out in the stop there is light, mm."""
-        return max(self.half)
+        return float(np.max(self.whole))
+
+    def window(self, seen: Box | None) -> Box | None:
+        """Return the part of the stop whose pattern holds what is seen; None: all of it.
+
+        Rounded outwards to steps of a fourth of itself or less, so that lights side by side share it.
+        """
+        if seen is None:
+            return None
+        found = []
+        for (low, high), texel, whole in zip(seen, self.texel, self.whole, strict=True):
+            margin = WINDOW_TEXELS * texel
+            step = 2.0 ** math.floor(math.log2(0.25 * (high - low + 2.0 * margin)))
+            near = math.floor((low - margin) / step) * step, math.ceil((high + margin) / step) * step
+            found.append((max(near[0], whole[0]), min(near[1], whole[1])))
+        sides, all_sides = ([high - low for low, high in box] for box in (found, self.whole))
+        if min(sides) <= 0.0 or math.prod(sides) > WINDOW_PART * math.prod(all_sides):
+            return None
+        return found[0], found[1]
 
 
 @dataclass(frozen=True)
@@ -289,35 +318,48 @@ class Rings:
         ringed = [c for c, item in enumerate(self.crossings) if not isinstance(item, Piece)]
         return np.asarray(_near_edge(data, len(self.crossings), self.ringing.opening)[:, ringed].any(axis=1))
 
-    def textures(self, drawn_nm: Floats) -> Textures:
-        """Prepare for drawing at some wavelengths."""
+    @property
+    def white(self) -> bool:
+        """Whether few fringes are left, so that a pattern knows only of what is near it."""
+        return not isinstance(self.light.spectrum, Lines)
+
+    @property
+    def local(self) -> bool:
+        """Whether it helps to know which part of the stop is seen."""
+        return self.white and any(isinstance(item, _Crossing) for item in self.crossings)
+
+    def textures(self, drawn_nm: Floats, seen: Sequence[Box | None]) -> Textures:
+        """Prepare for drawing at some wavelengths; of each crossing the part of the stop that is seen, where known."""
         bands = band_contents(self.light.spectrum, drawn_nm)
         edges = [item.pieces(bands) if isinstance(item, EdgeCrossing) else [] for item in self.crossings]
-        return Textures(self, bands, tuple(tuple(pieces) for pieces in edges))
+        windows = [
+            item.window(box) if isinstance(item, _Crossing) and self.white else None
+            for item, box in zip(self.crossings, seen, strict=True)
+        ]
+        return Textures(self, bands, tuple(tuple(pieces) for pieces in edges), tuple(windows))
 
-    def average(self, item: _Crossing, waves: Floats, shares: Floats) -> Pattern:
+    def average(self, item: _Crossing, window: Box | None, waves: Floats, shares: Floats) -> Pattern:
         """Average a crossing's pattern over the light of a band."""
-        sides = [np.interp(waves, self.wavelengths_nm, side / self.wavelengths_nm) * waves for side in item.area.T]
-        middle = len(self.wavelengths_nm) // 2
-        ratio = float(item.area[middle, 1] / item.area[middle, 0])
-        white = not isinstance(self.light.spectrum, Lines)
-        parts: dict[tuple[float, float], float] = {}
-        for x, y, share in zip(*sides, shares, strict=True):
-            if not white:
-                parts[(float(x), float(y))] = parts.get((float(x), float(y)), 0.0) + float(share)
-                continue
-            place = math.log(abs(x)) / NODE_STEP
-            low = math.floor(place)
-            for node, part in zip(range(low - 1, low + 3), _cubic(place - low), strict=True):
-                at = math.exp(node * NODE_STEP)
-                parts[(at, at * ratio)] = parts.get((at, at * ratio), 0.0) + part * float(share)
-        total: Singles | None = None
-        half = item.half
-        for area, share in parts.items():
-            values, half = self.ringing.pattern(item, area, white=white)
-            total = values * np.float32(share) if total is None else total + values * np.float32(share)
-        assert total is not None
-        return total, half
+        areas = np.column_stack(
+            [np.interp(waves, self.wavelengths_nm, side / self.wavelengths_nm) * waves for side in item.area.T]
+        )
+        if self.white:
+            # the proportion of both hardly depends on the wavelength
+            middle = len(self.wavelengths_nm) // 2
+            areas[:, 1] = areas[:, 0] * (item.area[middle, 1] / item.area[middle, 0])
+            parts = _narrow(areas[:, 0], shares)
+            light = np.array([shares[part].sum() for part in parts])
+            patterns = [
+                self.ringing.pattern(item, window, areas[part], shares[part] / own)
+                for part, own in zip(parts, light, strict=True)
+            ]
+        else:
+            light = shares
+            patterns = [self.ringing.pattern(item, window, areas[k : k + 1], None) for k in range(len(waves))]
+        if len(patterns) == 1:
+            return patterns[0]
+        total = sum(values * np.float32(share) for (values, _), share in zip(patterns, light, strict=True))
+        return np.asarray(total, dtype=np.float32), patterns[0][1]
 
 
 @dataclass(frozen=True)
@@ -331,11 +373,14 @@ class Textures:
         What light each drawn wavelength stands for.
     edges : tuple of tuple of Piece
         For each crossing of the stop its pieces at these wavelengths, where it has edges and corners.
+    windows : tuple of Box or None
+        For each the part of the stop that a picture of it holds; None for all of it.
     """
 
     rings: Rings
     bands: tuple[tuple[Floats, Floats], ...]
     edges: tuple[tuple[Piece, ...], ...]
+    windows: tuple[Box | None, ...]
 
     def draw(
         self, k: int, bundle: Bundle, data: Floats, densities: Floats, axes: Floats, to_pixels: Floats, gain: float,
@@ -353,11 +398,11 @@ class Textures:
     def _texture(self, k: int) -> tuple[Singles, Floats, float]:
         """Return the k-th patterns and their table, as `kernels.ringing` takes them, and a gain."""
         pieces: list[Piece] = []
-        for item, edges in zip(self.rings.crossings, self.edges, strict=True):
+        for item, edges, window in zip(self.rings.crossings, self.edges, self.windows, strict=True):
             if isinstance(item, EdgeCrossing):
                 pieces.append(edges[k])
             elif isinstance(item, _Crossing):
-                pieces.append(picture_piece(*self.rings.average(item, *self.bands[k])))
+                pieces.append(picture_piece(*self.rings.average(item, window, *self.bands[k])))
             else:
                 pieces.append(item)
         patterns, starts = self.rings.ringing.joined(tuple(piece.values for piece in pieces))
@@ -367,10 +412,13 @@ class Textures:
         return patterns, table, math.prod(piece.gain for piece in pieces)
 
 
-def _cubic(t: float) -> tuple[float, float, float, float]:
-    """Weights of Lagrange's cubic through four neighbours at t between the second and the third."""
-    a, b, c, d = t + 1.0, t, t - 1.0, t - 2.0
-    return -b * c * d / 6.0, a * c * d / 2.0, -a * b * d / 2.0, a * b * c / 6.0
+def _narrow(areas: Floats, shares: Floats) -> list[NDArray[np.intp]]:
+    """Divide a band into parts of like light, each so narrow that one transform serves it."""
+    mean = float(shares @ areas)
+    spread = math.sqrt(float(shares @ (areas - mean) ** 2)) / abs(mean)
+    count = max(1, math.ceil(spread / BAND_SPREAD))
+    part = np.minimum((np.cumsum(shares) - 0.5 * shares) * count, count - 0.5).astype(np.intp)
+    return [np.flatnonzero(part == k) for k in range(count) if (part == k).any()]
 
 
 def _rings(
@@ -457,7 +505,7 @@ def _crossing(
     enough = TEXEL_PX / np.maximum(magnified, 1e-9)
     # half octaves of this too
     shown = 0.0 if finer else 2.0 ** (0.5 * math.floor(2.0 * math.log2(0.5 * float(enough.min()))))
-    halvings = [int(np.clip(math.log2(side / ringing.grid(octaves, shown).step), 0, 6)) for side in enough]
     widest = WIDEST_RADII * ringing.radius
     half = [ringing.opening.radius + min(SHADOW * math.sqrt(0.5 * 2.0**top), widest) for top in high]
-    return _Crossing(area, octaves, shown, (half[0], half[1]), (halvings[0], halvings[1]))
+    whole = ((-half[0], half[0]), (-half[1], half[1]))
+    return _Crossing(area, octaves, shown, whole, (float(enough[0]), float(enough[1])))
