@@ -138,6 +138,7 @@ def _fill_woven(flat, blocks, row, depth, xl0, xl1, xr0, xr1, start, gx, density
     l_inverse, r_inverse = np.float32(1.0 / max(lb - la, 1e-6)), np.float32(1.0 / max(rb - ra, 1e-6))
     slope, low, high = np.float32(gx), np.float32(density_low), np.float32(density_high)
     red, green, blue = np.float32(rgb[0] * depth), np.float32(rgb[1] * depth), np.float32(rgb[2] * depth)
+    ahead = np.uint64(_AHEAD * blocks * _FLOATS)
     for block in range(int(la) // BLOCK, min(int(rb) // BLOCK, blocks - 1) + 1):
         x0 = float(BLOCK * block)
         base = np.float32(start + gx * (x0 + 0.5))
@@ -148,7 +149,10 @@ def _fill_woven(flat, blocks, row, depth, xl0, xl1, xr0, xr1, start, gx, density
             light[begin + np.uint64(m)] *= min(max(base + slope * c, low), high) * (
                 _covered(c, l0, l1, l_inverse) - _covered(c, r0, r1, r_inverse)
             )
-        add_colored(flat, np.uint64((row * blocks + block) * _FLOATS), light, begin, red, green, blue)
+        place = np.uint64((row * blocks + block) * _FLOATS)
+        fetch(flat, place + ahead)
+        fetch(flat, place + ahead + np.uint64(16))
+        add_colored(flat, place, light, begin, red, green, blue)
 
 
 @inlined

@@ -338,9 +338,10 @@ def _is_soft(bundle: Bundle, iris_radius: float) -> bool:
         within = (data[:, ALIVE] > 0.0) & (radius <= iris_radius).all(axis=1)
         if (data[within, REL] > 1.0).any():
             return False
-        nodes = bundle.triangles[within[bundle.triangles].all(axis=1)]
+        corners = np.ascontiguousarray(bundle.triangles.T)
+        nodes = corners[:, within[corners].all(axis=0)]
         x, y = data[nodes, X], data[nodes, Y]
-        area = (x[:, 1] - x[:, 0]) * (y[:, 2] - y[:, 0]) - (y[:, 1] - y[:, 0]) * (x[:, 2] - x[:, 0])
+        area = (x[1] - x[0]) * (y[2] - y[0]) - (y[1] - y[0]) * (x[2] - x[0])
         if area.size and area.min() * area.max() < 0.0:
             return False
     return True

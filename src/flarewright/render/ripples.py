@@ -69,15 +69,17 @@ def _largest_part(item: FinalPass, rings: Rings, bundle: Bundle, around: Surroun
     data = bundle.traced[len(item.shot.packed.wavelengths_nm) // 2]
     own = node_densities(data, bundle.pupil, bundle.triangles) * unit(item, bundle, data)
     lit = rings.lit_nodes(data)
-    near = bundle.triangles[lit[bundle.triangles].any(axis=1) & (data[:, ALIVE] > 0.0)[bundle.triangles].all(axis=1)]
+    # corner by corner: three long rows are compared many times faster than many rows of three
+    corners = np.ascontiguousarray(bundle.triangles.T)
+    near = corners[:, lit[corners].any(axis=0) & (data[:, ALIVE] > 0.0)[corners].all(axis=0)]
     (left, top), (right, bottom) = around.corners_px
     largest = 0.0
     for mirror in (1.0, -1.0)[: bundle.halves]:
         # what a ray that ended holds may be infinite, so only of those that live is anything computed
         c, r = places_of(item.shot, item.to_pixels, mirror * data[near, X], data[near, Y])
-        seen = (c.max(axis=1) >= left) & (c.min(axis=1) <= right) & (r.max(axis=1) >= top) & (r.min(axis=1) <= bottom)
+        seen = (c.max(axis=0) >= left) & (c.min(axis=0) <= right) & (r.max(axis=0) >= top) & (r.min(axis=0) <= bottom)
         if seen.any():
-            bright = own[near[seen]].max(axis=1)
-            there = np.maximum(around.at(c[seen], r[seen]).min(axis=1), bright)
+            bright = own[near[:, seen]].max(axis=0)
+            there = np.maximum(around.at(c[:, seen], r[:, seen]).min(axis=0), bright)
             largest = max(largest, float((bright / np.maximum(there, 1e-300)).max()))
     return largest
