@@ -9,6 +9,7 @@ from flarewright.io.lens_file import read_lens
 from flarewright.io.library import lens_path
 from flarewright.io.project_file import read_project
 from flarewright.model import Project
+from flarewright.render.analysis import ghosts
 from flarewright.render.display import view
 from flarewright.render.render import render
 
@@ -506,3 +507,39 @@ def test_an_iris_is_drawn_and_a_matte_hides_the_light(tab, tmp_path):
     tab.page.locator("#view").focus()
     tab.page.keyboard.press("Control+z")
     tab.until("flarewright.state.iris.mask === null")
+
+
+def test_the_stop_moves_and_the_lens_stays_as_sharp(tab, tmp_path):
+    tab.tab("lens")
+    before = tab.state()["lens"]
+    stop = next(k for k, row in enumerate(before["rows"]) if row["stop"])
+    tab.page.locator("input[data-row='3'][data-column='radius']").click()
+    tab.page.click("#move-stop")
+    tab.until(f"!flarewright.state.lens.rows[{stop}].stop")
+    tab.rest()
+    after = tab.state()["lens"]
+    assert len(after["rows"]) == len(before["rows"])
+    assert [row["stop"] for row in after["rows"]].index(True) == 3
+    assert after["facts"]["efl"] == pytest.approx(before["facts"]["efl"], rel=1e-9)
+    assert judged(tab, project_of(tab, tmp_path)) < 1.5
+    tab.page.click("#undo")
+    tab.until(f"flarewright.state.lens.rows[{stop}].stop")
+
+
+def test_the_lights_handle_stays_on_its_image_where_a_lens_bends_lines(tab):
+    """A fisheye's image of 40 degrees lies far within f tan of them."""
+    tab.tab("library")
+    tab.until("document.querySelectorAll('.library button').length > 10")
+    tab.page.fill("input[name=search]", "fisheye")
+    tab.page.click(".library button")
+    tab.until("flarewright.state.lens.name.includes('isheye')")
+    tab.js("flarewright.deed('move_light', {light: 0, x: 40, y: 15})")
+    tab.rest()
+    x, y = tab.light()
+    left, top, width, height = tab.frame()
+    sensor = tab.state()["camera"]["sensor"]
+    direct = ghosts("fisheye-nikkor-10.5", (40.0, 15.0), f_number=16.0).direct.centroid_mm
+    place = (left + width * (0.5 + direct[0] / sensor[0]), top + height * (0.5 - direct[1] / sensor[1]))
+    assert np.hypot(place[0] - x, place[1] - y) < 1.0
+    # its rays by f tan would be beside the picture's edge
+    assert place[0] < left + 0.9 * width

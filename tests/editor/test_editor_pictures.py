@@ -422,13 +422,14 @@ def test_grey_is_seen_at_the_exposure_of_the_lens():
 
 
 def test_rings_that_take_minutes_are_left_out_and_told(project, tmp_path):
-    """Through an image every ghost's rings are a wave on a grid: the picture never came."""
+    """Through an image and between cylinders every ghost's rings are a wave on a grid: the picture never came."""
     from PIL import Image
 
     Image.new("L", (64, 64), 255).save(tmp_path / "mask.png")
     masked = project.replace(iris=Iris(mask=str(tmp_path / "mask.png")))
     assert studio.staged(project, "final").quality.ringing == "collins"
     assert studio.staged(masked, "final").quality.ringing == "off"
+    assert studio.staged(project.replace(lens="anamorphic-heliar-2x"), "final").quality.ringing == "off"
     assert studio.take(masked, "final", View(), scale=0.3).remarks[-1] == studio.NO_RINGS
     assert studio.NO_RINGS not in studio.take(project, "final", View(), scale=0.3).remarks
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from ..io.library import lens_path
 from ..model import Art, Layer, Lens, Output, Project, Quality, Rule
 from ..render.display import auto_exposure
+from ..render.edge_rings import untabled
 from ..render.prepare import load_lens
 from ..render.render import render
 from ..render.working import working_ghosts
@@ -32,7 +33,9 @@ SOON_WAVELENGTHS = 5
 # its faintest ghosts are left out that carry together no more than this part of all ghost light
 SOON_CULL = 3e-3
 SOON_TOLERANCE_PX = 0.5
-NO_RINGS = "the screen leaves out rings inside ghosts, which take minutes through an image or dirt; files have them"
+NO_RINGS = (
+    "the screen leaves out rings inside ghosts, which are slow through an image, dirt or cylinders; files have them"
+)
 # gains of a draft's ghosts: their step, the least and the largest
 # (one that a rim hides now may come out as the hand goes on, so it is never dimmed altogether)
 STEP, LEAST, MOST = 2.0**0.25, 2.0**-1.5, 2.0
@@ -98,7 +101,7 @@ def staged(project: Project, grade: Grade, scale: float = 1.0) -> Project:
     if grade in ("soon", "final"):
         # reference quality is for files: it never ends
         quality = own.replace(mode="final") if own.mode != "final" else own
-        if _rings_take_minutes(project):
+        if _slow_rings(project):
             quality = quality.replace(ringing="off")
         if grade == "soon":
             few = min(quality.wavelengths, SOON_WAVELENGTHS)
@@ -111,12 +114,12 @@ def staged(project: Project, grade: Grade, scale: float = 1.0) -> Project:
     return found
 
 
-def _rings_take_minutes(project: Project) -> bool:
-    """Tell whether a project's rings are out of reach of a screen: through an image each is a wave on a grid."""
-    lens = project.lens
-    iris = project.iris if project.iris is not None or isinstance(lens, str) else lens.iris
-    image = iris is not None and iris.mask is not None
-    return project.quality.ringing != "off" and (image or (project.dirt.in_ghosts and not project.dirt.clean))
+def _slow_rings(project: Project) -> bool:
+    """Tell whether a project's rings are out of reach of a screen; its lens is at hand."""
+    assert isinstance(project.lens, Lens)
+    iris = project.iris or project.lens.iris
+    image = (iris is not None and iris.mask is not None) or (project.dirt.in_ghosts and not project.dirt.clean)
+    return project.quality.ringing != "off" and untabled(project.lens, image=image) is not None
 
 
 @lru_cache(maxsize=8)
@@ -171,7 +174,7 @@ def take(
     ghosts = spread([layer for layer in parts if layer.name.startswith("ghosts")], size)
     rest = spread([layer for layer in parts if not layer.name.startswith("ghosts")], size)
     told = rendering.remarks
-    if grade == "final" and _rings_take_minutes(stage.replace(quality=project.quality)):
+    if grade == "final" and _slow_rings(stage.replace(quality=project.quality)):
         told = (*told, NO_RINGS)
     return Picture(project, grade, ghosts, rest, time.perf_counter() - begun, told)
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..kernels import pattern as columns
+from ..model import Lens, Surface
 from ..optics.blade_form import BladeForm
 from ..optics.edge_ringing import (
     CORNER_SAMPLES,
@@ -100,6 +101,25 @@ class EdgeCrossing:
         tables = averaged(self.form, scale, spread, self.pixel_mm / scale)
         margin = len(tables.profile) // 2 / PROFILE_SAMPLES
         return edge_piece(self.form, tables, scale, margin * scale, gain(self.form, scale, tables))
+
+
+def untabled(lens: Lens, *, image: bool) -> str | None:
+    """Say what keeps all rings of a lens from being looked up in tables, so that each ghost's opening is transformed.
+
+    Parameters
+    ----------
+    lens : Lens
+    image : bool
+        The iris is one, or has dirt in it that ghosts show.
+
+    Returns
+    -------
+    str or None
+        None where nothing does.
+    """
+    if any(isinstance(row, Surface) and row.toroidal for row in lens.rows):
+        return "a lens with cylinders"
+    return "an iris image, or of one with dirt," if image else None
 
 
 def edge_crossing(form: BladeForm, wavelengths_nm: Floats, area: Floats, pixel_mm: float) -> EdgeCrossing | None:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ..io.mask_image import read_mask
 from ..kernels.trace import REFRACT
-from ..model import Layer, Project, Stop, Surface
+from ..model import Layer, Project, Stop
 from ..optics.grating import grating_orders
 from ..optics.paths import direct_path, ghost_paths
 from ..optics.shape import ideal
@@ -29,7 +29,6 @@ from .starburst_pass import OUT_OF_FOCUS_PX, read_soil, starburst_of
 if TYPE_CHECKING:
     from .ledger import Ledger
     from .reference import ReferenceRun
-    from .ringing import Ringing
 
 Progress = Callable[[float, str], None]
 
@@ -265,16 +264,14 @@ def _remarks(settled: Settled, shots: tuple[Shot, ...]) -> tuple[str, ...]:
     told += _grating_remarks(settled, shots)
     if quality.ringing == "frft" and quality.mode != "final":
         told.append(f"{quality.mode} quality traces rays alone: quality.ringing is for final quality")
-    if shots[0].ringing is not None and (own := _own_patterns(settled, shots[0].ringing)):
-        told.append(f"rings in the ghosts of {own} take most of the time: --ringing off leaves them out")
+    rings = shots[0].ringing
+    if rings is not None:
+        # only here: what has no rings need not know of them
+        from .edge_rings import untabled
+
+        if own := untabled(settled.lens, image=rings.form is None):
+            told.append(f"rings in the ghosts of {own} take most of the time: --ringing off leaves them out")
     return tuple(told)
-
-
-def _own_patterns(settled: Settled, rings: Ringing) -> str | None:
-    """Say what keeps an iris' rings from being looked up in the tables of its blades; None where nothing does."""
-    if any(isinstance(row, Surface) and row.toroidal for row in settled.lens.rows):
-        return "a lens with cylinders"
-    return "an iris image, or of one with dirt," if rings.form is None else None
 
 
 def _grating_remarks(settled: Settled, shots: tuple[Shot, ...]) -> list[str]:
