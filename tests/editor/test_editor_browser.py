@@ -395,6 +395,15 @@ def test_the_library_and_the_keys(tab):
     assert [each for each in names if not each[1]] == []
 
 
+def test_a_panel_is_found_again_as_it_was_left(tab):
+    tab.tab("light")
+    tab.js("document.getElementById('page').scrollTop = 120")
+    tab.tab("coating")
+    assert tab.js("document.getElementById('page').scrollTop") == 0
+    tab.tab("light")
+    assert tab.js("document.getElementById('page').scrollTop") == 120
+
+
 def test_readable_at_1280x720(tab):
     for name in ("light", "ghosts", "lens", "iris", "coating", "target", "library"):
         tab.tab(name)

@@ -297,7 +297,10 @@ const panels = {
 };
 const NAMES = { light: 'Light', ghosts: 'Ghosts', lens: 'Lens', iris: 'Iris', coating: 'Coating', target: 'Target', library: 'Library' };
 app.panels = panels;
+// how far down each panel was left
+const scrolled = {};
 app.open = (tab) => {
+  scrolled[app.tab] = $('page').scrollTop;
   app.tab = tab;
   for (const each of $('tabs').children) { each.setAttribute('aria-selected', each.dataset.tab === tab); each.tabIndex = each.dataset.tab === tab ? 0 : -1; }
   $('page').replaceChildren(panels[tab].element);
@@ -305,6 +308,7 @@ app.open = (tab) => {
   if (tab !== 'target') app.view.compare = 'physical';
   panels[tab].shown?.();
   if (app.state) { panels[tab].update?.(app.state); app.places(); }
+  $('page').scrollTop = scrolled[tab] ?? 0;
   app.view.redraw();
 };
 function tabs() {
