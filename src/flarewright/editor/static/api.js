@@ -31,7 +31,7 @@ async function send(path, body) {
 export const sentence = (text) => {
   const plain = String(text).trim();
   // a file keeps its name as it is, and so does a field
-  const name = /^\S+[._]\w+\b/.test(plain);
+  const name = /^\S+[._]\w+\b/.test(plain) || /^(?!cannot )[^:]+\.\w{2,5}: /.test(plain);
   return (name ? plain.charAt(0) : plain.charAt(0).toUpperCase()) + plain.slice(1) + (/[.!?]$/.test(plain) ? '' : '.');
 };
 
