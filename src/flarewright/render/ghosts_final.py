@@ -436,9 +436,10 @@ def _bridges(
         for column in range(STOP_X, short.shape[1], 2):
             passing &= short[:, column] ** 2 + short[:, column + 1] ** 2 <= iris_radius**2
         # what a ray that ended holds may be infinite, so only of those that pass is anything computed
-        here, there = short[passing][:, [X, Y]], long[passing][:, [X, Y]]
-        seen = (here**2).sum(axis=1) <= view_radius**2
-        shift = ((there - here) ** 2).sum(axis=1)[seen]
+        nodes = np.flatnonzero(passing)
+        x, y = short[nodes, X], short[nodes, Y]
+        across, along = long[nodes, X] - x, long[nodes, Y] - y
+        shift = (across * across + along * along)[x * x + y * y <= view_radius**2]
         # the few nodes that fly farthest carry hardly any light
         far = int(SHIFT_QUANTILE * (shift.size - 1))
         wide = sqrt(np.partition(shift, far)[far]) * scale if shift.size else 0.0

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import groupby
 from math import isfinite, pi
 from typing import TYPE_CHECKING, Any
@@ -108,22 +111,25 @@ def render(
             project.quality.ringing, seen[0].opening, settled.order.stop_semi_diameter, settled.order.f_number
         )
         seen = tuple(replace(shot, ringing=rings) for shot in seen)
+    images = [direct_image(settled.lens, shot) for shot in shots]
+    stars = images if tables is None else dimmed(images, tables)
+    starburst: Callable[[], Layer] = partial(starburst_of, settled, shots, stars, mask, soil, threads=threads)
     if project.quality.mode == "reference":
         drawn = _reference(settled, mask, run, threads, progress)
     else:
+        if project.output.starburst:
+            starburst = _begun(starburst, threads)
         drawn = _ghosts(settled, seen, art, threads, progress)
-    images = [direct_image(settled.lens, shot) for shot in shots]
     passes = list(drawn.passes)
     scattered: dict[str, Any] = {}
     told: tuple[str, ...] = ()
     if tables is not None:
         if project.quality.mode != "reference":
             passes.append(render_scatter(settled, shots, images, tables, threads=threads))
-        images = dimmed(images, tables)
         facts, told = scatter_facts(settled, tables)
         scattered = {"scatter": facts}
     if project.output.starburst:
-        passes.insert(0, starburst_of(settled, shots, images, mask, soil, threads=threads))
+        passes.insert(0, starburst())
     passes = [graded(layer, art.gain.get(layer.name.removesuffix(".order4"), 1.0)) for layer in passes]
     others = [graded(layer, art.gain.get("ghosts", 1.0)) for layer in drawn.others]
     whole = beauty(passes, project.camera.size_px)
@@ -133,7 +139,7 @@ def render(
         from .ledger import trace_ledger
 
         account = trace_ledger(shots, project.quality.seed, scatter=tables, threads=threads)
-    summary = {**_summary(settled, shots, images, art), **drawn.facts, **scattered}
+    summary = {**_summary(settled, shots, stars, art), **drawn.facts, **scattered}
     return Rendering(
         settled.project,
         layers,
@@ -141,6 +147,20 @@ def render(
         (*settled.remarks, *drawn.remarks, *told, *_remarks(settled, seen)),
         account if ledger else None,
     )
+
+
+def _begun(work: Callable[[], Layer], threads: int | None) -> Callable[[], Layer]:
+    """Begin some work beside what follows, where there is a second thread; return what waits for what it made.
+
+    Transforms need neither the interpreter nor the compiler, for which threads that draw their first ghosts take turns.
+    """
+    if (threads or os.cpu_count() or 1) < 2:
+        return work
+    with_one = ThreadPoolExecutor(1)
+    begun = with_one.submit(work)
+    # nobody waits for it where the rest is broken off
+    with_one.shutdown(wait=False)
+    return begun.result
 
 
 @dataclass(frozen=True)
