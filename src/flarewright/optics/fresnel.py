@@ -289,7 +289,8 @@ def band_intensity(grid: FresnelGrid, areas: Sequence[tuple[float, float]] | Flo
     # each turn is that of the first in its row and that of its column in the first row, for all colours at once
     ratios = pairs[:, 0] / middle[0]
     rows, columns = (np.exp(-1j * math.pi * ratios * one[:, None]) for one in (at[:, 0], at[0]))
-    turn = ((rows * shares) @ columns.T).ravel()
+    # without BLAS, whose threads would wait for each other beside ours
+    turn = np.einsum("ik,jk->ij", rows * shares, columns).ravel()
     fade = ending(np.sqrt(2.0 * at.ravel()), *FADE)
     across, down = (np.float32(abs(a)) * f**2 for a, f in zip(middle, (fx, fy), strict=True))
     to_step = np.float32(last / end)

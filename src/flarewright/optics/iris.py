@@ -193,25 +193,40 @@ def resampled(image: NDArray[np.floating], half: float, x: Floats, y: Floats) ->
     -------
     ndarray, shape (..., Ny, Nx)
     """
-    across = _triangles(x / half, image.shape[-1])
-    down = _triangles(y / half, image.shape[-2])[:, ::-1]
-    mean: Floats = down @ np.asarray(image, dtype=np.float64) @ across.T
-    return mean
+    wanted = np.asarray(image, dtype=np.float64)[..., ::-1, :]
+    lines = _averaged(wanted, *_triangles(y / half, image.shape[-2]))
+    across = np.ascontiguousarray(lines.swapaxes(-1, -2))
+    return _averaged(across, *_triangles(x / half, image.shape[-1])).swapaxes(-1, -2)
 
 
-def _triangles(at: Floats, pixels: int) -> Floats:
-    """Weights of the pixels of a line over [-1, 1] for samples of it, shape (N, pixels)."""
+def _averaged(image: Floats, first: NDArray[np.intp], weights: Floats) -> Floats:
+    """Average rows of an image, dark around it, by weights of the few from `first` on; row 0 is the one before it."""
+    beyond = [(0, 0)] * (image.ndim - 2) + [(1, weights.shape[1]), (0, 0)]
+    padded = np.pad(image, beyond)
+    total: Floats = weights[:, 0, None] * padded[..., first, :]
+    for k in range(1, weights.shape[1]):
+        total += weights[:, k, None] * padded[..., first + k, :]
+    return total
+
+
+def _triangles(at: Floats, pixels: int) -> tuple[NDArray[np.intp], Floats]:
+    """Tell which pixels of a line over [-1, 1] make its samples: the first of them, and their weights, (N, K).
+
+    Pixels are counted from 1, with a dark one at either end.
+    """
     parts = 16
     step = float(at[1] - at[0])
-    weights = np.zeros((len(at), pixels + 2))
+    offsets = (np.arange(2 * parts) + 0.5) / parts - 1.0
+    places = np.clip(0.5 * (at[:, None] + offsets * step + 1.0) * pixels + 0.5, 0.0, pixels + 1.0)
+    low = np.minimum(places.astype(np.intp), pixels)
+    first = low[:, 0]
+    weights = np.zeros((len(at), int((low[:, -1] - first).max()) + 2))
     rows = np.arange(len(at))
-    for part in (np.arange(2 * parts) + 0.5) / parts - 1.0:
-        place = np.clip(0.5 * (at + part * step + 1.0) * pixels + 0.5, 0.0, pixels + 1.0)
-        low = np.minimum(place.astype(np.intp), pixels)
-        share = (1.0 - abs(part)) / parts
-        weights[rows, low] += share * (1.0 - (place - low))
-        weights[rows, low + 1] += share * (place - low)
-    return weights[:, 1:-1]
+    for k, offset in enumerate(offsets):
+        share, upper = (1.0 - abs(offset)) / parts, places[:, k] - low[:, k]
+        weights[rows, low[:, k] - first] += share * (1.0 - upper)
+        weights[rows, low[:, k] - first + 1] += share * upper
+    return first, weights
 
 
 def _border_value(edges: Floats, x: Floats, y: Floats) -> Floats:
