@@ -166,7 +166,7 @@ def find_region(
         for w in wavelengths_fitted(packed)[: 1 if quick else None]
     ]
     box, cells = front_box(packed, tilt), cells_across(packed, PREPASS_QUICK if quick else PREPASS)
-    finest = _finest(packed, tilt)
+    finest = _finest(packed, box)
     if within is not None:
         # as dense as on the whole front
         parts = (within[1::2] - within[0::2]) / (box[1::2] - box[0::2])
@@ -219,10 +219,10 @@ def _with_room(found: Floats, box: Floats, cells: tuple[int, int]) -> Floats:
     return np.array([low[0], high[0], low[1], high[1]])
 
 
-def _finest(packed: PackedLens, tilt: float) -> tuple[float, float]:
-    """Tell how finely what hides between the samples of a part is looked for: as on the whole front."""
-    box, cells = front_box(packed, tilt), cells_across(packed, PREPASS)
-    return float(box[1] - box[0]) / (PROBES * cells[0]), float(box[3] - box[2]) / (PROBES * cells[1])
+def _finest(packed: PackedLens, front: Floats) -> tuple[float, float]:
+    """Tell how finely what hides between the samples of a part is looked for: as on the whole front, shape (4,)."""
+    cells = cells_across(packed, PREPASS)
+    return float(front[1] - front[0]) / (PROBES * cells[0]), float(front[3] - front[2]) / (PROBES * cells[1])
 
 
 def measure_region(
@@ -243,7 +243,7 @@ def measure_region(
     """
     w, cells = wavelengths_fitted(packed)[0], cells_across(packed, FINER)
     arguments = (*_looking_arguments(packed, w, path, tilt), path.stop_crossings, iris_radius, view_radius)
-    found, sums, _ = _scan(packed, arguments, box, cells, _finest(packed, tilt))
+    found, sums, _ = _scan(packed, arguments, box, cells, _finest(packed, front_box(packed, tilt)))
     if found[1] <= found[0] or sums[0] <= 0.0:
         return None
     return _region(_with_room(found, box, cells), sums)

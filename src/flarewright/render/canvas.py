@@ -117,7 +117,7 @@ def to_layer(
         return Layer(name, np.zeros((1, 1, 3), dtype=np.float32), (0, 0, 1, 1), about)
     shape = (y1 - y0, x1 - x0, 3)
     irradiance = np.empty(shape, dtype=np.float32)
-    if reuse and pixels.shape == shape:
+    if reuse and pixels.shape == shape and pixels.dtype == np.float32:
         irradiance = pixels.astype(np.float32, copy=False)
     np.multiply(pixels[y0:y1, x0:x1], 1.0 / pixel_area, out=irradiance, casting="same_kind")
     return Layer(name, irradiance, (x0, y0, x1 - x0, y1 - y0), about)
