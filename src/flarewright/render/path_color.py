@@ -139,7 +139,9 @@ def places_of(shot: Shot, to_pixels: Floats, x: Floats, y: Floats) -> tuple[Floa
 
 
 def _passes(rays: Floats, iris_radius: float) -> Bools:
-    within = (rays[:, STOP_X::2] ** 2 + rays[:, STOP_X + 1 :: 2] ** 2 <= iris_radius**2).all(axis=1)
+    # what a ray that ended holds may be infinite
+    with np.errstate(over="ignore", invalid="ignore"):
+        within = (rays[:, STOP_X::2] ** 2 + rays[:, STOP_X + 1 :: 2] ** 2 <= iris_radius**2).all(axis=1)
     return np.asarray((rays[:, ALIVE] > 0.0) & (rays[:, REL] <= 1.0) & within)
 
 
