@@ -433,9 +433,10 @@ def _bridges(
     pieces = []
     for short, long in pairwise(traced):
         passing = (short[:, ALIVE] * long[:, ALIVE] > 0.0) & (np.minimum(short[:, REL], long[:, REL]) <= 1.0)
-        for column in range(STOP_X, short.shape[1], 2):
-            passing &= short[:, column] ** 2 + short[:, column + 1] ** 2 <= iris_radius**2
-        # what a ray that ended holds may be infinite, so only of those that pass is anything computed
+        # what a ray that ended holds may be infinite
+        with np.errstate(over="ignore", invalid="ignore"):
+            for column in range(STOP_X, short.shape[1], 2):
+                passing &= short[:, column] ** 2 + short[:, column + 1] ** 2 <= iris_radius**2
         nodes = np.flatnonzero(passing)
         x, y = short[nodes, X], short[nodes, Y]
         across, along = long[nodes, X] - x, long[nodes, Y] - y
