@@ -9,7 +9,6 @@ from scipy.interpolate import CubicSpline
 from test_track import ANGLES, drawn, thrice
 
 from flarewright.io.ghost_model_file import read_ghost_model, write_ghost_model
-from flarewright.kernels.measure_pupil import UNDER
 from flarewright.measure.compact import compact, curves_of, held_error, numbers_in, rounded, written_numbers
 from flarewright.measure.curves import Pose, posed, spline_basis, value_at
 from flarewright.measure.fit import Shape, evaluate, free_numbers, patches_of, refine, render
@@ -52,19 +51,6 @@ def test_a_curve_is_as_bent_as_its_values():
     found = [value_at(bent, angle, (0.0, 20.0)) for angle in at]
     assert np.sqrt(np.mean((found - wave) ** 2)) < 0.02
     assert smooth_curve(at[:2], at[:2], error[:2], (0.0, 20.0), usual=1.0, spread=0.5) is None
-
-
-def test_a_pose_shifts_every_point_alike_though_its_place_is_divided():
-    ghost = shape(-80.0, 20.0, 0.5, bend=5.0)
-    ghost.numbers[UNDER:] = -0.2, 0.4, -0.3
-    view = views((), angles=(12.0,))[0]
-    still = render(ghost, view)
-    moved = render(replace(ghost, numbers=posed(ghost.numbers, view.sigma, Pose(along_px=3.0))), view)
-    far = view.frame.copy()
-    far[0] += 3.0 * far[2]
-    far[1] -= 3.0 * far[3]
-    assert np.abs(moved - still).max() > 0.1 * still.max()
-    np.testing.assert_allclose(moved, render(ghost, replace(view, frame=far)), atol=1e-9 * still.max())
 
 
 def fitted(seed=0):

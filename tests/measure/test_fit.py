@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from planted_run import GHOSTS, LARGEST, NOISE, SIZE, shape, views
 
-from flarewright.kernels.measure_pupil import SOFT, UNDER
+from flarewright.kernels.measure_pupil import SOFT
 from flarewright.measure.compress import compress
 from flarewright.measure.find import Candidate, candidates, slopes_of
 from flarewright.measure.fit import Shape, free_numbers, patches_of, presence, refine, render
@@ -66,29 +66,6 @@ def test_softness_comes_back_within_its_uncertainty_and_through_a_model(variance
     # sharp borders cannot stand in for soft ones
     sharp = refine(GHOSTS[0], patches_of(planted, shown, 1), free[:-1], width=SIZE[0], steps=30, error=0.0)
     assert sharp.cost > 2.0 * fit.cost
-
-
-def test_a_denominator_comes_back_within_its_uncertainty_and_through_a_model():
-    numbers = GHOSTS[0].numbers.copy()
-    numbers[UNDER:] = -0.06, 0.15, -0.1
-    planted = Shape(numbers)
-    shown = views((planted,), angles=FEW)
-    patches = patches_of(planted, shown, 1)
-    free = free_numbers(1, 0, 1, divided=True)
-    assert np.isin(np.arange(UNDER, UNDER + 3), free).all()
-    fit = refine(GHOSTS[0], patches, free, width=SIZE[0], steps=60, offset=False, error=0.0)
-    pulls = (fit.shape.numbers - numbers)[free] / fit.uncertainty[free]
-    assert fit.cost / fit.count == pytest.approx(1.0, abs=0.03)
-    assert np.abs(pulls).max() < 4.0
-    assert fit.uncertainty[UNDER:].max() < 0.15
-    written = channel_of(fit.shape.numbers, 0, fit.uncertainty)
-    assert written.denominator == pytest.approx(tuple(numbers[UNDER:]), abs=0.4)
-    assert len(written.uncertainty) == 34
-    assert written.uncertainty[31:] == pytest.approx(tuple(fit.uncertainty[UNDER:]))
-    assert channel_numbers(written, None) == pytest.approx(fit.shape.numbers)
-    # what Seidel's numbers alone cannot do
-    plain = refine(GHOSTS[0], patches, free[:-3], width=SIZE[0], steps=30, offset=False, error=0.0)
-    assert plain.cost > 1.2 * fit.cost
 
 
 def test_replay_equals_the_fit_at_captured_angles():

@@ -21,7 +21,6 @@ from .measure_pupil import (
     SOFT,
     TERMS,
     TURN,
-    UNDER,
     at_field,
     border,
     level,
@@ -29,7 +28,6 @@ from .measure_pupil import (
     place,
     rims,
     slopes,
-    under,
 )
 from .measure_soft import add_spreading, reach_of, soften, taps_of
 
@@ -108,8 +106,7 @@ def _land(parameters, pupil, sigma, frame, spots):
             xi, eta = pupil[i, j, 0], pupil[i, j, 1]
             u, v = xi * xi + eta * eta, xi * sigma
             spread = level(g, u, v)
-            over, _ = under(parameters, u, v, sigma * sigma)
-            along, across = (sigma * level(f, u, v) + xi * spread) * over, eta * spread * over
+            along, across = sigma * level(f, u, v) + xi * spread, eta * spread
             # rows count downwards
             spots[i, j, 0] = frame[0] + frame[4] * (frame[2] * along - frame[3] * across)
             spots[i, j, 1] = frame[1] - frame[4] * (frame[3] * along + frame[2] * across)
@@ -499,20 +496,15 @@ def _spot_changes(parameters, sigma, free, frame, pupil, pupil_by, spots_by):
         for j in range(pupil.shape[1]):
             xi, eta = pupil[i, j, 0], pupil[i, j, 1]
             monomials(xi * xi + eta * eta, xi * sigma, w, terms)
-            here, aside, a_xi, a_eta, c_xi, c_eta = place(parameters, xi, eta, sigma)
-            over, moves = under(parameters, terms[1], terms[2], w)
+            _, _, a_xi, a_eta, c_xi, c_eta = place(parameters, xi, eta, sigma)
             for q in range(free.size):
                 n = free[q]
                 if n == SOFT:
                     along, across = 0.0, 0.0
-                elif n >= UNDER:
-                    # u, v and w are the second to the fourth term
-                    part = -over * terms[n - UNDER + 1] if moves else 0.0
-                    along, across = here * part, aside * part
                 elif n < FIRST_G:
-                    along, across = sigma * terms[n] * over, 0.0
+                    along, across = sigma * terms[n], 0.0
                 elif n < FIRST_I:
-                    along, across = xi * terms[n - FIRST_G] * over, eta * terms[n - FIRST_G] * over
+                    along, across = xi * terms[n - FIRST_G], eta * terms[n - FIRST_G]
                 elif n < FIRST_DISC:
                     along, across = 0.0, 0.0
                 else:
@@ -564,7 +556,7 @@ def _triangle_changes(parameters, sigma, free, pupil, pupil_by, spots, spots_by,
             # what is below 0 is drawn as 0; its way up must show
             out[q] = -terms[n - FIRST_I] * part / area if not dark else 0.0
             continue
-        if FIRST_DISC <= n < UNDER:
+        if n >= FIRST_DISC:
             dax, day = _pupil_change(n, sigma, pupil_by, ia, ja)
             dbx, dby = _pupil_change(n, sigma, pupil_by, ib, jb)
             dcx, dcy = _pupil_change(n, sigma, pupil_by, ic, jc)

@@ -1,9 +1,7 @@
 """The pupil of a measured ghost: a fan of points over the intersection of discs, and where they land on the sensor.
 
 A ghost of a lens of revolution maps a pupil point p and a field s to (x, y) = s f(p.p, p.s, s.s) + p g(p.p, p.s, s.s):
-no other form is symmetric. f and g are polynomials over one common 1 + a p.p + b p.s + c s.s: a ghost that is focused
-in front of the sensor or behind it is cast from a point, as a perspective is, and that no polynomial does well. Its
-rims are the unit disc, or an iris of straight blades as large (`measure_iris`), and
+no other form is symmetric. Its rims are the unit disc, or an iris of straight blades as large (`measure_iris`), and
 discs whose centres move with s, so that the open part of the pupil is convex; with discs alone it is mirrored at the
 line through s. Every point comes with its derivatives by the ghost's parameters.
 """
@@ -18,18 +16,14 @@ from .measure_iris import ends, nearest_side, side_and_disc, side_corner
 # monomials of u = p.p, v = p.s, w = s.s up to second order: of f, of g and of the intensity
 TERMS = 10
 # parameters: f, g, intensity, then three a disc: centre by s, centre by s (s.s), radius; last the blades of the iris,
-# 0 for a round one, the direction of a side's normal in the picture, radians counterclockwise from the right, the
-# variance by which the light is spread, pixels of the model squared, and the denominator's u, v and w
+# 0 for a round one, the direction of a side's normal in the picture, radians counterclockwise from the right, and the
+# variance by which the light is spread, pixels of the model squared
 FIRST_G, FIRST_I, FIRST_DISC = TERMS, 2 * TERMS, 3 * TERMS
 DISC_NUMBERS = 3
 MOST_DISCS = 4
 BLADES = FIRST_DISC + DISC_NUMBERS * MOST_DISCS
 TURN = BLADES + 1
 SOFT = TURN + 1
-UNDER = SOFT + 1
-UNDER_NUMBERS = 3
-# the denominator is never taken to be less: what comes closer to 0 lands farther off than any picture reaches
-_LEAST_UNDER = 0.05
 
 
 @inner
@@ -228,13 +222,6 @@ def _snap(discs, spokes, blades, turn, active, middle, points, by):
 
 
 @inner
-def under(parameters, u, v, w):
-    """Return 1 over the denominator, and whether it moves with its numbers: where it comes close to 0 it stays."""
-    below = 1.0 + parameters[UNDER] * u + parameters[UNDER + 1] * v + parameters[UNDER + 2] * w
-    return 1.0 / max(below, _LEAST_UNDER), below > _LEAST_UNDER
-
-
-@inner
 def place(parameters, xi, eta, sigma):
     """Return where a pupil point lands, along s and across, and the derivatives by the pupil point."""
     u, v, w = xi * xi + eta * eta, xi * sigma, sigma * sigma
@@ -242,12 +229,5 @@ def place(parameters, xi, eta, sigma):
     g, gu, gv = slopes(parameters, FIRST_G, u, v, w)
     f_xi, f_eta = 2.0 * xi * fu + sigma * fv, 2.0 * eta * fu
     g_xi, g_eta = 2.0 * xi * gu + sigma * gv, 2.0 * eta * gu
-    over, moves = under(parameters, u, v, w)
-    along, across = (sigma * f + xi * g) * over, eta * g * over
-    by_u, by_v = (parameters[UNDER], parameters[UNDER + 1]) if moves else (0.0, 0.0)
-    d_xi, d_eta = 2.0 * xi * by_u + sigma * by_v, 2.0 * eta * by_u
-    return (
-        along, across, (sigma * f_xi + g + xi * g_xi - along * d_xi) * over,
-        (sigma * f_eta + xi * g_eta - along * d_eta) * over, (eta * g_xi - across * d_xi) * over,
-        (g + eta * g_eta - across * d_eta) * over,
-    )  # fmt: skip
+    along, across = sigma * f + xi * g, eta * g
+    return along, across, sigma * f_xi + g + xi * g_xi, sigma * f_eta + xi * g_eta, eta * g_xi, g + eta * g_eta

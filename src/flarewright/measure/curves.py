@@ -7,7 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from ..kernels.measure_pupil import FIRST_DISC, FIRST_G, FIRST_I, UNDER
+from ..kernels.measure_pupil import FIRST_DISC, FIRST_G, FIRST_I
 from ..model.ghost_model import Curve, Curves
 from .numbers import Floats
 
@@ -36,21 +36,18 @@ def posed(numbers: Floats, sigma: float, pose: Pose) -> Floats:
 
     Parameters
     ----------
-    numbers : ndarray, shape (48,)
+    numbers : ndarray, shape (45,)
     sigma : float
         Length of the field; with the light on the axis nothing shifts along it.
     pose : Pose
 
     Returns
     -------
-    ndarray, shape (48,)
+    ndarray, shape (45,)
     """
     out = numbers.copy()
     if sigma > 0.0:
-        # times the denominator, so that every point shifts alike
-        shift = pose.along_px / sigma
-        out[0] += shift
-        out[1:4] += shift * out[UNDER:]
+        out[0] += pose.along_px / sigma
     out[FIRST_G:FIRST_I] *= pose.size
     out[FIRST_I:FIRST_DISC] *= pose.brightness
     return out

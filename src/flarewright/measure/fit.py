@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..kernels.measure_edges import sum_along_rows, sum_changes_along_rows
 from ..kernels.measure_mesh import draw_with_changes, window_of
-from ..kernels.measure_pupil import DISC_NUMBERS, FIRST_DISC, FIRST_G, FIRST_I, SOFT, UNDER, UNDER_NUMBERS
+from ..kernels.measure_pupil import DISC_NUMBERS, FIRST_DISC, FIRST_G, FIRST_I, SOFT
 from .normal import inverse, solution
 from .numbers import NUMBERS, Floats
 from .views import View, halved
@@ -24,8 +24,8 @@ AREA = 7000
 MODEL_ERROR = 0.03
 # standard deviations beyond which a pixel counts less and less
 OUTLIER = 4.0
-# what softness is usual, part of the picture's width, and what numbers a denominator has
-_SOFTNESS, _UNDER = 0.005, 0.5
+# what softness is usual, part of the picture's width
+_SOFTNESS = 0.005
 _NONE = np.zeros(0, np.int64)
 
 
@@ -35,7 +35,7 @@ class Shape:
 
     Attributes
     ----------
-    numbers : ndarray, shape (48,)
+    numbers : ndarray, shape (45,)
         See `kernels.measure_pupil`.
     discs : int
     """
@@ -69,7 +69,7 @@ class Fit:
 
     @property
     def uncertainty(self) -> Floats:
-        """Standard deviation of all 48 numbers; 0 for those that were not fitted."""
+        """Standard deviation of all 45 numbers; 0 for those that were not fitted."""
         deviation = np.zeros(NUMBERS)
         # pixels that the model misses by more than noise make all numbers less certain
         excess = max(1.0, self.cost / max(self.count - self.free.size, 1))
@@ -89,7 +89,7 @@ class Patch:
     weight: Floats
 
 
-def free_numbers(order: int, discs: int, intensity_order: int, soft: bool = False, divided: bool = False) -> Indices:
+def free_numbers(order: int, discs: int, intensity_order: int, soft: bool = False) -> Indices:
     """Return which numbers to fit.
 
     Parameters
@@ -101,15 +101,12 @@ def free_numbers(order: int, discs: int, intensity_order: int, soft: bool = Fals
         0: even; 1: first order in u, v, w; 2: all.
     soft : bool
         Also how soft the borders are.
-    divided : bool
-        Also the denominator.
     """
     geometry = {0: (0, 3), 1: (0, 1, 2, 3), 2: tuple(range(10))}[order]
     light = {0: (0,), 1: (0, 1, 2, 3), 2: tuple(range(10))}[intensity_order]
     picked = [*geometry, *(FIRST_G + k for k in geometry), *(FIRST_I + k for k in light)]
     picked += [FIRST_DISC + k for k in range(DISC_NUMBERS * discs)]
     picked += [SOFT] if soft else []
-    picked += range(UNDER, UNDER + UNDER_NUMBERS) if divided else []
     return np.array(picked, dtype=np.int64)
 
 
@@ -222,7 +219,6 @@ def priors(shape: Shape, free: Indices, width: int) -> Floats:
     spread[FIRST_I] *= 20.0
     spread[FIRST_DISC:] = 3.0
     spread[SOFT] = (_SOFTNESS * width) ** 2
-    spread[UNDER:] = _UNDER
     return np.asarray(1.0 / spread[free] ** 2)
 
 

@@ -32,8 +32,6 @@ class Growth:
         Part of the light that the model may miss.
     soft : bool
         Whether borders may be soft, once place and size are known.
-    divided : bool
-        Whether a denominator is looked for then, too: among other ghosts it wanders.
     """
 
     order: int = 2
@@ -41,7 +39,6 @@ class Growth:
     discs: int = 2
     error: float = MODEL_ERROR
     soft: bool = True
-    divided: bool = False
 
 
 def grow(
@@ -75,7 +72,7 @@ def grow(
         patches = patches_of(start, views, channel)
         if not patches:
             return None
-        free = free_numbers(order, start.discs, light, most.soft and order > 0, most.divided and order > 0)
+        free = free_numbers(order, start.discs, light, most.soft and order > 0)
         return refine(start, patches, free, width=width, steps=steps, error=most.error, pool=pool), patches
 
     found = polish(shape, 0, 0, 8)
@@ -84,8 +81,7 @@ def grow(
         fit, patches = found
         grown: Fit | None = None
         if fit.shape.discs < most.discs:
-            free = free_numbers(order, 0, min(order, 1), divided=most.divided and order > 0)
-            grown = _with_rim(fit.shape, patches, free, width, most, pool)
+            grown = _with_rim(fit.shape, patches, free_numbers(order, 0, min(order, 1)), width, most, pool)
             before = cost_of(fit.shape, patches, error=most.error)
             if grown is not None and cost_of(grown.shape, patches, error=most.error) < (1.0 - RIM_PAYS) * before:
                 found = polish(grown.shape, order, min(order, most.intensity_order), 6) or found
@@ -112,7 +108,7 @@ def _with_rim(
     few = patches[:: max(1, len(patches) // 8)]
     at = FIRST_DISC + DISC_NUMBERS * shape.discs
     largest = max(patch.sigma for patch in patches)
-    own = np.concatenate([free[(free >= FIRST_I) & (free < FIRST_DISC)], [at, at + 2]])
+    own = np.concatenate([free[free >= FIRST_I], [at, at + 2]])
     trials = []
     for centre in _CENTRES:
         for bite in _BITES:

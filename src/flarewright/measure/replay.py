@@ -201,7 +201,7 @@ def draw_packed(
 
 
 def _posed(meshes: Sequence[AberrationGhost], numbers: Floats, constellation_deg: float, sigma: float) -> Floats:
-    """Return the numbers, shape (3, G, 48), as the ghosts' curves bend them at a constellation."""
+    """Return the numbers, shape (3, G, 45), as the ghosts' curves bend them at a constellation."""
     out = numbers
     for k, ghost in enumerate(meshes):
         if ghost.curves != Curves():

@@ -218,8 +218,7 @@ def _disc(ghost: AberrationGhost, model: GhostModel, constellation_deg: float) -
     u, v, w = px * px + py * py, px * s, np.full(px.size, s * s)
     terms = np.stack([np.ones_like(u), u, v, w, u * u, u * v, v * v, u * w, v * w, w * w])
     # green tells the shape, every colour its light
-    below = 1.0 + np.array(ghost.green.denominator) @ terms[1:4]
-    f, g = (np.array(numbers) @ terms / below for numbers in (ghost.green.f, ghost.green.g))
+    f, g = (np.array(numbers) @ terms for numbers in (ghost.green.f, ghost.green.g))
     radius = float(((px * (s * f + px * g) + py * py * g).sum()) / u.sum())
     pose = pose_at(ghost.curves, constellation_deg, ghost.visible_deg)
     radius *= pose.size

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..kernels.measure_edges import sum_along_rows, sum_changes_along_rows
 from ..kernels.measure_mesh import draw_with_changes, window_of
-from ..kernels.measure_pupil import FIRST_G, FIRST_I, UNDER
+from ..kernels.measure_pupil import FIRST_G, FIRST_I
 from .curves import Pose, posed
 from .fit import MODEL_ERROR, OUTLIER, Shape
 from .found import CHANNELS
@@ -29,8 +29,7 @@ _BRIGHTNESS, _RADII, _WIDTHS, _SIZE = 3.0, 0.3, 0.01, 0.2
 # a step that gains less than this part of the cost is the last
 _GAIN = 1e-3
 # the derivatives that make a shift and a change of size
-_SHIFT = 4
-_FREE = np.array([*range(_SHIFT), *range(FIRST_G, FIRST_I)], dtype=np.int64)
+_FREE = np.array([0, *range(FIRST_G, FIRST_I)], dtype=np.int64)
 
 
 def halvings(width: int) -> int:
@@ -212,10 +211,8 @@ def _draw(ghost: int, shape: Shape, pose: Pose, view: View) -> _Drawn | None:
     picture, by = plane[:, :width], changes[:, :width]
     # a ghost that is not seen has no place either: its light, not below a tenth, scales what place and size change
     level = max(pose.brightness, 0.1)
-    # every point shifts alike where f grows as the denominator does
-    alike = by[..., :_SHIFT] @ np.array([1.0, *numbers[UNDER:]])
-    shift = level * alike / view.sigma if view.sigma > 0.0 else np.zeros_like(picture)
-    growth = level * (by[..., _SHIFT:] @ shape.numbers[FIRST_G:FIRST_I])
+    shift = level * by[..., 0] / view.sigma if view.sigma > 0.0 else np.zeros_like(picture)
+    growth = level * (by[..., 1:] @ shape.numbers[FIRST_G:FIRST_I])
     part = (slice(top, top + height), slice(left, left + width))
     return _Drawn(ghost, part, picture, np.stack([picture, shift, growth], axis=-1))
 

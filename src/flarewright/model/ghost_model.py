@@ -36,9 +36,8 @@ class Disc(Frozen):
 class Channel(Frozen):
     """One colour of a ghost: where each point p of its pupil lands, and how bright it is.
 
-    (x, y) = (s f + p g) / (1 + d.(u, v, w)); f, g and the intensity are polynomials of u = p.p, v = p.s, w = s.s with
-    the ten terms 1, u, v, w, uu, uv, vv, uw, vw, ww, and d is the `denominator`. The pupil is the unit disc, or the
-    ghost's `blades`, cut by `discs`.
+    (x, y) = s f + p g; f, g and the intensity are polynomials of u = p.p, v = p.s, w = s.s with the ten terms
+    1, u, v, w, uu, uv, vv, uw, vw, ww. The pupil is the unit disc, or the ghost's `blades`, cut by `discs`.
 
     Attributes
     ----------
@@ -50,10 +49,9 @@ class Channel(Frozen):
     soft_px : float
         Standard deviation of the Gaussian that spreads its light, pixels: borders are soft, for the light has a size
         and every wavelength draws the ghost in its own.
-    denominator : tuple of 3 float
     uncertainty : tuple of float
-        Standard deviation of f, g, intensity and each disc's three numbers, in this order, of soft_px where that or the
-        denominator was fitted, and of the denominator where it was; 0 for numbers that were not fitted. Empty: unknown.
+        Standard deviation of f, g, intensity and each disc's three numbers, in this order, and of soft_px where that
+        was fitted; 0 for numbers that were not fitted. Empty: unknown.
     """
 
     f: Ten
@@ -61,17 +59,13 @@ class Channel(Frozen):
     intensity: Ten
     discs: tuple[Disc, ...] = Field((), max_length=4)
     soft_px: float = Field(0.0, ge=0.0, le=1000.0)
-    denominator: tuple[float, float, float] = (0.0, 0.0, 0.0)
     uncertainty: tuple[float, ...] = ()
 
     @model_validator(mode="after")
     def _count(self) -> Channel:
         numbers = 30 + 3 * len(self.discs)
-        if len(self.uncertainty) not in (0, numbers, numbers + 1, numbers + 4):
-            raise ValueError(
-                f"uncertainty needs {numbers} numbers, one more with that of soft_px, three more with those of the "
-                "denominator, or none"
-            )
+        if len(self.uncertainty) not in (0, numbers, numbers + 1):
+            raise ValueError(f"uncertainty needs {numbers} numbers, one more with that of soft_px, or none")
         return self
 
 
