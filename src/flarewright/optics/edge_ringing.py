@@ -9,8 +9,8 @@ light: s alone depends on them. What a blade's curvature adds is taken at a few 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -77,23 +77,26 @@ class EdgeTables:
         Column of the corner itself.
     excess : tuple of float
         What the pattern holds more than the opening: per s of border, its first moment, and at half a corner.
+    values : ndarray, shape (V,), float32
+        As the kernel reads them, once they are `laid_out`: the corner's table row by row, after it the profile,
+        `EDGE_SAMPLES` per s, and zeros, for an edge is looked up as a corner is, between neighbours that count for
+        nothing but have to be there.
     """
 
     profile: Singles
     corner: Singles
     first: int
     excess: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    values: Singles = field(default_factory=lambda: np.zeros(0, dtype=np.float32), repr=False)
 
-    @cached_property
-    def values(self) -> Singles:
-        """The corner's table row by row, after it the profile, `EDGE_SAMPLES` per s, and zeros: shape (P,).
-
-        An edge is looked up as a corner is, between neighbours that count for nothing but have to be there.
-        """
+    def laid_out(self) -> EdgeTables:
+        """Return the same tables with their `values`, of which the corner's is a part: hundreds of them are kept."""
         count = len(self.profile)
         fine = np.linspace(0.0, count - 1.0, self.edge_count)
         profile = np.interp(fine, np.arange(count), self.profile).astype(np.float32)
-        return np.concatenate([self.corner.ravel(), profile, np.zeros(self.corner.shape[1] + 2, dtype=np.float32)])
+        beyond = np.zeros(self.corner.shape[1] + 2, dtype=np.float32)
+        values = np.concatenate([self.corner.ravel(), profile, beyond])
+        return replace(self, corner=values[: self.corner.size].reshape(self.corner.shape), values=values)
 
     @property
     def edge_count(self) -> int:
@@ -264,7 +267,7 @@ def sharp_tables() -> EdgeTables:
     """Return the opening itself, its border a sample of a corner's table wide; its s may be of any length."""
     across = np.arange(-PROFILE_SAMPLES, PROFILE_SAMPLES + 1) / PROFILE_SAMPLES
     profile = np.clip(0.5 - across * CORNER_SAMPLES, 0.0, 1.0)
-    return EdgeTables(profile.astype(np.float32), np.zeros((0, 0), dtype=np.float32), 0)
+    return EdgeTables(profile.astype(np.float32), np.zeros((0, 0), dtype=np.float32), 0).laid_out()
 
 
 def averaged(form: BladeForm, scale: float, spread: float, pixel: float = 0.0) -> EdgeTables:
@@ -297,7 +300,7 @@ def _averaged(corner: Corner, spread: float, pixel: float) -> EdgeTables:
     band = _band(corner, spread, 0.5 * math.ceil(2.0 * (REACH + 0.5 + 0.5 * pixel)))
     profile = _boxed(band.profile, 0, pixel * PROFILE_SAMPLES).astype(np.float32)
     profile[0], profile[-1] = 1.0, 0.0
-    return replace(band, profile=profile, corner=_boxed_corner(band.corner, pixel * CORNER_SAMPLES))
+    return replace(band, profile=profile, corner=_boxed_corner(band.corner, pixel * CORNER_SAMPLES)).laid_out()
 
 
 @lru_cache(maxsize=KEPT_BANDS)

@@ -8,7 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import groupby
-from math import isfinite, pi
+from math import isfinite, pi, prod
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -34,6 +34,9 @@ if TYPE_CHECKING:
     from .reference import ReferenceRun
 
 Progress = Callable[[float, str], None]
+
+BESIDE_PX = 1_000_000
+"""The starburst of a larger picture is not made beside its ghosts: together they hold 100 MB more at 1080p."""
 
 
 @dataclass(frozen=True)
@@ -117,7 +120,7 @@ def render(
     if project.quality.mode == "reference":
         drawn = _reference(settled, mask, run, threads, progress)
     else:
-        if project.output.starburst:
+        if project.output.starburst and prod(project.camera.size_px) <= BESIDE_PX:
             starburst = _begun(starburst, threads)
         drawn = _ghosts(settled, seen, art, threads, progress)
     passes = list(drawn.passes)

@@ -75,8 +75,8 @@ WINDOW_PART = 0.7
 WINDOW_TEXELS = 3.0
 """A window reaches this many of a pattern's texels farther than what is seen through it."""
 
-KEPT_BYTES = 150_000_000
-KEPT_GRID_BYTES = 100_000_000
+KEPT_BYTES = 60_000_000
+KEPT_GRID_BYTES = 60_000_000
 KEPT_JOINED_BYTES = 20_000_000
 # a crossing is lit where rays come as near to its edge as this part of the circle within it
 LIT = 0.95
