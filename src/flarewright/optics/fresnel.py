@@ -96,10 +96,10 @@ class FresnelGrid:
         """Rows and columns of a pattern."""
         return len(self.at[1]), len(self.at[0])
 
-    def frequencies(self) -> tuple[Singles, Singles]:
+    def frequencies(self) -> tuple[Floats, Floats]:
         """Return those of the spectrum, across and, as a column, down, 1/mm."""
         across, down = np.fft.rfftfreq(len(self.at[0]), self.step), np.fft.fftfreq(len(self.at[1]), self.step)
-        return across.astype(np.float32), down[:, None].astype(np.float32)
+        return np.asarray(across, dtype=np.float64), np.asarray(down, dtype=np.float64)[:, None]
 
 
 @dataclass(frozen=True)
@@ -248,10 +248,10 @@ def fresnel_intensity(grid: FresnelGrid, area: tuple[float, float]) -> Singles:
     -----
     U is T with each frequency f turned by -pi lambda L f^2 (Goodman, Introduction to Fourier Optics, section 4.2).
     """
-    fx = np.fft.rfftfreq(len(grid.at[0]), grid.step)
-    fy = np.fft.fftfreq(len(grid.at[1]), grid.step)
-    turn = np.exp(-1j * math.pi * area[1] * fy**2)[:, None].astype(np.complex64)
-    return _turned(grid, turn * np.exp(-1j * math.pi * area[0] * fx**2).astype(np.complex64))
+    across, down = (
+        np.exp(-1j * math.pi * a * f**2).astype(np.complex64) for a, f in zip(area, grid.frequencies(), strict=True)
+    )
+    return _turned(grid, down * across)
 
 
 def band_intensity(grid: FresnelGrid, areas: Sequence[tuple[float, float]] | Floats, shares: Floats) -> Singles:
@@ -282,7 +282,7 @@ def band_intensity(grid: FresnelGrid, areas: Sequence[tuple[float, float]] | Flo
     pairs = np.asarray(areas, dtype=np.float64)
     middle = shares @ pairs
     # a frequency is told by f^2 times the mean area, up to the end of the fade
-    fx, fy = grid.frequencies()
+    fx, fy = (f.astype(np.float32) for f in grid.frequencies())
     end = 0.5 * FADE[1] ** 2
     last = TURN_STEPS**2 - 1
     at = np.linspace(0.0, end, last + 1).reshape(TURN_STEPS, TURN_STEPS)
@@ -343,13 +343,10 @@ def crop(grid: FresnelGrid, pattern: Singles, window: Box) -> tuple[Singles, Box
         ranges.append((max(first, 0), min(last, len(at))))
     (left, right), (bottom, top) = ranges
     kept = pattern[bottom:top, left:right].copy()
-    if grid.whole:
-        kept[0], kept[-1], kept[:, 0], kept[:, -1] = 0.0, 0.0, 0.0, 0.0
-    # what lost fringes took is given back; of a whole opening also what lies beyond, and what its border lost
-    total = float((kept if grid.whole else pattern).sum(dtype=np.float64))
+    # what lost fringes took is given back; of a whole opening also what lies beyond, and what its border loses
+    total = float((kept[1:-1, 1:-1] if grid.whole else pattern).sum(dtype=np.float64))
     kept *= np.float32(grid.light / max(total, 1e-30))
-    if not grid.whole:
-        kept[0], kept[-1], kept[:, 0], kept[:, -1] = 0.0, 0.0, 0.0, 0.0
+    kept[0], kept[-1], kept[:, 0], kept[:, -1] = 0.0, 0.0, 0.0, 0.0
     box = [
         (float(at[a]) - 0.5 * grid.step, float(at[b - 1]) + 0.5 * grid.step)
         for at, (a, b) in zip(grid.at, ranges, strict=True)

@@ -329,11 +329,11 @@ class Rings:
         return self.white and any(isinstance(item, _Crossing) for item in self.crossings)
 
     def textures(self, drawn_nm: Floats, seen: Sequence[Box | None]) -> Textures:
-        """Prepare for drawing at some wavelengths; of each crossing the part of the stop that is seen, where known."""
+        """Prepare for drawing at some wavelengths; of each crossing the part that is seen, where known and `local`."""
         bands = band_contents(self.light.spectrum, drawn_nm)
         edges = [item.pieces(bands) if isinstance(item, EdgeCrossing) else [] for item in self.crossings]
         windows = [
-            item.window(box) if isinstance(item, _Crossing) and self.white else None
+            item.window(box) if isinstance(item, _Crossing) else None
             for item, box in zip(self.crossings, seen, strict=True)
         ]
         return Textures(self, bands, tuple(tuple(pieces) for pieces in edges), tuple(windows))

@@ -13,6 +13,7 @@ from ..optics.border import points
 from ..optics.bundle import Bundle
 from ..optics.ringing import ripple_height
 from .path_color import places_of
+from .seen_stop import touching
 from .surroundings import Surroundings, unit
 
 if TYPE_CHECKING:
@@ -72,12 +73,11 @@ def _largest_part(item: FinalPass, rings: Rings, bundle: Bundle, around: Surroun
     # corner by corner: three long rows are compared many times faster than many rows of three
     corners = np.ascontiguousarray(bundle.triangles.T)
     near = corners[:, lit[corners].any(axis=0) & (data[:, ALIVE] > 0.0)[corners].all(axis=0)]
-    (left, top), (right, bottom) = around.corners_px
     largest = 0.0
     for mirror in (1.0, -1.0)[: bundle.halves]:
         # what a ray that ended holds may be infinite, so only of those that live is anything computed
         c, r = places_of(item.shot, item.to_pixels, mirror * data[near, X], data[near, Y])
-        seen = (c.max(axis=0) >= left) & (c.min(axis=0) <= right) & (r.max(axis=0) >= top) & (r.min(axis=0) <= bottom)
+        seen = touching(c, r, around.corners_px)
         if seen.any():
             bright = own[near[:, seen]].max(axis=0)
             there = np.maximum(around.at(c[:, seen], r[:, seen]).min(axis=0), bright)
