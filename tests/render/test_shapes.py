@@ -64,6 +64,27 @@ def test_a_picture_through_exchanged_meridians_is_the_exchanged_picture(mode):
     assert np.abs(blurred(one) - blurred(two)).max() > 0.2 * blurred(one).max()
 
 
+def test_between_two_meridians_the_direct_image_is_the_line_that_gauss_says():
+    lens = load_lens("triplet-pestrecov")
+    lens = lens.replace(rows=(lens.rows[0].replace(curvature_x=0.85 * lens.rows[0].curvature), *lens.rows[1:]))
+    project = Project(
+        lens=lens, lights=(Light(field_deg=(0.0, 0.0)),), f_number=16.0,
+        camera=Camera(size_px=(256, 256), sensor_mm=(8.0, 8.0)), quality=Quality(wavelengths=3),
+    )  # fmt: skip
+    rendering = render(project)
+    # across, the cone of rays has its tip away from the sensor
+    order, across = first_order(lens, 16.0), first_order(transposed(lens), 16.0)
+    wide = across.entrance_pupil_diameter * order.stop_semi_diameter / across.stop_semi_diameter
+    length = 256 / 8.0 * wide * abs(order.bfl_x - order.sensor_distance) / order.efl_x
+    assert length > 40.0
+    assert any(f"up to {length:.1f} pixels" in remark for remark in rendering.remarks)
+    layer = next(layer for layer in rendering.layers if layer.name == "starburst")
+    light = layer.pixels.sum(axis=2, dtype=np.float64)
+    columns, rows = light.sum(axis=0), light.sum(axis=1)
+    assert np.count_nonzero(columns > 0.2 * columns.max()) == pytest.approx(length, abs=2.0)
+    assert np.count_nonzero(rows > 0.2 * rows.max()) <= 4
+
+
 def test_final_draws_a_whole_pupil_as_two_halves():
     lens = load_lens("heliar-tronnier")
     plain, whole = (picture(one, (9.0, 4.0), "final", blades=6, rotation=10.0) for one in (

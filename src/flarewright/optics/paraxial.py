@@ -79,8 +79,10 @@ def _index(medium: Medium | None, wavelength_nm: float) -> float:
     return float(refractive_index(medium, wavelength_nm))
 
 
-def path_matrices(lens: Lens, path: LightPath, wavelength_nm: float, sensor_z: float) -> tuple[list[Matrix], Matrix]:
-    """Multiply the matrices along a path, in the y-z plane.
+def path_matrices(
+    lens: Lens, path: LightPath, wavelength_nm: float, sensor_z: float, *, across: bool = False
+) -> tuple[list[Matrix], Matrix]:
+    """Multiply the matrices along a path, in the y-z plane or across it.
 
     Parameters
     ----------
@@ -89,6 +91,8 @@ def path_matrices(lens: Lens, path: LightPath, wavelength_nm: float, sensor_z: f
     wavelength_nm : float
     sensor_z : float
         Sensor plane, mm from the first vertex.
+    across : bool
+        In the x-z plane, which is another lens where there are cylinders or toroids.
 
     Returns
     -------
@@ -97,7 +101,9 @@ def path_matrices(lens: Lens, path: LightPath, wavelength_nm: float, sensor_z: f
     total : ndarray, shape (2, 2)
         First vertex to sensor: Ms Ma.
     """
-    curvature = np.array([row.curvature if isinstance(row, Surface) else 0.0 for row in lens.rows])
+    curvature = curvature_across(lens) if across else None
+    if curvature is None:
+        curvature = np.array([row.curvature if isinstance(row, Surface) else 0.0 for row in lens.rows])
     return _along(lens, path, curvature, wavelength_nm, sensor_z)
 
 
@@ -186,10 +192,9 @@ def first_order(
 
 def _meridian_x(lens: Lens, wavelength_nm: float, last: float) -> dict[str, float]:
     """Focal length and back focus in the x-z plane, if it is another lens there."""
-    curvature = curvature_across(lens)
-    if curvature is None:
+    if curvature_across(lens) is None:
         return {}
-    _, ((a, _), (c, _)) = _along(lens, direct_path(lens), curvature, wavelength_nm, last)
+    _, ((a, _), (c, _)) = path_matrices(lens, direct_path(lens), wavelength_nm, last, across=True)
     afocal = abs(c) < 1e-9
     return {"efl_x": float("inf") if afocal else -1.0 / c, "bfl_x": float("inf") if afocal else -a / c}
 

@@ -108,15 +108,17 @@ def defocus_mm(lens: Lens, shot: Shot) -> float:
     Returns
     -------
     float
-        Diameter of the disc, mm; 0 in focus.
+        Diameter of the disc, mm, the longer one where two meridians focus at different places; 0 in focus.
     """
     packed = shot.packed
-    order = packed.first_order
-    _, total = path_matrices(lens, direct_path(lens), D_LINE_NM, packed.sensor_z)
     nearness = packed.nearness / shot.incidence.tilt_cosine
-    # the marginal ray of a near light is lower on the first vertex' plane than in the entrance pupil, or higher
-    height = 0.5 * order.entrance_pupil_diameter / (1.0 + nearness * order.entrance_pupil_z)
-    return 2.0 * height * abs(float(total[0, 0] + nearness * total[0, 1]))
+    widths = []
+    for across in (False,) if packed.curvature_x is None else (False, True):
+        ((stop, *_), *_), total = path_matrices(lens, direct_path(lens), D_LINE_NM, packed.sensor_z, across=across)
+        # heights in the stop and on the sensor of the ray that meets the first vertex' plane at 1
+        in_stop, on_sensor = (float(row[0] + nearness * row[1]) for row in (stop, total[0]))
+        widths.append(2.0 * packed.first_order.stop_semi_diameter * abs(on_sensor / in_stop))
+    return max(widths)
 
 
 def widest_defocus_mm(lens: Lens, shots: Sequence[Shot]) -> float:

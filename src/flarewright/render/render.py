@@ -280,7 +280,8 @@ def _remarks(settled: Settled, shots: tuple[Shot, ...]) -> tuple[str, ...]:
     blur_px = widest_defocus_mm(settled.lens, shots) * float(shots[0].to_pixels[2])
     if settled.project.output.starburst and blur_px > OUT_OF_FOCUS_PX:
         of = f"the direct image of {'the light' if len(shots) == 1 else 'a light'} is out of focus"
-        told.append(f"{of}: a disc {blur_px:.1f} pixels wide")
+        spot = "a disc" if shots[0].packed.curvature_x is None else "a spot up to"
+        told.append(f"{of}: {spot} {blur_px:.1f} pixels wide")
     if settled.project.quality.mode == "draft" and ideal(settled.lens) != settled.lens:
         told.append("draft quality draws the lens as designed, without decentre, tilt and figure errors")
     quality = settled.project.quality
