@@ -12,7 +12,15 @@ from scipy.special import fresnel, j1
 
 from flarewright.model import Iris
 from flarewright.model.light import BlackBody, Lines
-from flarewright.optics.fresnel import SHADOW, band_intensity, crop, fresnel_grid, fresnel_intensity, halved
+from flarewright.optics.fresnel import (
+    SHADOW,
+    band_intensity,
+    band_pattern,
+    crop,
+    fresnel_grid,
+    fresnel_intensity,
+    halved,
+)
 from flarewright.optics.iris import blade_edges, coverage, resampled, softened
 from flarewright.optics.pack import pack_lens
 from flarewright.optics.paraxial import first_order, flare_matrices
@@ -227,9 +235,9 @@ def test_white_patterns_are_the_fringes_that_a_band_of_colours_leaves():
     assert np.std(faded[middle]) < 0.6 * np.std(one[middle])
 
 
-def band(number, width, ratio=1.0):
+def band(number, width, ratio=1.0, count=41):
     """Fresnel areas and shares of a band whose light rises and falls evenly, `width` of its mean wide."""
-    at = np.linspace(-1.0, 1.0, 41)
+    at = np.linspace(-1.0, 1.0, count)
     areas = RADIUS**2 / number * (1.0 + 0.5 * width * at)
     return np.column_stack([areas, ratio * areas]), (1.0 - np.abs(at)) / (1.0 - np.abs(at)).sum()
 
@@ -257,6 +265,33 @@ def test_one_transform_holds_the_light_of_a_band(width, ratio):
     shadow = light == 0.0
     assert expected[shadow].sum() * 0.9 < found[shadow].sum() < expected[shadow].sum()
     assert found.sum(dtype=float) == pytest.approx(expected.sum(), rel=2e-3)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_part_of_a_pattern_is_cut_out_of_all_of_it(sign):
+    """Second method: all of the pattern, summed and cropped; of a whole opening and of a window of it."""
+    areas, shares = band(500.0, 0.1, 0.7 * sign)
+    opening = blades(Iris(blades=5, rotation_deg=11))
+    sides = tuple(np.abs(areas).min(axis=0)), tuple(np.abs(areas).max(axis=0))
+    for place in (None, ((-0.5, 0.9), (0.6, 2.0))):
+        grid = fresnel_grid(opening, RADIUS, RADIUS, *sides, 0.0, place)
+        window = ((-0.4, 0.8), (0.7, 1.9))
+        found, box = band_pattern(grid, areas, shares, window)
+        expected, at = crop(grid, band_intensity(grid, areas, shares), window)
+        assert box == at
+        assert found.std() > 0.1
+        np.testing.assert_allclose(found, expected, atol=2e-5)
+
+
+def test_colours_that_run_alike_are_joined(monkeypatch):
+    """Against every colour by itself: a wide band of a light by the nanometre."""
+    areas, shares = band(500.0, 0.16, count=160)
+    opening = blades(Iris(blades=6))
+    grid = fresnel_grid(opening, RADIUS, RADIUS, (areas[:, 0].min(),) * 2, (areas[:, 0].max(),) * 2)
+    joined = band_intensity(grid, areas, shares)
+    monkeypatch.setattr("flarewright.optics.fresnel.ALIKE", 1e-6)
+    each = band_intensity(grid, areas, shares)
+    assert 0.0 < np.abs(joined - each).max() < 1e-3
 
 
 @pytest.mark.parametrize("window", [((-0.9, 0.5), (-2.3, -1.1)), ((0.6, 2.4), (-0.4, 0.8)), ((0.9, 2.2), (0.2, 2.4))])

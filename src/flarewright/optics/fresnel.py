@@ -10,16 +10,20 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..kernels.fresnel import sum_turns, turn_frequencies
 from .fft_size import fast_size
 
 Floats = NDArray[np.float64]
 Singles = NDArray[np.float32]
 Kind = TypeVar("Kind", np.float32, np.float64)
+Waves = NDArray[np.complex64]
+Ranges = tuple[tuple[int, int], tuple[int, int]]
 Box = tuple[tuple[float, float], tuple[float, float]]
 """From where to where a part of the stop reaches in x and in y, mm."""
 
@@ -50,6 +54,14 @@ CUT = 4.0
 TURN_STEPS = 128
 """The square of it is in how many steps the turn of frequencies is told up to the end of `FADE`, 77 radians."""
 
+ALIKE = 0.4
+"""Colours of a band whose turns differ by less than this at the end of `FADE`, radians, are joined, which changes their
+wave by 0.7 % there, where nothing is left, and by a fourth of that where the fade begins."""
+
+# f^2 lambda L at the end of the fade, and steps to it
+_END = 0.5 * FADE[1] ** 2
+_TO_STEP = (TURN_STEPS**2 - 1) / _END
+
 __all__ = [
     "FADE",
     "REACH",
@@ -57,6 +69,7 @@ __all__ = [
     "Box",
     "FresnelGrid",
     "band_intensity",
+    "band_pattern",
     "crop",
     "ending",
     "fresnel_grid",
@@ -251,7 +264,8 @@ def fresnel_intensity(grid: FresnelGrid, area: tuple[float, float]) -> Singles:
     across, down = (
         np.exp(-1j * math.pi * a * f**2).astype(np.complex64) for a, f in zip(area, grid.frequencies(), strict=True)
     )
-    return _turned(grid, down * across)
+    turn = down * across
+    return _light(grid, grid.spectrum * turn.real, grid.spectrum * turn.imag)
 
 
 def band_intensity(grid: FresnelGrid, areas: Sequence[tuple[float, float]] | Floats, shares: Floats) -> Singles:
@@ -279,45 +293,92 @@ def band_intensity(grid: FresnelGrid, areas: Sequence[tuple[float, float]] | Flo
     a band a sixth of its wavelength wide errs by 1e-3 rms along the border and by 0.02 at worst, deep in corners.
     Fringes end between `FADE`, and where the grid can hold no more of them.
     """
+    real, imaginary, _ = _wave(grid, areas, shares)
+    return _light(grid, real, imaginary)
+
+
+def band_pattern(
+    grid: FresnelGrid, areas: Sequence[tuple[float, float]] | Floats, shares: Floats, window: Box
+) -> tuple[Singles, Box]:
+    """Diffract an opening by a band of white light and keep a part of it: `crop` of `band_intensity`.
+
+    What is not kept is not transformed back.
+
+    Parameters
+    ----------
+    grid, areas, shares
+        As in `band_intensity`.
+    window : Box
+        The part to keep.
+
+    Returns
+    -------
+    pattern : ndarray, shape (Ky, Kx), float32
+        0 along its border.
+    box : Box
+        What was kept.
+    """
+    real, imaginary, light = _wave(grid, areas, shares)
+    (left, right), (bottom, top) = ranges = _ranges(grid, window)
+    # the light of all of it by Parseval: most is not there to be summed
+    kept = np.ascontiguousarray(_light(grid, real, imaginary, (bottom, top))[:, left:right])
+    return kept, _given_back(grid, kept, light, ranges)
+
+
+def _wave(
+    grid: FresnelGrid, areas: Sequence[tuple[float, float]] | Floats, shares: Floats
+) -> tuple[Waves, Waves, float]:
+    """Return a band's mean wave, its frequencies times the turn's real and imaginary parts, and the sum of its light.
+
+    The opening is real and the turn even, so both parts are spectra of something real; they end where all are 0.
+    """
     pairs = np.asarray(areas, dtype=np.float64)
     middle = shares @ pairs
-    # a frequency is told by f^2 times the mean area, up to the end of the fade
-    fx, fy = (f.astype(np.float32) for f in grid.frequencies())
-    end = 0.5 * FADE[1] ** 2
-    last = TURN_STEPS**2 - 1
-    at = np.linspace(0.0, end, last + 1).reshape(TURN_STEPS, TURN_STEPS)
     # each turn is that of the first in its row and that of its column in the first row, for all colours at once
-    ratios = pairs[:, 0] / middle[0]
-    rows, columns = (np.exp(-1j * math.pi * ratios * one[:, None]) for one in (at[:, 0], at[0]))
-    # without BLAS, whose threads would wait for each other beside ours
-    turn = np.einsum("ik,jk->ij", rows * shares, columns).ravel()
-    fade = ending(np.sqrt(2.0 * at.ravel()), *FADE)
-    across, down = (np.float32(abs(a)) * f**2 for a, f in zip(middle, (fx, fy), strict=True))
-    to_step = np.float32(last / end)
-    if (middle[0] > 0.0) == (middle[1] > 0.0):
-        table = (turn * fade).astype(np.complex64)
-        wave = table[np.minimum((across + down) * to_step + 0.5, last).astype(np.intp)]
-    else:
-        # hyperbolas: the turn knows the difference, the fade the sum
-        apart = across - down
-        steps = np.minimum(np.abs(apart) * to_step + 0.5, last).astype(np.intp)
-        wave = turn.astype(np.complex64)[steps]
-        wave.imag[apart < 0.0] *= -1.0
-        wave *= fade.astype(np.float32)[np.minimum((across + down) * to_step + 0.5, last).astype(np.intp)]
+    ratios, parts = _fewer(pairs[:, 0] / middle[0], shares)
+    steps = np.arange(TURN_STEPS) / _TO_STEP
+    rates = -1j * math.pi * ratios[:, None]
+    table = np.empty(TURN_STEPS**2, dtype=np.complex64)
+    sum_turns(parts[:, None] * np.exp(rates * (TURN_STEPS * steps)), np.exp(rates * steps), table)
+    # a frequency is told by f^2 times the mean area, up to the end of the fade
+    across, down = (f.ravel() ** 2 for f in grid.frequencies())
+    area_x, area_y = np.abs(middle).tolist()
+    count = int(np.searchsorted(area_x * across, _END))
     # a grid that pixels or samples limit ends before that: softly, or edges would ring of its own
-    if (0.5 / grid.step) ** 2 * float(np.abs(middle).min()) < end / FINEST_PART**2:
-        wave *= ending(np.float32(2.0 * grid.step) * np.hypot(fx, fy), FINEST_PART, 1.0)
-    return _turned(grid, wave)
+    finest = 0.5 / grid.step
+    ends = (FINEST_PART * finest, finest)
+    if finest**2 * min(area_x, area_y) >= _END / FINEST_PART**2:
+        ends = (math.inf, math.inf)
+    turned = np.empty((2, len(down), count), dtype=np.complex64)
+    light = turn_frequencies(
+        grid.spectrum, across[:count], down, area_x, area_y, math.copysign(1.0, middle[0] * middle[1]), ends, table,
+        _fades(), _TO_STEP, turned,
+    )  # fmt: skip
+    return turned[0], turned[1], light / math.prod(grid.shape)
 
 
-def _turned(grid: FresnelGrid, turn: NDArray[np.complex64]) -> Singles:
-    """Return the light of a wave whose frequencies are multiplied by a turn that is even in both directions.
+def _fewer(ratios: Floats, shares: Floats) -> tuple[Floats, Floats]:
+    """Join colours whose turns hardly part before the end of the fade, each group at its mean."""
+    width = ALIKE / (math.pi * _END)
+    group = ((ratios - ratios.min()) / width).astype(np.intp)
+    parts = np.bincount(group, shares)
+    held = parts > 0.0
+    return np.bincount(group, shares * ratios)[held] / parts[held], parts[held]
 
-    The opening is real, so the transforms with the turn's real and its imaginary part are those of the wave.
-    """
-    real = np.fft.irfft2(grid.spectrum * turn.real, grid.shape)
-    imaginary = np.fft.irfft2(grid.spectrum * turn.imag, grid.shape)
-    return np.asarray(real * real + imaginary * imaginary, dtype=np.float32)
+
+@lru_cache(maxsize=1)
+def _fades() -> Singles:
+    """Return what is left of fringes at the steps of `_TO_STEP`."""
+    return ending(np.sqrt(2.0 * np.arange(TURN_STEPS**2) / _TO_STEP), *FADE).astype(np.float32)
+
+
+def _light(grid: FresnelGrid, real: Waves, imaginary: Waves, rows: tuple[int, int] | None = None) -> Singles:
+    """Return the light of a wave, its rows from the first to before the last; as `_wave` has its parts."""
+    parts = [
+        np.fft.irfft(np.fft.ifft(part, axis=0)[slice(*rows) if rows else slice(None)], grid.shape[1])
+        for part in (real, imaginary)
+    ]
+    return np.asarray(parts[0] * parts[0] + parts[1] * parts[1], dtype=np.float32)
 
 
 def crop(grid: FresnelGrid, pattern: Singles, window: Box) -> tuple[Singles, Box]:
@@ -337,21 +398,31 @@ def crop(grid: FresnelGrid, pattern: Singles, window: Box) -> tuple[Singles, Box
     box : Box
         What was kept.
     """
-    ranges = []
+    (left, right), (bottom, top) = ranges = _ranges(grid, window)
+    kept = pattern[bottom:top, left:right].copy()
+    return kept, _given_back(grid, kept, float(pattern.sum(dtype=np.float64)), ranges)
+
+
+def _ranges(grid: FresnelGrid, window: Box) -> Ranges:
+    """Return the first sample of a window and the one after its last, in x and in y."""
+    found = []
     for (low, high), at in zip(window, grid.at, strict=True):
         first, last = (round((end - at[0]) / grid.step + 0.5) for end in (low, high))
-        ranges.append((max(first, 0), min(last, len(at))))
-    (left, right), (bottom, top) = ranges
-    kept = pattern[bottom:top, left:right].copy()
+        found.append((max(first, 0), min(last, len(at))))
+    return found[0], found[1]
+
+
+def _given_back(grid: FresnelGrid, kept: Singles, light: float, ranges: Ranges) -> Box:
+    """Give the kept part of a pattern, in place, all its light and a dark border; return where it lies."""
     # what lost fringes took is given back; of a whole opening also what lies beyond, and what its border loses
-    total = float((kept[1:-1, 1:-1] if grid.whole else pattern).sum(dtype=np.float64))
+    total = float(kept[1:-1, 1:-1].sum(dtype=np.float64)) if grid.whole else light
     kept *= np.float32(grid.light / max(total, 1e-30))
     kept[0], kept[-1], kept[:, 0], kept[:, -1] = 0.0, 0.0, 0.0, 0.0
     box = [
         (float(at[a]) - 0.5 * grid.step, float(at[b - 1]) + 0.5 * grid.step)
         for at, (a, b) in zip(grid.at, ranges, strict=True)
     ]
-    return kept, (box[0], box[1])
+    return box[0], box[1]
 
 
 def halved(pattern: Singles, box: Box, times: tuple[int, int]) -> tuple[Singles, Box]:

@@ -28,7 +28,7 @@ from ..optics.fresnel import (
     SHADOW,
     Box,
     FresnelGrid,
-    band_intensity,
+    band_pattern,
     crop,
     fresnel_grid,
     fresnel_intensity,
@@ -197,11 +197,12 @@ class Ringing:
         key = (item.octaves, item.shown, window, times, areas.tobytes(), None if shares is None else shares.tobytes())
         found = self._patterns.get(key)
         if found is None:
+            part = item.whole if window is None else window
             if shares is None:
-                light = fresnel_intensity(grid, (float(areas[0, 0]), float(areas[0, 1])))
+                whole = crop(grid, fresnel_intensity(grid, (float(areas[0, 0]), float(areas[0, 1]))), part)
             else:
-                light = band_intensity(grid, areas, shares)
-            found = halved(*crop(grid, light, item.whole if window is None else window), times)
+                whole = band_pattern(grid, areas, shares, part)
+            found = halved(*whole, times)
             self._patterns.put(key, found, found[0].nbytes)
         kept: Pattern = found
         return kept
