@@ -265,7 +265,8 @@ def weave(patterns, table, corners, places, light, where, beside, below, row, fi
             radius, middle = np.float32(table[k, RADIUS]), middle + half
             back_x, back_y = (offset - radius) * cosine, (offset - radius) * sine
             curved = radius > zero
-            for m in range(padded):
+            across = np.float32(columns)
+            for m in range(-(-count // LANES) * LANES):
                 p = min(max(u0 + du * np.float32(m), u_low), u_high)
                 q = abs(min(max(v0 + dv * np.float32(m), v_low), v_high))
                 # the corner on that side of the blade, and beyond it the next blade, run alike
@@ -278,10 +279,11 @@ def weave(patterns, table, corners, places, light, where, beside, below, row, fi
                 nearest = np.int32(min(max(beyond * edge_per_mm + middle, half), longest + half))
                 near = (column >= zero) & (column < last_column) & (line < last_row)
                 column, line = min(max(column, zero), last_column), min(max(line, zero), last_row)
-                c, r = np.int32(column), np.int32(line)
-                where[np.uint64(m)] = start + r * columns + c if near else edge + nearest
-                beside[np.uint64(m)] = column - np.float32(c) if near else zero
-                below[np.uint64(m)] = line - np.float32(r) if near else zero
+                c, r = np.float32(np.int32(column)), np.float32(np.int32(line))
+                # a product of whole numbers, exact and sooner done
+                where[np.uint64(m)] = start + np.int32(r * across + c) if near else edge + nearest
+                beside[np.uint64(m)] = column - c if near else zero
+                below[np.uint64(m)] = line - r if near else zero
         else:
             for m in range(count):
                 u = min(max(u0 + du * np.float32(m), u_low), u_high)

@@ -58,6 +58,25 @@ def _taken(builder, data, places):
     return vector
 
 
+def _taken_pairs(builder, data, places):
+    """Look up two numbers that stand side by side for every lane, each two by one load."""
+    pair = ir.VectorType(ir.FloatType(), 2)
+    found = [builder.load(builder.bitcast(builder.gep(data, [place]), pair.as_pointer()), align=4) for place in places]
+    while len(found) > 1:
+        found = [_joined(builder, *found[k : k + 2]) for k in range(0, len(found), 2)]
+    nowhere = ir.Constant(found[0].type, ir.Undefined)
+    return [
+        builder.shuffle_vector(found[0], nowhere, ir.Constant(_PLACES, list(range(side, 2 * LANES, 2))))
+        for side in range(2)
+    ]
+
+
+def _joined(builder, one, other):
+    """Put two vectors one after the other."""
+    count = 2 * one.type.count
+    return builder.shuffle_vector(one, other, ir.Constant(ir.VectorType(_LANE, count), list(range(count))))
+
+
 def _mixed(builder, one, other, part):
     """Go from one vector to the other by a part of the way."""
     way = builder.fsub(other, one, flags=_FLAGS)
@@ -123,17 +142,13 @@ def multiply_between(_, light, first, values, columns, where, right, down, m):
         shown, table, places, across, along = (
             _data(context, builder, signature.args[k], arguments[k]) for k in (0, 2, 4, 5, 6)
         )
-        here = _load(builder, places, arguments[7], _PLACES)
-        step = ir.Constant(_PLACES, ir.Undefined)
-        for lane in range(LANES):
-            step = builder.insert_element(step, arguments[3], _LANE(lane))
-        below = builder.add(here, step)
-        one = ir.Constant(_PLACES, [1] * LANES)
+        here = [
+            builder.load(builder.gep(places, [builder.add(arguments[7], arguments[7].type(lane))]))
+            for lane in range(LANES)
+        ]
         x, y = (_load(builder, data, arguments[7]) for data in (across, along))
-        upper, lower = (
-            _mixed(builder, _taken(builder, table, row), _taken(builder, table, builder.add(row, one)), x)
-            for row in (here, below)
-        )
+        rows = (table, builder.gep(table, [arguments[3]]))
+        upper, lower = (_mixed(builder, *_taken_pairs(builder, row, here), x) for row in rows)
         product = builder.fmul(_load(builder, shown, arguments[1]), _mixed(builder, upper, lower, y), flags=_FLAGS)
         _store(builder, product, shown, arguments[1])
         return context.get_dummy_value()
