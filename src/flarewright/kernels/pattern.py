@@ -279,11 +279,11 @@ def weave(patterns, table, corners, places, light, where, beside, below, row, fi
                 nearest = np.int32(min(max(beyond * edge_per_mm + middle, half), longest + half))
                 near = (column >= zero) & (column < last_column) & (line < last_row)
                 column, line = min(max(column, zero), last_column), min(max(line, zero), last_row)
-                c, r = np.float32(np.int32(column)), np.float32(np.int32(line))
-                # a product of whole numbers, exact and sooner done
-                where[np.uint64(m)] = start + np.int32(r * across + c) if near else edge + nearest
-                beside[np.uint64(m)] = column - c if near else zero
-                below[np.uint64(m)] = line - r if near else zero
+                # a product of whole numbers is exact, and sooner done than that of integers
+                cell, cells = np.float32(np.int32(column)), np.float32(np.int32(line))
+                where[np.uint64(m)] = start + np.int32(cells * across + cell) if near else edge + nearest
+                beside[np.uint64(m)] = column - cell if near else zero
+                below[np.uint64(m)] = line - cells if near else zero
         else:
             for m in range(count):
                 u = min(max(u0 + du * np.float32(m), u_low), u_high)

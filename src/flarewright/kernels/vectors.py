@@ -77,8 +77,9 @@ def _joined(builder, one, other):
     return builder.shuffle_vector(one, other, ir.Constant(ir.VectorType(_LANE, count), list(range(count))))
 
 
-def _mixed(builder, one, other, part):
+def _mixed(builder, ends, part):
     """Go from one vector to the other by a part of the way."""
+    one, other = ends
     way = builder.fsub(other, one, flags=_FLAGS)
     return builder.fadd(one, builder.fmul(way, part, flags=_FLAGS), flags=_FLAGS)
 
@@ -147,9 +148,10 @@ def multiply_between(_, light, first, values, columns, where, right, down, m):
             for lane in range(LANES)
         ]
         x, y = (_load(builder, data, arguments[7]) for data in (across, along))
-        rows = (table, builder.gep(table, [arguments[3]]))
-        upper, lower = (_mixed(builder, *_taken_pairs(builder, row, here), x) for row in rows)
-        product = builder.fmul(_load(builder, shown, arguments[1]), _mixed(builder, upper, lower, y), flags=_FLAGS)
+        upper, lower = (
+            _mixed(builder, _taken_pairs(builder, row, here), x) for row in (table, builder.gep(table, [arguments[3]]))
+        )
+        product = builder.fmul(_load(builder, shown, arguments[1]), _mixed(builder, (upper, lower), y), flags=_FLAGS)
         _store(builder, product, shown, arguments[1])
         return context.get_dummy_value()
 

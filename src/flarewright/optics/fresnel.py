@@ -361,7 +361,7 @@ def _fewer(ratios: Floats, shares: Floats) -> tuple[Floats, Floats]:
     """Join colours whose turns hardly part before the end of the fade, each group at its mean."""
     width = ALIKE / (math.pi * _END)
     group = ((ratios - ratios.min()) / width).astype(np.intp)
-    parts = np.bincount(group, shares)
+    parts: Floats = np.bincount(group, shares).astype(np.float64)
     held = parts > 0.0
     return np.bincount(group, shares * ratios)[held] / parts[held], parts[held]
 
