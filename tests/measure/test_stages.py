@@ -60,6 +60,35 @@ def test_a_person_can_take_a_ghost_away_and_point_at_one(folder, tmp_path, capsy
     assert json.loads(capsys.readouterr().out)["find"]["ghosts"] == 0
 
 
+def test_what_came_of_corrections_is_told(folder, tmp_path, capsys):
+    path = tmp_path / "corrections.json"
+    along, y = np.tan(np.radians(ANGLES[8])) / np.tan(np.radians(LARGEST)), 0.5 * SIZE[1] - 1.6
+    there, nowhere = (
+        {"constellation_deg": ANGLES[8], "centre_px": [0.5 * SIZE[0] + 2.3 + speed * along, y], "radius_px": 14.0}
+        for speed in (55.0, -90.0)
+    )
+    path.write_text(json.dumps({"add": [there, nowhere], "remove": ["77"]}))
+    assert command(["measure", "find", str(folder), "--corrections", str(path)]) == 0
+    told = capsys.readouterr().err
+    assert "is ghost 1" in told
+    assert "left out" in told
+    assert "no ghost '77' to remove; found were 1" in told
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"centre_px": [9999.0, 80.0]}, "not in the picture"), ({"constellation_deg": 70.0}, "no frame shows 70"),
+        ({"radius_px": 500.0}, "larger than the picture"),
+    ],
+)  # fmt: skip
+def test_a_correction_that_points_at_nothing_is_refused(folder, tmp_path, capsys, change, words):
+    path = tmp_path / "corrections.json"
+    path.write_text(json.dumps({"add": [{"constellation_deg": 12.0, "centre_px": [9, 9], "radius_px": 5} | change]}))
+    assert command(["measure", "find", str(folder), "--corrections", str(path)]) == 2
+    assert words in capsys.readouterr().err
+
+
 def test_fitting_needs_finding_first(tmp_path, capsys):
     write(tmp_path, ())
     assert command(["measure", "fit", str(tmp_path)]) == 2

@@ -15,9 +15,8 @@ from ..errors import FlarewrightError
 from ..io.merged import read_frame
 from ..kernels.measure_pupil import FIRST_DISC, FIRST_I, SOFT
 from ..model.capture import MergedRun
-from ..model.corrections import Corrections, Pointed
+from ..model.corrections import Corrections
 from ..model.ghost_model import AberrationGhost, Blades, GhostModel, Halo, Reference, Star
-from .find import Candidate
 from .fit import Shape, render
 from .found import Found
 from .fragments import joined
@@ -26,6 +25,7 @@ from .glow_fit import fit_halo, fit_star, followed, glow, iris_of, register
 from .joint import lit
 from .journal import Journal
 from .numbers import channel_numbers
+from .pointing import candidate, kept, tell_pointed
 from .pursuit import pursue
 from .replay import draw, light_px
 from .settle import Settling, settle, to_model
@@ -162,14 +162,15 @@ def find_ghosts(
     Raises
     ------
     FlarewrightError
-        When frames cannot be read or are too few.
+        When frames cannot be read or are too few, or a correction points at nothing.
     """
     views = read_views(folder, run, every)
     dim = dimmed(views)
     times = max(0, int(np.ceil(np.log2(run.size_px[0] / SEARCH_WIDTH))))
     small = [coarse(view, times) for view in dim.views]
     iris = iris_of(dim.star)
-    pointed = [_pointed(each, small, 2.0**times, run) for each in (corrections.add if corrections else ())]
+    known = corrections or Corrections()
+    pointed = [candidate(each, small, 2.0**times, run) for each in known.add]
     measured = [np.asarray(np.isfinite(view.variance).all(axis=2)) for view in small]
     with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
         found = pursue(
@@ -177,23 +178,9 @@ def find_ghosts(
             journal=journal,
         )  # fmt: skip
         found = lit(joined(lit(found, small, pool=pool), small, pool=pool, tell=tell), small, pool=pool)
-    ghosts = to_model([_sized(ghost, 2.0**times) for ghost in found], views)
-    if corrections:
-        ghosts = tuple(ghost for ghost in ghosts if ghost.name not in corrections.remove)
+    tell_pointed(known, pointed, found, tell)
+    ghosts = kept(known, to_model([_sized(ghost, 2.0**times) for ghost in found], views), tell)
     return _model(run, ghosts, dim, views)
-
-
-def _pointed(pointed: Pointed, views: Sequence[View], factor: float, run: MergedRun) -> Candidate:
-    """Turn a ghost that a person pointed at, in one frame, into a candidate."""
-    angles = np.array([view.constellation_deg for view in views])
-    at = int(np.argmin(np.abs(angles - pointed.constellation_deg)))
-    if not views[at].sigma > 0.0:
-        raise FlarewrightError("a ghost pointed at with the light on the axis tells no speed; point at it elsewhere")
-    x, y, cosine, sine, _ = views[at].frame
-    along = (pointed.centre_px[0] / factor - x) * cosine - (pointed.centre_px[1] / factor - y) * sine
-    if max(run.size_px) < pointed.radius_px:
-        raise FlarewrightError(f"a ghost of radius {pointed.radius_px:g} pixels is larger than the picture")
-    return Candidate(float(along / views[at].sigma), pointed.radius_px / factor, 0, len(views) - 1, 1e9)
 
 
 def fit_ghosts(
