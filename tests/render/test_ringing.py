@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.special import fresnel
 
-from flarewright.model import Art, Camera, Dirt, Iris, Light, Lines, Output, Project, Quality, Rule
+from flarewright.model import D65, Art, Camera, Dirt, Iris, Light, Lines, Output, Project, Quality, Rule
 from flarewright.optics.paraxial import flare_matrices
 from flarewright.optics.paths import ghost_paths
 from flarewright.render.edge_rings import edge_crossing
@@ -199,8 +199,14 @@ def test_a_part_of_an_opening_rings_as_all_of_it_does(lens, ghost, dirt, sensor,
 def test_what_makes_rings_slow_is_told():
     small = Camera(size_px=(32, 18))
     dirt = Dirt(dust_per_mm2=0.3, dust_um=(200.0, 400.0), seed=2, in_ghosts=True)
-    for ringing, wanted, slow in (("collins", dirt, True), ("off", dirt, False), ("collins", Dirt(), False)):
-        told = render(project("2-1", ringing, dirt=wanted, camera=small)).remarks
+    white, sodium = (Light(field_deg=(3.0, 2.0), spectrum=one) for one in (D65(), Lines(lines=((589.3, 1.0),))))
+    for ringing, wanted, light, slow in (
+        ("collins", dirt, white, True),
+        ("off", dirt, sodium, False),
+        ("collins", Dirt(), white, False),
+        ("collins", Dirt(), sodium, True),
+    ):
+        told = render(project("2-1", ringing, dirt=wanted, lights=(light,), camera=small)).remarks
         assert any("--ringing off leaves them out" in remark for remark in told) is slow
 
 

@@ -34,7 +34,8 @@ SOON_WAVELENGTHS = 5
 SOON_CULL = 3e-3
 SOON_TOLERANCE_PX = 0.5
 NO_RINGS = (
-    "the screen leaves out rings inside ghosts, which are slow through an image, dirt or cylinders; files have them"
+    "the screen leaves out rings inside ghosts, which are slow through an image, dirt or cylinders and for spectral "
+    "lines; files have them"
 )
 # gains of a draft's ghosts: their step, the least and the largest
 # (one that a rim hides now may come out as the hand goes on, so it is never dimmed altogether)
@@ -119,7 +120,7 @@ def _slow_rings(project: Project) -> bool:
     assert isinstance(project.lens, Lens)
     iris = project.iris or project.lens.iris
     image = (iris is not None and iris.mask is not None) or (project.dirt.in_ghosts and not project.dirt.clean)
-    return project.quality.ringing != "off" and untabled(project.lens, image=image) is not None
+    return project.quality.ringing != "off" and untabled(project.lens, project.lights, image=image) is not None
 
 
 @lru_cache(maxsize=8)

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..kernels import pattern as columns
-from ..model import Lens, Surface
+from ..model import Lens, Light, Surface
+from ..model.light import Lines
 from ..optics.blade_form import BladeForm
 from ..optics.edge_ringing import (
     CORNER_SAMPLES,
@@ -103,12 +104,13 @@ class EdgeCrossing:
         return edge_piece(self.form, tables, scale, margin * scale, gain(self.form, scale, tables))
 
 
-def untabled(lens: Lens, *, image: bool) -> str | None:
-    """Say what keeps all rings of a lens from being looked up in tables, so that each ghost's opening is transformed.
+def untabled(lens: Lens, lights: Sequence[Light], *, image: bool) -> str | None:
+    """Say what keeps rings from being looked up in tables, so that each ghost's opening is transformed.
 
     Parameters
     ----------
     lens : Lens
+    lights : sequence of Light
     image : bool
         The iris is one, or has dirt in it that ghosts show.
 
@@ -119,7 +121,9 @@ def untabled(lens: Lens, *, image: bool) -> str | None:
     """
     if any(isinstance(row, Surface) and row.toroidal for row in lens.rows):
         return "a lens with cylinders"
-    return "an iris image, or of one with dirt," if image else None
+    if image:
+        return "an iris image, or of one with dirt,"
+    return "a light of spectral lines" if any(isinstance(light.spectrum, Lines) for light in lights) else None
 
 
 def edge_crossing(form: BladeForm, wavelengths_nm: Floats, area: Floats, pixel_mm: float) -> EdgeCrossing | None:

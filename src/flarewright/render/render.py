@@ -293,7 +293,7 @@ def _remarks(settled: Settled, shots: tuple[Shot, ...]) -> tuple[str, ...]:
         # only here: what has no rings need not know of them
         from .edge_rings import untabled
 
-        if own := untabled(settled.lens, image=rings.form is None):
+        if own := untabled(settled.lens, settled.project.lights, image=rings.form is None):
             told.append(f"rings in the ghosts of {own} take most of the time: --ringing off leaves them out")
     return tuple(told)
 
