@@ -62,7 +62,9 @@ def test_a_state_of_another_light_is_refused(capsys):
     assert run([*REFERENCE, "--samples", "512", "-o", "a.exr"]) == 0
     capsys.readouterr()
     assert run(["render", "--resume", "a.state.npz", "--light", "1,1", "-o", "b.exr"]) == 2
-    assert "the state to resume belongs to another light" in capsys.readouterr().err
+    assert "the state to resume belongs to another light;" in capsys.readouterr().err
+    assert run(["render", "--resume", "a.state.npz", "--fstop", "11", "-o", "b.exr"]) == 2
+    assert "the state to resume belongs to another f-number;" in capsys.readouterr().err
     assert run(["render", "--resume", "a.state.npz", "--quality", "final", "-o", "b.exr"]) == 2
     assert "--resume works with --quality reference only" in capsys.readouterr().err
 

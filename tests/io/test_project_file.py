@@ -1,6 +1,7 @@
 """Project files: what is written reads back, short texts mean what they say, every mistake is told at once."""
 
 import json
+import re
 import tomllib
 from pathlib import Path
 
@@ -17,9 +18,12 @@ from flarewright.model import (
     Bare,
     BlackBody,
     Camera,
+    Dirt,
     EqualEnergy,
     Everywhere,
     Film,
+    Holdout,
+    Imperfection,
     Iris,
     Lens,
     Light,
@@ -36,6 +40,7 @@ from flarewright.model import (
     Scatter,
     Stack,
     Standard,
+    Starburst,
     Stop,
     Surface,
     Tabulated,
@@ -121,6 +126,34 @@ def test_a_written_project_reads_back_the_same(tmp_path, monkeypatch, project, c
     monkeypatch.chdir(tmp_path)
     Path("p.toml").write_text(project_text(project, comments=comments), "utf-8")
     assert read_project("p.toml") == project
+
+
+def test_a_commented_project_teaches_every_key(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    text = project_text(Project(lens="x", iris=Iris(), lights=(Light(field_deg=(0, 0)),)), comments=True)
+    records = (
+        Project,
+        Light,
+        Iris,
+        Camera,
+        Quality,
+        Output,
+        Dirt,
+        Starburst,
+        Scatter,
+        Holdout,
+        Imperfection,
+        Art,
+        Rule,
+    )
+    keys = {name for record in records for name in record.model_fields}
+    # the path of a light is the editor's, what is wanted of a new lens is no render's
+    assert {key for key in keys if not re.search(rf"\b{key}\b", text)} == {"keyframes", "design"}
+    taught = re.findall(r"^# \w+ = .*$", text.split("\n# What shapes")[0], re.MULTILINE)
+    assert len(taught) >= 15
+    for line in taught:
+        Path("p.toml").write_text(text.replace(line, line[2:]), "utf-8")
+        assert read_project("p.toml")
 
 
 @pytest.mark.parametrize("project", PROJECTS)

@@ -7,7 +7,7 @@ import pytest
 
 from flarewright.errors import ProjectError
 from flarewright.io.reference_state import read_state, write_state
-from flarewright.model import BlackBody, Camera, Iris, Light, Output, Project, Quality, Scatter, Surface
+from flarewright.model import BlackBody, Camera, Imperfection, Iris, Light, Output, Project, Quality, Scatter, Surface
 from flarewright.optics.color import luminance_weights
 from flarewright.render import reference as reference_pass
 from flarewright.render.prepare import load_lens, settle
@@ -150,7 +150,8 @@ def test_a_state_of_other_settings_is_refused(tmp_path):
         (project(seed=5), "seed"),
         (project(lights=LIGHTS), "light"),
         (project().replace(camera=Camera(size_px=(40, 25))), "picture"),
-        (project().replace(f_number=8.0), "lens"),
+        (project().replace(imperfection=Imperfection(seed=1)), "lens"),
+        (project().replace(f_number=8.0), "f-number"),
         (project().replace(iris=Iris(blades=5)), "iris"),
         (project(wavelengths=5), "spectral sampling"),
     ):

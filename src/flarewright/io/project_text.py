@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from ..errors import ProjectError
-from ..model import Art, Dirt, Starburst
+from ..model import Art, Dirt, Light, Starburst
 from ..model import project as choices
 from ..model.project import CoatingChoice, Project
 from .coating_text import UNCOATED, format_coating
@@ -21,14 +21,17 @@ HOLDOUT_FILES = ("image", "depth")
 FILES = (("iris", "mask"), ("dirt", "image"), ("holdout", *HOLDOUT_FILES))
 """Sections, and their keys that name files."""
 
+_TAUGHT = ("camera", "quality", "output")
+
 ABOUT = {
     "lens": "a shipped lens (`flarewright lenses`), or a lens file beside this project",
     "f_number": "2.8   # left out: wide open",
     "coating": '"lens", "none", "preset:NAME", "quarter-wave:NM" or a file, on every glass-air surface',
     "iris": "left out: the lens file's blades",
-    "zoom": '35.0, or "wide"   # a focal length in mm or a position of the lens file; left out: as its rows stand',
+    "zoom": '35.0   # a focal length in mm, or "wide", a position of the lens file; left out: as its rows stand',
     "filter": '"N-BK7:2:5"   # a plane filter in front: glass, thickness, gap to the lens, mm',
-    "imperfection": "{ seed = 1, decentre_um = 10.0, tilt_arcmin = 1.0, figure_nm = 0.0 }   # one sample of the lens",
+    "imperfection": "{ seed = 1, decentre_um = 10.0, tilt_arcmin = 1.0, figure_nm = 0.0 }   # one sample of the lens; "
+    "also: ghost_offset_mm, by hand",
     "camera.cover_glass": '"N-BK7:2:0.5"   # plane glass in front of the sensor, with its gap to the sensor, mm',
     "camera.sensor_reflectance": "part of the light that the sensor mirrors back",
     "camera.sensor_grating": "{ period_um = 8.0, fill = 0.7, orders = 3 }   # its pixels diffract what it reflects",
@@ -37,7 +40,9 @@ ABOUT = {
     "iris.blades": "0 is round",
     "iris.mask": '"iris.png"   # an image instead of blades, white transmits',
     "lights.field_deg": "degrees right and up in the picture",
-    "lights.distance": "mm in front of the first vertex; left out: so far away that its rays are parallel",
+    "lights.distance": "2000.0   # mm in front of the first vertex; left out: so far away that its rays are parallel",
+    "lights.shape": '{ kind = "rectangle", size_deg = [4.0, 3.0], rotation_deg = 15.0 }   # or "polygon", corners_deg',
+    "lights.holdout": '{ image = "leaves.png", invert = true }   # what hides this light alone',
     "lights.intensity": "irradiance on a plane that faces the light",
     "lights.diameter_deg": "across the light's disc: 0.53 for the sun, 0 for a point",
     "iris.roughness_um": "rms of the blades' edges",
@@ -201,15 +206,14 @@ def _without_none(value: Any) -> Any:
 def _left_out(project: Project) -> dict[tuple[str, ...], list[str]]:
     """Return by section the keys whose value is None and which are worth a commented line."""
     found: dict[tuple[str, ...], list[str]] = {}
-    for section, record in (
-        ("", project),
-        ("camera", project.camera),
-        ("quality", project.quality),
-        ("output", project.output),
-    ):
-        for name in type(record).model_fields:
+    records = [("", project), ("iris", project.iris), *((name, getattr(project, name)) for name in _TAUGHT)]
+    for section, record in records:
+        for name in () if record is None else type(record).model_fields:
             if getattr(record, name) is None and f"{section}.{name}".strip(".") in ABOUT:
                 found.setdefault((section,) if section else (), []).append(name)
+    # lights share their words: a key is taught where none of them has it
+    unsaid = [name for name in Light.model_fields if all(getattr(light, name) is None for light in project.lights)]
+    found["lights",] = [name for name in unsaid if f"lights.{name}" in ABOUT]
     return found
 
 
@@ -228,7 +232,8 @@ def _emit_table(
         ):
             below.append((key, value))
             continue
-        note = about.get(".".join((*path, key)))
+        # where a key is left out its words begin with an example
+        note = about.get(".".join((*path, key)), "").split("   # ")[-1]
         out.append(f"{_key(key)} = {_value(value)}" + (f"   # {note}" if note else ""))
     for key in left_out.get(path, ()):
         if key != "iris":

@@ -217,7 +217,9 @@ def _fingerprints(settled: Settled, shots: Sequence[Shot], rays: ReferenceRays) 
     scatter = chosen_scatter(settled)
     hidden = any(holdout is not None for holdout in (project.holdout, *(light.holdout for light in project.lights)))
     parts: dict[str, Any] = {
-        "lens": [settled.lens.model_dump(mode="json"), settled.order.stop_semi_diameter, packed.sensor_z],
+        "lens": settled.lens.model_dump(mode="json"),
+        "f-number": settled.order.stop_semi_diameter,
+        "distance of the sensor": packed.sensor_z,
         "iris": [settled.iris.model_dump(mode="json", exclude={"mask"}), _digest(opening.mask)],
         "coating": project.coating.model_dump(mode="json"),
         "light": [light.model_dump(mode="json", exclude={"holdout", "keyframes"}) for light in project.lights],
