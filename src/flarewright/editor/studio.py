@@ -71,7 +71,7 @@ class Picture:
     @property
     def ghost_light(self) -> NDArray[np.float64]:
         """Mean of the ghosts, R, G, B."""
-        return np.asarray(self.ghosts.reshape(-1, 3).mean(axis=0, dtype=np.float64))
+        return np.asarray(self.ghosts.mean(axis=0, dtype=np.float64).mean(axis=0))
 
 
 def view_size(project: Project, scale: float = 1.0) -> tuple[int, int]:

@@ -206,17 +206,14 @@ def mirror_squares_traced(packed: PackedLens, path: LightPath, tilt: float, poin
         path.rows, path.actions, packed.curvature, packed.form, packed.z_vertex, n, packed.sensor_z, tilt,
         packed.nearness, np.ascontiguousarray(points[:, 0]), np.ascontiguousarray(points[:, 1]), hits,
     )  # fmt: skip
-    hits = hits[np.isfinite(hits).all(axis=(1, 2))]
+    # a ray that ends has no place from there on
+    hits = hits[np.isfinite(hits[:, -1]).all(axis=1)]
     steps = np.flatnonzero(path.actions == REFLECT)
-    before, after = (_unit(hits[:, steps + k + 1] - hits[:, steps + k]) for k in (0, 1))
-    cosine2 = 0.25 * ((after - before) ** 2).sum(axis=2)
+    legs = hits[:, steps[:, None] + [1, 2]] - hits[:, steps[:, None] + [0, 1]]
+    legs /= np.sqrt((legs**2).sum(axis=3, keepdims=True))
+    cosine2 = 0.25 * ((legs[:, :, 1] - legs[:, :, 0]) ** 2).sum(axis=2)
     rows = path.rows[steps]
     forward = np.arange(len(steps)) % 2 == 0
     n_in, n_out = np.where(forward, n[rows], n[rows + 1]), np.where(forward, n[rows + 1], n[rows])
     squares: Floats = np.clip((1.0 - cosine2) * np.maximum(n_in / n_out, 1.0) ** 2, 0.0, 1.0)
     return squares
-
-
-def _unit(vectors: Floats) -> Floats:
-    unit: Floats = vectors / np.sqrt((vectors**2).sum(axis=2, keepdims=True))
-    return unit

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,17 +71,22 @@ def gathered_weights(
     where = spread_rays(bundle, shown, seen, SAMPLE)
     if where.size == 0 or (careful and not _seen_alike(packed, bundle, tilt, shown, seen)):
         return None
-    flux = np.empty(count)
-    for w in range(count):
-        held = bundle.traced.get(w)
-        rays = trace_points(packed, w, bundle.path, tilt, bundle.pupil[where]) if held is None else held[where]
-        flux[w] = float(rays[seen(rays), WEIGHT].sum())
+    places, held = bundle.pupil[where], bundle.traced
+    rays = np.concatenate([
+        held[w][where] if w in held else trace_points(packed, w, bundle.path, tilt, places) for w in range(count)
+    ])  # fmt: skip
+    flux = np.where(seen(rays), rays[:, WEIGHT], 0.0).reshape(count, -1).sum(axis=1)
     drawn = flux[list(shown)]
     if not drawn.min() > LEAST_PART * flux.max():
         return None
-    hats = np.stack([np.interp(np.arange(count), shown, row) for row in np.eye(len(shown))])
-    gathered: Floats = (hats * flux / drawn[:, None]) @ weights
+    gathered: Floats = (_hats(count, shown) * flux / drawn[:, None]) @ weights
     return gathered
+
+
+@lru_cache(maxsize=64)
+def _hats(count: int, shown: tuple[int, ...]) -> Floats:
+    """Return how wavelengths are split between those that are drawn, shape (len(shown), count)."""
+    return np.stack([np.interp(np.arange(count), shown, row) for row in np.eye(len(shown))])
 
 
 def _seen_alike(

@@ -80,9 +80,9 @@ def spread_rays(
     """
     triangles = bundle.triangles[:: max(1, len(bundle.triangles) // TRIANGLES)]
     nodes = triangles.ravel()
-    corners = bundle.pupil[triangles]
-    along, across = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    share = np.repeat(np.abs(along[:, 0] * across[:, 1] - along[:, 1] * across[:, 0]), 3)
+    x, y = bundle.pupil[nodes].T.reshape(2, -1, 3)
+    x, y = x[:, 1:] - x[:, :1], y[:, 1:] - y[:, :1]
+    share = np.repeat(np.abs(x[:, 0] * y[:, 1] - y[:, 0] * x[:, 1]), 3)
     for w in waves:
         rays = bundle.traced[w]
         # a node belongs to some six triangles: it is asked once where that is less to ask
@@ -139,10 +139,12 @@ def places_of(shot: Shot, to_pixels: Floats, x: Floats, y: Floats) -> tuple[Floa
 
 
 def _passes(rays: Floats, iris_radius: float) -> Bools:
+    passing = (rays[:, ALIVE] > 0.0) & (rays[:, REL] <= 1.0)
     # what a ray that ended holds may be infinite
     with np.errstate(over="ignore", invalid="ignore"):
-        within = (rays[:, STOP_X::2] ** 2 + rays[:, STOP_X + 1 :: 2] ** 2 <= iris_radius**2).all(axis=1)
-    return np.asarray((rays[:, ALIVE] > 0.0) & (rays[:, REL] <= 1.0) & within)
+        for column in range(STOP_X, rays.shape[1], 2):
+            passing &= rays[:, column] ** 2 + rays[:, column + 1] ** 2 <= iris_radius**2
+    return np.asarray(passing)
 
 
 def direct_bend(shot: Shot, lens: Lens) -> Floats | None:
