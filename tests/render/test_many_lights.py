@@ -202,9 +202,9 @@ def test_a_region_between_two_lights_holds_what_passes():
     shared = looking.looking(shots, paths, {})
     assert looking._rows(shots), "nothing is shared"
     for path in paths[::4]:
-        found = {item.shot.number: item for item in shared(path)}
+        found = {item.shot.number: item for item in shared([path])[0]}
         for shot in shots[::5]:
-            item = next(iter(looking.looking([shot], paths, {})(path)), None)
+            item = next(iter(looking.looking([shot], paths, {})([path])[0]), None)
             mine = found.get(shot.number)
             assert (item is None) == (mine is None)
             if item is None or mine is None:
@@ -235,7 +235,7 @@ def test_gathered_weights_keep_the_flux_of_every_wavelength():
     _, (shot,) = _shots((Light(field_deg=(6.0, 3.0)),))
     path = ghost_paths(settle(project((shot.light,))).lens)[5]
     tilt = shot.incidence.tilt
-    (item,) = looking.looking([shot], [path], {})(path)
+    ((item,),) = looking.looking([shot], [path], {})([path])
     bundle = trace_grid(
         shot.packed, path, tilt, (shot.opening.radius, shot.opening.inner), item.region, tolerance=0.25, scale=20.0
     )

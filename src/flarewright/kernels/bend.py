@@ -9,6 +9,9 @@ from ._jit import inlined
 REFRACT = 0
 REFLECT = 1
 STOP = 2
+# of steps that follow several paths at once: remember the rays as they are; land them, and go on from there again
+KEEP = 3
+LAND = 4
 
 LANES = 64
 

@@ -57,7 +57,7 @@ def rejected(data, nodes, crossings, iris_radius, slack):
 @compiled
 def find_box(
     rows, actions, curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, tilt, nearness,
-    crossings, iris_radius, view_radius, box, nx, ny, finest_x, finest_y,
+    crossings, iris_radius, view_radius, box, nx, ny, finest_x, finest_y, traced,
 ):  # fmt: skip
     """Bound the part of the pupil that a path accepts, and estimate what it carries.
 
@@ -77,6 +77,9 @@ def find_box(
         Cells of the pre-pass.
     finest_x, finest_y : float
         How near to each other samples need to stand where a spot may hide between those of the cells, mm.
+    traced : ndarray, shape ((nx + 1) (ny + 1), >= 5 + 2 C)
+        The corners of the cells as `trace_lanes` fills them, those of one x after another; without rows where nobody
+        has traced them yet.
 
     Returns
     -------
@@ -104,10 +107,13 @@ def find_box(
         for b in range(width):
             px[a * width + b] = box[0] + a * hx
             py[a * width + b] = box[2] + b * hy
-    data = np.empty((count, STOP_X + 2 * crossings))
-    trace_lanes(
-        rows, actions, curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, tilt, nearness, px, py, data
-    )
+    data = traced
+    if traced.shape[0] == 0:
+        data = np.empty((count, STOP_X + 2 * crossings))
+        trace_lanes(
+            rows, actions, curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, tilt, nearness,
+            px, py, data,
+        )  # fmt: skip
     found, spots = _nowhere(), _nowhere()
     sums = np.empty(6)
     for m in range(6):

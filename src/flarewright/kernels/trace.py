@@ -4,20 +4,44 @@ from math import sqrt
 
 import numpy as np
 
-from ._jit import compiled, inner
-from .bend import ALIVE, LANES, REFLECT, REFRACT, REL, STOP, STOP_X, WEIGHT, X, Y, bend, bend_about, ray_from_near
+from ._jit import borrowing, compiled, inner
+from .bend import (
+    ALIVE,
+    KEEP,
+    LAND,
+    LANES,
+    REFLECT,
+    REFRACT,
+    REL,
+    STOP,
+    STOP_X,
+    WEIGHT,
+    X,
+    Y,
+    bend,
+    bend_about,
+    ray_from_near,
+)  # fmt: skip
 from .intersect import FLATTEST, intersect_conic, intersect_sphere
 from .shape_lanes import trace_shapes
 from .shapes import hit_shapes
 
 __all__ = [
-    "ALIVE", "LANES", "REFLECT", "REFRACT", "REL", "STOP", "STOP_X", "WEIGHT", "X", "Y", "bend", "trace_hits",
-    "trace_lanes", "trace_nodes",
+    "ALIVE", "KEEP", "LAND", "LANES", "REFLECT", "REFRACT", "REL", "STOP", "STOP_X", "WEIGHT", "X", "Y", "bend",
+    "trace_hits", "trace_lanes", "trace_nodes",
 ]  # fmt: skip
 
 
 # lanes are taken in multiples of this, whole vectors to the compiler
 VECTOR = 8
+
+
+@borrowing
+def _copy(source, target):
+    """Copy all lanes."""
+    for k in range(source.shape[0]):
+        for m in range(LANES):
+            target[k, m] = source[k, m]
 
 
 @inner
@@ -29,7 +53,8 @@ def trace_lanes(
     Parameters
     ----------
     rows, actions : ndarray, shape (S,), int64
-        Row met at each step and what happens there (REFRACT, REFLECT, STOP).
+        Row met at each step and what happens there (REFRACT, REFLECT, STOP). Centred conics alone also know KEEP and
+        LAND, by which P paths that begin alike share that beginning (`optics.paths.together`).
     curvature, conic, z_vertex, inv_semi : ndarray, shape (K,)
         Geometry of the rows; `inv_semi` is 1 / semi-diameter, 0 for the stop. Where not every row is a centred conic,
         `conic` is the shape table instead, shape (K, P) (`kernels.intersect`); only then is its code compiled.
@@ -45,10 +70,10 @@ def trace_lanes(
         1 / distance from the light to the first vertex, 1/mm; 0 for a distant light, whose rays are parallel.
     px, py : ndarray, shape (N,)
         Where the rays cross the plane of the first vertex, mm.
-    out : ndarray, shape (N, 5 + 2 C)
-        Filled with x, y on the sensor, weight (product of R and T), the largest r / semi-diameter met, alive (1 or 0),
-        and x, y at each of the C crossings of the stop. Of a ray that ended, the first is the number of surfaces it
-        passed; all else but "alive" means nothing.
+    out : ndarray, shape (P N, 5 + 2 C)
+        Filled, path by path, with x, y on the sensor, weight (product of R and T), the largest r / semi-diameter met,
+        alive (1 or 0), and x, y at each of the C crossings of the stop, 0 where a path has fewer. Of a ray that ended,
+        the first is the number of surfaces it passed; all else but "alive" means nothing.
 
     Notes
     -----
@@ -64,18 +89,14 @@ def trace_lanes(
     n_rays = px.shape[0]
     samples = reflectance.shape[1]
     last_place, last_cell = float(samples - 1), np.int32(samples - 2)
-    x = np.empty(LANES)
-    y = np.empty(LANES)
-    z = np.empty(LANES)
-    dx = np.empty(LANES)
-    dy = np.empty(LANES)
-    dz = np.empty(LANES)
-    weight = np.empty(LANES)
-    rel2 = np.empty(LANES)
-    alive = np.empty(LANES)
-    passed = np.empty(LANES)
+    rays = np.empty((10, LANES))
+    x, y, z, dx, dy, dz = rays[0], rays[1], rays[2], rays[3], rays[4], rays[5]
+    weight, rel2, alive, passed = rays[6], rays[7], rays[8], rays[9]
     cos_low = np.empty(LANES)
     where = np.empty(LANES, dtype=np.int32)
+    # the rays where a path leaves what it shares with the next
+    kept = np.empty((10, LANES))
+    kept_heading, kept_crossing, kept_living = 1.0, 0, 0.0
     for start in range(0, n_rays, LANES):
         count = min(LANES, n_rays - start)
         # the few rays of a cell that is halved do not take the time of a full set
@@ -97,9 +118,38 @@ def trace_lanes(
                 dx[m], dy[m], dz[m], weight[m] = ray_from_near(tilt, nearness, x[m], y[m])
         heading = 1.0
         crossing = 0
-        for step in range(rows.shape[0]):
+        living = 1.0
+        # where this path's rays begin in `out`
+        begin = start
+        for step in range(rows.shape[0] + 1):
+            action = actions[step] if step < rows.shape[0] else LAND
+            if action == KEEP:
+                _copy(rays, kept)
+                kept_heading, kept_crossing, kept_living = heading, crossing, living
+                continue
+            if action == LAND:
+                for k in range(begin, begin + count):
+                    for m in range(STOP_X + 2 * crossing, out.shape[1]):
+                        out[k, m] = 0.0
+                for m in range(count):
+                    t = (sensor_z - z[m]) / dz[m]
+                    out[begin + m, X] = x[m] + t * dx[m] if alive[m] > 0.0 else passed[m]
+                    out[begin + m, Y] = y[m] + t * dy[m]
+                    out[begin + m, WEIGHT] = weight[m]
+                    out[begin + m, REL] = sqrt(rel2[m])
+                    out[begin + m, ALIVE] = alive[m]
+                if step == rows.shape[0]:
+                    break
+                _copy(kept, rays)
+                heading, crossing, living = kept_heading, kept_crossing, kept_living
+                for k in range(begin, begin + count):
+                    for m in range(STOP_X, STOP_X + 2 * crossing):
+                        out[k + n_rays, m] = out[k, m]
+                begin += n_rays
+                continue
+            if living == 0.0:
+                continue
             row = rows[step]
-            action = actions[step]
             vertex = z_vertex[row]
             if action == STOP:
                 for m in range(lanes):
@@ -108,8 +158,8 @@ def trace_lanes(
                     y[m] += t * dy[m]
                     z[m] = vertex
                 for m in range(count):
-                    out[start + m, STOP_X + 2 * crossing] = x[m]
-                    out[start + m, STOP_X + 2 * crossing + 1] = y[m]
+                    out[begin + m, STOP_X + 2 * crossing] = x[m]
+                    out[begin + m, STOP_X + 2 * crossing + 1] = y[m]
                 crossing += 1
                 continue
             c = curvature[row]
@@ -181,7 +231,7 @@ def trace_lanes(
             for m in range(lanes):
                 living += alive[m]
             if living == 0.0:
-                break
+                continue
             table = reflectance[row]
             # where to look is found for several rays at once; the rest would keep the compiler from it
             for m in range(lanes):
@@ -197,16 +247,6 @@ def trace_lanes(
                 weight[m] *= r if mirror > 0.0 else 1.0 - r
             if mirror > 0.0:
                 heading = -heading
-        for k in range(start, start + count):
-            for m in range(STOP_X + 2 * crossing, out.shape[1]):
-                out[k, m] = 0.0
-        for m in range(count):
-            t = (sensor_z - z[m]) / dz[m]
-            out[start + m, X] = x[m] + t * dx[m] if alive[m] > 0.0 else passed[m]
-            out[start + m, Y] = y[m] + t * dy[m]
-            out[start + m, WEIGHT] = weight[m]
-            out[start + m, REL] = sqrt(rel2[m])
-            out[start + m, ALIVE] = alive[m]
 
 
 @compiled

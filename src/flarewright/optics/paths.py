@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernels.trace import REFLECT, REFRACT, STOP
+from ..kernels.trace import KEEP, LAND, REFLECT, REFRACT, STOP
 from ..model import Lens
 
 
@@ -51,6 +53,11 @@ class LightPath:
         last = max(self.mirrors) if self.sensor else None
         return "-".join("sensor" if row == last else str(row) for row in self.mirrors)
 
+    @property
+    def steps(self) -> NDArray[np.int64]:
+        """Rows and actions, shape (2, S)."""
+        return np.stack([self.rows, self.actions])
+
     @cached_property
     def stop_crossings(self) -> int:
         """How often the path crosses the stop: 1, 3 or 5."""
@@ -88,6 +95,36 @@ def steps_between(count: int, stop: int, mirrors: tuple[int, ...]) -> LightPath:
     first, second = mirrors[:2] if mirrors else (None, None)
     steps = np.array(rows, dtype=np.int64), np.array(actions, dtype=np.int64)
     return LightPath(first, second, *steps, count in mirrors, mirrors[2:])
+
+
+def together(paths: Sequence[LightPath]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return the steps by which `kernels.trace` follows several paths at once.
+
+    Parameters
+    ----------
+    paths : sequence of LightPath
+        Each begins with more of what it shares with the next than that one shares with the one after: of one first
+        mirror, the later second mirror comes first.
+
+    Returns
+    -------
+    rows, actions : ndarray, shape (S,), int64
+        What two neighbours share is walked once: before a path leaves it the rays are kept, and when it has landed the
+        next one goes on from there.
+    """
+    steps: list[NDArray[np.int64]] = []
+    walked = 0
+    for path, following in pairwise(paths):
+        one, other = path.steps, following.steps
+        count = min(one.shape[1], other.shape[1])
+        same = (one[:, :count] == other[:, :count]).all(axis=0)
+        shared = count if same.all() else int(np.argmin(same))
+        if shared < walked:
+            raise ValueError(f"{following.name} leaves the way of {path.name} before that has left the one before it")
+        steps += [one[:, walked:shared], np.array([[0], [KEEP]]), one[:, shared:], np.array([[0], [LAND]])]
+        walked = shared
+    rows, actions = np.concatenate([*steps, paths[-1].steps[:, walked:]], axis=1)
+    return rows, actions
 
 
 def direct_path(lens: Lens) -> LightPath:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import ceil, cos, sin, sqrt, tan
 from typing import Any
@@ -11,8 +12,9 @@ from numpy.typing import NDArray
 
 from ..kernels.intersect import AXES, ORIGIN, sag_of_shape
 from ..kernels.prepass import PROBES, find_box
+from ..kernels.trace import STOP_X, trace_nodes
 from .pack import PackedLens
-from .paths import LightPath
+from .paths import LightPath, together
 
 Floats = NDArray[np.float64]
 
@@ -26,6 +28,7 @@ PREPASS_QUICK, ENTRY_QUICK = (24, 48), (14, 28)
 # cells of the whole front or of a part
 COARSE = (8, 16)
 SPECK, SMALL_REGION = 16, 64
+_UNTRACED = np.empty((0, STOP_X))
 
 
 def tracing_arguments(packed: PackedLens, w: int | list[int], path: LightPath, tilt: float) -> Any:
@@ -138,6 +141,7 @@ def find_region(
     view_radius: float = float("inf"),
     within: Floats | None = None,
     quick: bool = False,
+    traced: Floats | None = None,
 ) -> Region | None:
     """Find the part of the pupil that a path accepts (Hullin 2011, section 4.2, "Ray Bounding").
 
@@ -154,6 +158,8 @@ def find_region(
         A box that holds the region; None: the whole front.
     quick : bool
         Look at the middle wavelength alone, in half as many places, and leave more room around for the others.
+    traced : ndarray, optional
+        The path's part of `first_look`, with the same light, `within` and `quick`.
 
     Returns
     -------
@@ -165,18 +171,12 @@ def find_region(
         (*_looking_arguments(packed, w, path, tilt), *limits)
         for w in wavelengths_fitted(packed)[: 1 if quick else None]
     ]
-    box, cells = front_box(packed, tilt), cells_across(packed, PREPASS_QUICK if quick else PREPASS)
-    finest = _finest(packed, box)
-    if within is not None:
-        # as dense as on the whole front
-        parts = (within[1::2] - within[0::2]) / (box[1::2] - box[0::2])
-        few = cells_across(packed, ENTRY_QUICK if quick else ENTRY)
-        cells = (max(ceil(cells[0] * parts[0]), few[0]), max(ceil(cells[1] * parts[1]), few[1]))
-        box = within
+    finest = _finest(packed, front_box(packed, tilt))
+    box, cells = _looked_at(packed, tilt, within, quick)
     whole = True
     held = np.array([np.inf, -np.inf, np.inf, -np.inf])
     for _ in range(4):
-        found, sums, spots = _scan(packed, middle, box, cells, finest)
+        found, sums, spots = _scan(packed, middle, box, cells, finest, traced if whole else None)
         plenty = sums[4] >= (SPECK if whole else SMALL_REGION)
         near, few = box, cells_across(packed, COARSE) if plenty else cells
         if whole and sums[4] > 0.0:
@@ -199,6 +199,45 @@ def find_region(
         if not shrunk:
             break
     return _region(roomy if quick else box, sums)
+
+
+def _looked_at(packed: PackedLens, tilt: float, within: Floats | None, quick: bool) -> tuple[Floats, tuple[int, int]]:
+    """Return the part of the front that is looked at first, and its cells."""
+    box, cells = front_box(packed, tilt), cells_across(packed, PREPASS_QUICK if quick else PREPASS)
+    if within is None:
+        return box, cells
+    # as dense as on the whole front
+    parts = (within[1::2] - within[0::2]) / (box[1::2] - box[0::2])
+    few = cells_across(packed, ENTRY_QUICK if quick else ENTRY)
+    return within, (max(ceil(cells[0] * parts[0]), few[0]), max(ceil(cells[1] * parts[1]), few[1]))
+
+
+def first_look(
+    packed: PackedLens, paths: Sequence[LightPath], tilt: float, within: Floats | None = None, quick: bool = False
+) -> Floats:
+    """Trace what `find_region` looks at first, of several paths whose beginnings are alike at once.
+
+    Parameters
+    ----------
+    packed : PackedLens
+        Of centred conics.
+    paths : sequence of LightPath
+        Of two reflections, in an order as `optics.paths.together` wants it.
+    tilt, within, quick
+        As in `find_region`.
+
+    Returns
+    -------
+    ndarray, shape (P, N, 5 + 2 C)
+        For each path, C the most crossings of the stop among them.
+    """
+    box, cells = _looked_at(packed, tilt, within, quick)
+    x, y = (box[2 * k] + np.arange(cells[k] + 1) * ((box[2 * k + 1] - box[2 * k]) / cells[k]) for k in (0, 1))
+    px, py = np.repeat(x, len(y)), np.tile(y, len(x))
+    data = np.empty((len(paths), len(px), STOP_X + 2 * max(path.stop_crossings for path in paths)))
+    arguments = _looking_arguments(packed, wavelengths_fitted(packed)[0], paths[0], tilt)
+    trace_nodes(*together(paths), *arguments[2:], px, py, data.reshape(-1, data.shape[2]))
+    return data
 
 
 def _region(box: Floats, sums: Floats) -> Region:
@@ -299,9 +338,10 @@ def _scan(
     box: Floats,
     cells: tuple[int, int],
     finest: tuple[float, float],
+    traced: Floats | None = None,
 ) -> tuple[Floats, Floats, Floats]:
     """Run the pre-pass over a box at one wavelength."""
-    found, sums, spots = find_box(*arguments, box, *cells, *finest)
+    found, sums, spots = find_box(*arguments, box, *cells, *finest, _UNTRACED if traced is None else traced)
     if packed.halves == 1:
         # the kernel counts every ray for its mirror image too
         sums[:3] *= 0.5

@@ -32,7 +32,7 @@ from .ghosts_draft import (
     spread_light,
 )
 from .ghosts_final import SCREEN, STEP_CONTRAST, FinalPass, contrast, detail_of, draw_alone, draw_final
-from .looking import looking
+from .looking import kindred, looking
 from .shot import Shot
 from .sources import halvings, motion, spread_border
 
@@ -177,16 +177,18 @@ def _final(
     meter: _Meter,
 ) -> GhostPass:
     others, faintest = levels
-    look = looking(shots, paths, art, quality.screen)
+    # where ghosts get layers of their own none may be missing
+    look = looking(shots, paths, art, quality.screen and singles == 0)
 
-    def find(path: LightPath) -> list[FinalPass]:
+    def find(group: list[LightPath]) -> list[list[FinalPass]]:
         if meter.cancelled.is_set():
             return []
-        found = look(path)
-        meter.step("looking for ghosts")
+        found = look(group)
+        for _ in group:
+            meter.step("looking for ghosts")
         return found
 
-    found = [items for items in pool.map(find, paths) if items]
+    found = [items for group in pool.map(find, kindred(paths)) for items in group if items]
     # what lands beside the picture is neither bright nor worth keeping
     flux = np.array([sum(item.region.seen_flux * item.gain for item in items) for items in found])
     own = _level(found)
@@ -375,8 +377,8 @@ def plain_level(shots: Sequence[Shot], paths: Sequence[LightPath], threads: int 
     float
     """
     with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
-        found = list(pool.map(looking(shots, paths, {}), paths))
-    return _level(found)
+        groups = pool.map(looking(shots, paths, {}), kindred(paths))
+        return _level([items for group in groups for items in group])
 
 
 def _level(found: Sequence[Sequence[FinalPass]], *, plain: bool = False) -> float:
@@ -468,7 +470,8 @@ def _collect(
         path, pixels = named[k], merge(planes, shot.size_px)
         about: dict[str, str | float] = {
             "path": path.name,
-            "flux_mm2": float(luminance @ pixels.sum(axis=(0, 1), dtype=np.float64)),
+            # first down the columns: along a row the three channels stand in each other's way
+            "flux_mm2": float(luminance @ pixels.sum(axis=0, dtype=np.float64).sum(axis=0)),
         }
         if path.name in art:
             about["art"] = art[path.name].text()

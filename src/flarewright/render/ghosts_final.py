@@ -113,7 +113,7 @@ class FinalPass:
 
 def find_final(
     shot: Shot, path: LightPath, art: PathArt = PLAIN, entry: Region | None = None, around: Floats | None = None,
-    quick: bool = False,
+    quick: bool = False, traced: Floats | None = None,
 ) -> FinalPass | None:  # fmt: skip
     """Look where a path accepts light; None when it passes nothing.
 
@@ -129,6 +129,8 @@ def find_final(
         A part of the pupil known to hold all that the path accepts; of a point that `art` does not frame.
     quick : bool
         As in `optics.region.find_region`.
+    traced : ndarray, optional
+        The path's part of `optics.region.first_look`.
 
     Returns
     -------
@@ -157,7 +159,7 @@ def find_final(
         orders = grating_orders(lens, path.second_reflection, shot.grating)
         view_radius += float(np.nanmax([np.hypot(*order.shift_mm.T) for order in orders]))
     if around is None:
-        region = find_region(lens, path, tilt, iris_radius, view_radius, within, quick)
+        region = find_region(lens, path, tilt, iris_radius, view_radius, within, quick, traced)
     else:
         region = measure_region(lens, path, tilt, iris_radius, view_radius, around)
     if region is None:

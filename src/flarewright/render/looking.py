@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..optics.paths import LightPath
-from ..optics.region import front_box, join_boxes
+from ..optics.region import Region, first_look, front_box, join_boxes
 from .art import PLAIN, PathArt
 from .ghosts_final import FinalPass, find_entry, find_final
 from .shot import Shot
@@ -28,14 +28,39 @@ MARGIN = 0.15
 MOST_GROWTH = 3.0
 # fewer lights are looked for one by one
 MANY = 8
+# so many paths of one first mirror are followed to it at once; of more the rays would not stay in the processor's cache
+TOGETHER = 8
 
-__all__ = ["looking"]
+__all__ = ["kindred", "looking"]
+
+
+def kindred(paths: Sequence[LightPath]) -> list[list[LightPath]]:
+    """Divide paths into groups of one first mirror; together they have the order of the paths.
+
+    Parameters
+    ----------
+    paths : sequence of LightPath
+
+    Returns
+    -------
+    list of list of LightPath
+        The second mirrors of each rise.
+    """
+    groups: list[list[LightPath]] = []
+    for path in paths:
+        group = groups[-1] if groups else []
+        alike = group and len(path.mirrors) == 2 and group[-1].mirrors[:-1] == path.mirrors[:-1]
+        if alike and len(group) < TOGETHER and group[-1].mirrors < path.mirrors:
+            group.append(path)
+        else:
+            groups.append([path])
+    return groups
 
 
 def looking(
     shots: Sequence[Shot], paths: Sequence[LightPath], art: Mapping[str, PathArt], quick: bool = False
-) -> Callable[[LightPath], list[FinalPass]]:
-    """Return what looks for the ghost of a path, one of `paths`, by every light.
+) -> Callable[[Sequence[LightPath]], list[list[FinalPass]]]:
+    """Return what looks for the ghosts of some paths, a group of `kindred`, by every light.
 
     Parameters
     ----------
@@ -49,21 +74,21 @@ def looking(
     Returns
     -------
     callable
-        Takes a path, and returns its ghosts in the order of the shots, without those that pass no light.
+        Takes paths, and returns the ghosts of each in the order of the shots, without those that pass no light.
     """
     # what reaches the stop is common to all paths whose mirrors stand behind it
     way_in = next((path.entry for path in paths if path.entry is not None), None)
     entries = [None if way_in is None else find_entry(shot, way_in) for shot in shots]
     rows = _rows(shots)
 
-    def look(path: LightPath) -> list[FinalPass]:
+    def look(path: LightPath, traced: Sequence[Floats | None]) -> list[FinalPass]:
         changed = art.get(path.name, PLAIN)
         inside = entries if path.entry is not None else [None] * len(shots)
         found: dict[int, FinalPass | None] = {}
 
         def at(k: int, around: Floats | None = None) -> FinalPass | None:
             if k not in found:
-                found[k] = find_final(shots[k], path, changed, inside[k], around, quick)
+                found[k] = find_final(shots[k], path, changed, inside[k], around, quick, traced[k])
             return found[k]
 
         for row in [] if changed.framed else rows:
@@ -73,7 +98,23 @@ def looking(
                     at(k, _between(shots[k], ends))
         return [item for item in map(at, range(len(shots))) if item is not None]
 
-    return look
+    def look_at_all(group: Sequence[LightPath]) -> list[list[FinalPass]]:
+        inside = entries if group[0].entry is not None else [None] * len(shots)
+        traced: list[Sequence[Floats | None]] = [[None] * len(group)] * len(shots)
+        if len(group) > 1 and len(shots) < MANY:
+            traced = [_first_look(shot, group, entry, quick) for shot, entry in zip(shots, inside, strict=True)]
+        return [look(path, [of_shot[k] for of_shot in traced]) for k, path in enumerate(group)]
+
+    return look_at_all
+
+
+def _first_look(shot: Shot, group: Sequence[LightPath], entry: Region | None, quick: bool) -> Sequence[Floats | None]:
+    """Trace where each path of a group is looked for first; nothing where the tracer does not follow several."""
+    if shot.packed.shapes is not None:
+        return [None] * len(group)
+    within = None if entry is None else entry.box
+    # the later second mirror is met first
+    return list(first_look(shot.packed, group[::-1], shot.incidence.tilt, within, quick)[::-1])
 
 
 def _rows(shots: Sequence[Shot]) -> list[list[int]]:
