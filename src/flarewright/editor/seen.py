@@ -1,7 +1,7 @@
 """Which ghosts are seen where: the table of ghosts, what lies under the pointer, and outlines.
 
-Every ghost is drawn by itself in a small picture, by the same renderer and in the same quality as the picture that is
-shown. A ghost is under the pointer where its light is, so iris, rims and folds count exactly as they do in the
+Every ghost is drawn by itself in a small picture, by the same renderer as the picture that is shown, in the detail that
+a screen shows. A ghost is under the pointer where its light is, so iris, rims and folds count exactly as they do in the
 picture; the one that is chosen is drawn once more at full size.
 """
 
@@ -83,7 +83,9 @@ def see(project: Project, grade: Grade, progress: Callable[[float, str], None] |
     art = Art(rules=tuple(rule for rule in project.art.rules if rule.enable is None))
     quality = stage.quality
     if grade == "final":
-        quality = Quality(mode="final", wavelengths=3, paths=quality.paths, tolerance_px=1.0, ringing="off")
+        quality = Quality(
+            mode="final", wavelengths=3, paths=quality.paths, tolerance_px=1.0, ringing="off", screen=True
+        )
     stage = stage.replace(art=art, quality=quality, output=Output(layers="ghosts", starburst=False))
     rendering = render(stage, progress=progress)
     width, height = stage.camera.size_px
