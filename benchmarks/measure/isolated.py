@@ -19,11 +19,11 @@ from numpy.typing import NDArray
 from synthetic_camera import Pose, Setup, ghost_layers, poses, project_of, scale_of
 
 from flarewright.kernels.measure_pupil import FIRST_DISC, FIRST_I
-from flarewright.measure.find import rims_of
 from flarewright.measure.fit import Fit, Shape, free_numbers, patches_of, refine, render
 from flarewright.measure.grow import Growth, grow
-from flarewright.measure.numbers import field, frame, with_blades
+from flarewright.measure.numbers import field, frame
 from flarewright.measure.pursuit import pursue
+from flarewright.measure.settle import kinds_of
 from flarewright.measure.views import View
 from flarewright.measure.walch import circle, descend, draw, fit_bezier, window_of
 from flarewright.model.ghost_model import Blades
@@ -116,7 +116,7 @@ def _alone(views: list[View], iris: Blades | None) -> dict[str, Any]:
     rough = max(found, key=lambda one: one.shapes[1].numbers[FIRST_I])
     there = [k for k, view in enumerate(even) if view.pixels.any()]
     shown = [even[k] for k in there[:: max(1, len(there) // VIEWS)]]
-    fits = [fit for rim in rims_of(iris) if (fit := _fitted(rough.shapes[1], rim, shown)) is not None]
+    fits = [fit for start in kinds_of(rough.shapes[1], iris) if (fit := _fitted(start, shown)) is not None]
     best = min(fits, key=lambda fit: fit.cost)
     took = time.process_time() - start
     first, last = 2 * there[0], 2 * there[-1]
@@ -138,9 +138,9 @@ def _alone(views: list[View], iris: Blades | None) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _fitted(start: Shape, rim: Blades | None, views: list[View]) -> Fit | None:
-    """Fit a ghost with a kind of rim, as far as 27 numbers go, until noise hides every step."""
-    grown = grow(replace(start, numbers=with_blades(start.numbers, rim)), views, 1, most=Growth(order=2, discs=1))
+def _fitted(start: Shape, views: list[View]) -> Fit | None:
+    """Fit a ghost as far as 27 numbers go, until noise hides every step."""
+    grown = grow(start, views, 1, most=Growth(order=2, discs=1))
     if grown is None:
         return None
     patches = patches_of(grown.shape, views, 1)

@@ -7,6 +7,7 @@ import pytest
 from planted_run import shape, views
 
 from flarewright.kernels.measure_hough import outline
+from flarewright.kernels.measure_pupil import FIRST_DISC
 from flarewright.measure.find import rims_of
 from flarewright.measure.fit import render
 from flarewright.measure.found import Found
@@ -62,6 +63,18 @@ def test_a_fit_takes_the_rim_that_fits(rim):
     (ghost,) = settle([Found((start,) * 3, 0, 2)], shown, how=how, iris=IRIS)
     assert [blades_of(one.numbers) for one in ghost.shapes] == [rim] * 3
     assert ghost.shapes[1].numbers[0] == pytest.approx(-60.0, abs=0.2)
+
+
+def test_a_disc_that_stood_for_blades_goes_when_they_are_known():
+    """As a search leaves a polygon that it took for round: a disc cuts one side."""
+    shown = views([bladed(IRIS, -60.0, 26.0, 1.0)], angles=(8.0, 15.0, 22.0))
+    start = shape(-60.0, 27.0, 0.9)
+    start.numbers[FIRST_DISC : FIRST_DISC + 3] = 1.2, 0.0, 1.2
+    how = Settling(rounds=1, most=Growth(order=1, discs=1))
+    (ghost,) = settle([Found((replace(start, discs=1),) * 3, 0, 2)], shown, how=how, iris=IRIS)
+    for one in ghost.shapes:
+        assert one.discs == 0
+        assert blades_of(one.numbers) == IRIS
 
 
 @pytest.mark.slow

@@ -9,12 +9,12 @@ from functools import partial
 
 import numpy as np
 
-from ..kernels.measure_pupil import FIRST_DISC, FIRST_I
+from ..kernels.measure_pupil import DISC_NUMBERS, FIRST_DISC, FIRST_I
 from ..model.ghost_model import AberrationGhost, Blades
 from .find import rims_of
 from .fit import Fit, Shape, free_numbers, patches_of, presence, refine
 from .found import CHANNELS, Found, alone, by_light, exchange, rest_of
-from .grow import Growth, grow
+from .grow import RIM_PAYS, Growth, grow
 from .joint import lit
 from .journal import Journal
 from .numbers import blades_of, channel_of, with_blades
@@ -127,16 +127,40 @@ def _rimmed(
     if iris is None or not patches:
         return shape
     few = patches[:: max(1, len(patches) // _FEW)]
-    free = free_numbers(1, shape.discs, 1)
-    own = blades_of(shape.numbers)
-    others = [kind for kind in rims_of(iris) if kind != own]
     best, least = shape, np.inf
-    for kind in (own, *others):
-        start = replace(shape, numbers=with_blades(shape.numbers, kind))
+    for start in kinds_of(shape, iris):
+        free = free_numbers(1, start.discs, 1)
         fit = refine(start, few, free, width=shown[0].size_px[0], steps=4, pool=pool)
-        if fit.cost < least:
-            best, least = fit.shape, fit.cost
+        cost = fit.cost / (1.0 - RIM_PAYS) ** start.discs
+        if cost < least:
+            best, least = fit.shape, cost
     return best
+
+
+def kinds_of(shape: Shape, iris: Blades | None) -> list[Shape]:
+    """Return a shape with every kind of rim that an iris may give it, its own first.
+
+    Parameters
+    ----------
+    shape : Shape
+    iris : Blades or None
+
+    Returns
+    -------
+    list of Shape
+        A disc that bites into the rim may have stood for a blade: with another rim the shape comes without discs too.
+    """
+    own = blades_of(shape.numbers)
+    found = [shape]
+    for kind in rims_of(iris):
+        if kind != own:
+            numbers = with_blades(shape.numbers, kind)
+            found.append(replace(shape, numbers=numbers))
+            if shape.discs:
+                bare = numbers.copy()
+                bare[FIRST_DISC : FIRST_DISC + DISC_NUMBERS * shape.discs] = 0.0
+                found.append(replace(shape, numbers=bare, discs=0))
+    return found
 
 
 def touch_up(
