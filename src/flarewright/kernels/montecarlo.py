@@ -101,8 +101,10 @@ def trace_batch(
         Colour of each sample over its chance.
     heroes : int
         Wavelengths traced from each point, evenly spread over the chances.
-    boosts : ndarray, shape (2,)
-        Chance over reflectance of a reflection's being followed: of the third and fourth, and of later ones.
+    boosts : ndarray, shape (4,)
+        Chance over reflectance of a reflection's being followed: of the third and fourth, and of later ones. Then how
+        many rays one of two or three reflections may split off on average, and one of more: below 1, or oblique rays,
+        whose R is many times that which decides how many are worth following, breed without end.
     key : ndarray, shape (2,), uint64
     batch, light : int
         Which stream of random numbers.
@@ -199,6 +201,8 @@ def trace_tree(
     order, mirrors = np.int64(0), np.int64(0)
     waiting = 0
     steps = 0
+    # rays that this one may still split off, on average
+    left = boosts[2]
     while True:
         ended = False
         if row < 0:
@@ -261,7 +265,9 @@ def trace_tree(
                 if R > 0.0:
                     # beyond these the light is split: R and 1 - R
                     chance = 1.0 if order < 2 else min(1.0, boosts[0 if order < 4 else 1] * R)
-                    alone = (order >= 2 and R > SPLIT_BELOW) or waiting == STACK
+                    alone = (order >= 2 and (R > SPLIT_BELOW or chance > left)) or waiting == STACK
+                    if order >= 2 and not alone:
+                        left -= chance
                     up = R
                     if alone or chance < 1.0:
                         if drawn == 4:
@@ -318,6 +324,7 @@ def trace_tree(
             weight, row, heading = ray[_WEIGHT], np.int64(ray[_ROW]), np.int64(ray[_HEADING])
             order, mirrors = np.int64(ray[_ORDER]), np.int64(ray[_ROWS])
             steps = 0
+            left = boosts[2 if order < 4 else 3]
 
 
 @inner

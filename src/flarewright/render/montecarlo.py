@@ -28,6 +28,8 @@ Batch = dict[str, NDArray[Any]]
 HEROES = 4
 # reflections to follow, on average, while a ray of high order crosses the lens once
 FOLLOWED = 0.5
+# rays that a ray of high order splits off at most, on average
+MOST_BRED = 0.9
 # directions squared into which a batch divides its points for an area light
 AIMS = 8
 # side of the blocks for which errors are kept, pixels
@@ -115,6 +117,11 @@ def ray_source(
     return RaySource(shot, before, behind, seed, side, light, followed, scatter, drawn)
 
 
+def _most_bred(followed: tuple[float, float]) -> Floats:
+    """How many rays one may split off: as many as are wanted, and room; those of high order must die out."""
+    return np.array([max(2.0 * followed[0], MOST_BRED), MOST_BRED])
+
+
 def spectrum_of(
     shot: Shot, gain: float, seed: int, followed: tuple[float, float] = (FOLLOWED, FOLLOWED)
 ) -> tuple[Any, ...]:
@@ -142,7 +149,7 @@ def spectrum_of(
     total = float(packed.reflectance[len(rgb) // 2, :, -1].sum())
     return (
         np.cumsum(chance), (over * rgb) @ luminance_weights(shot.colorspace), over * rgb,
-        min(HEROES, len(rgb)), np.array(followed) / max(total, 1e-9),
+        min(HEROES, len(rgb)), np.concatenate([np.array(followed) / max(total, 1e-9), _most_bred(followed)]),
         np.array([seed & 0xFFFFFFFF, seed >> 32], dtype=np.uint64),
     )  # fmt: skip
 
