@@ -115,7 +115,7 @@ def test_every_flag_reaches_the_project(capsys, projects, folder):
     call(
         capsys, "render", "heliar-tronnier", "--light", "-10,5", "--light", "2,-6", "--intensity", "1", "--intensity",
         "0.5", "--spectrum", "lamp.csv", "--fstop", "8", "--blades", "7", "--rotation", "-5", "--rounding", "0.5",
-        "--iris-image", "iris.png", "--coating", "quarter-wave:550", "--quality", "draft", "--wavelengths", "3",
+        "--iris-image", "iris.png", "--coating", "quarter-wave:550", "--quality", "reference", "--wavelengths", "3",
         "--size", "10x8", "--sensor", "24x18", "--layers", "ghosts", "--brightest", "4", "--colorspace", "acescg",
         "--half", "--paths", "same-side", "--focus", "2000", "--sensor-distance", "82.5", "--no-starburst",
         "--full-windows", "--exposure", "-2", "--view", "filmic", "--threads", "1", "--seed", "5", "--error", "0.1",
@@ -129,7 +129,7 @@ def test_every_flag_reaches_the_project(capsys, projects, folder):
     assert project.iris is not None
     iris = {"blades": 7, "rotation_deg": -5.0, "rounding": 0.5, "mask": "iris.png"}
     assert project.iris.model_dump(include=set(iris)) == iris
-    assert (project.quality.mode, project.quality.wavelengths, project.quality.paths) == ("draft", 3, "same-side")
+    assert (project.quality.mode, project.quality.wavelengths, project.quality.paths) == ("reference", 3, "same-side")
     quality = project.quality
     assert (quality.seed, quality.reference_samples) == (5, 1000)
     assert (quality.orders, quality.order4_limit) == (4, 1e-5)

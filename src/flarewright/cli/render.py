@@ -371,7 +371,13 @@ def render(
         squeeze=squeeze, desqueeze=desqueeze,
     )  # fmt: skip
     settings = build_project(flags)
-    run = _reference_run(settings, output, state, time_limit)
+    only = {
+        "--resume": state, "--time-limit": time_limit, "--error": error, "--error-of": error_of, "--samples": samples,
+        "--rays-from": rays_from,
+    }  # fmt: skip
+    run = _reference_run(
+        settings, output, state, time_limit, [flag for flag, value in only.items() if value is not None]
+    )
     _keep_inputs(settings, project, [output] if no_png else [output, output.with_suffix(".png")])
     try:
         rendering = _render(settings, threads, run, ledger)
@@ -415,18 +421,17 @@ def _read_state(path: Path | None) -> ReferenceState | None:
 
 
 def _reference_run(
-    project: Project, output: Path, state: ReferenceState | None, time_limit: float | None
+    project: Project, output: Path, state: ReferenceState | None, time_limit: float | None, given: list[str]
 ) -> ReferenceRun | None:
     """Check what only reference quality understands; None for the other qualities."""
     if time_limit is not None and not 0.0 < time_limit < float("inf"):
         raise ProjectError(f"--time-limit {time_limit:g} is no time; give seconds above 0")
     if project.quality.mode != "reference":
-        for flag, given in (("--resume", state), ("--time-limit", time_limit)):
-            if given is not None:
-                raise ProjectError(
-                    f"{flag} works with --quality reference only, not with {project.quality.mode}; add it or leave "
-                    f"{flag} out"
-                )
+        for flag in given:
+            raise ProjectError(
+                f"{flag} works with --quality reference only, not with {project.quality.mode}; add it or leave "
+                f"{flag} out"
+            )
         return None
     from ..io.reference_state import SUFFIX
     from ..render.reference import ReferenceRun

@@ -6,14 +6,14 @@ import re
 from itertools import pairwise
 from typing import Annotated
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import AfterValidator, Field, StrictBool, model_validator
 
 from .base import Frozen
 
 _ROW = r"(?:sensor|\d+)"
 SELECTOR = re.compile(
     r"(?P<opposite>not\s+)?"
-    r"(?:(?P<all>all)|row:(?P<row>\d{1,4})|largest:(?P<largest>\d{1,6})|brightest:(?P<brightest>\d{1,6})|"
+    r"(?:(?P<all>all)|row:(?P<row>\d{1,4})|largest:(?P<largest>[1-9]\d{0,5})|brightest:(?P<brightest>[1-9]\d{0,5})|"
     r"bounded:(?P<bounded>stop|entrance)|"
     rf"(?P<names>{_ROW}(?:-{_ROW})+(?:,{_ROW}(?:-{_ROW})+)*))"
 )
@@ -69,7 +69,7 @@ class Rule(Frozen):
     """
 
     select: Selector
-    enable: bool | None = None
+    enable: StrictBool | None = None
     gain: Factor = 1.0
     tint: Colour = (1.0, 1.0, 1.0)
     ramp: tuple[tuple[Factor, Factor, Factor, Factor], ...] = ()
@@ -103,7 +103,7 @@ class Art(Frozen):
         that says `enable` decides.
     """
 
-    physical: bool = False
+    physical: StrictBool = False
     gain: dict[str, Factor] = Field(default_factory=dict)
     rules: tuple[Rule, ...] = ()
 

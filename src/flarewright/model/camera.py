@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from pydantic import Field
+from pydantic import Field, StrictBool
 
 from .base import Frozen
 from .grating import SensorGrating
@@ -46,7 +46,7 @@ class Camera(Frozen):
     sensor_reflectance: float = Field(0.0, ge=0.0, le=1.0)
     sensor_grating: SensorGrating | None = None
     squeeze: float | None = Field(None, ge=0.25, le=4.0)
-    desqueeze: bool = False
+    desqueeze: StrictBool = False
 
     @property
     def sensor(self) -> tuple[float, float]:

@@ -11,7 +11,7 @@ from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, model_validator
+from pydantic import Field, StrictBool, model_validator
 
 from .base import Frozen
 
@@ -140,7 +140,7 @@ class FrameInfo(Frozen):
     nominal_roll_deg: float = 0.0
     light_px: tuple[float, float]
     light_error_px: float = Field(0.0, ge=0.0)
-    light_found: bool = True
+    light_found: StrictBool = True
     axis_px: tuple[float, float]
     exposures_s: tuple[Positive, ...] = ()
     iso: Positive = 100.0

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import Field, WithJsonSchema, field_validator, model_validator
+from pydantic import Field, StrictBool, WithJsonSchema, field_validator, model_validator
 
 from .base import Frozen
 
@@ -168,12 +168,12 @@ class Design(Frozen):
     bounds : Bounds
     """
 
-    own_ghosts: bool = True
+    own_ghosts: StrictBool = True
     wishes: tuple[GhostWish, ...] = ()
     surfaces: int | None = Field(None, ge=2, le=60)
     structure: Literal["any", "lens"] = "any"
     fixed_rows: tuple[int, ...] = ()
-    signed: bool = True
+    signed: StrictBool = True
     weights: Literal["relative", "absolute"] = "relative"
     brightness: Literal["none", "stop", "fresnel"] = "none"
     extra: float = Field(500.0, ge=0.0, le=1e9)

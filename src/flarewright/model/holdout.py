@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pydantic import Field, model_validator
+from pydantic import Field, StrictBool, model_validator
 
 from .base import Frozen
 
@@ -28,7 +28,7 @@ class Holdout(Frozen):
     image: str | None = None
     depth: str | None = None
     depth_unit_mm: float = Field(1000.0, gt=0.0, le=1e9)
-    invert: bool = False
+    invert: StrictBool = False
     overscan: float = Field(1.0, ge=1.0, le=100.0)
 
     @model_validator(mode="after")

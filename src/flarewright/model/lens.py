@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import inf, sqrt
 from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, StrictBool, model_validator
 
 from .base import Frozen
 from .coating import Coating
@@ -69,7 +69,7 @@ class Surface(Frozen):
     thickness: float = Field(0.0, ge=-1000.0, le=10000.0)
     medium: Medium | None = None
     semi_diameter: float | None = Field(None, gt=0.0, le=2000.0)
-    semi_diameter_estimated: bool = False
+    semi_diameter_estimated: StrictBool = False
     coating: Coating | None = None
 
     @property

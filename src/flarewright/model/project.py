@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, StrictBool, field_validator, model_validator
 
 from .art import Art
 from .base import Frozen
@@ -97,7 +97,7 @@ class Quality(Frozen):
 
     mode: Literal["draft", "final", "reference"] = "final"
     wavelengths: int = Field(7, ge=1, le=81)
-    bridge: bool = True
+    bridge: StrictBool = True
     paths: Literal["all", "same-side"] = "all"
     tolerance_px: float = Field(0.25, gt=0.0, le=10.0)
     ringing: Literal["off", "collins", "frft"] = "collins"
@@ -105,7 +105,7 @@ class Quality(Frozen):
     orders: Literal[2, 4] = 2
     order4_limit: float = Field(1e-4, gt=0.0, lt=1.0)
     source_step_deg: float = Field(2.0, ge=0.05, le=60.0)
-    screen: bool = False
+    screen: StrictBool = False
     seed: int = Field(0, ge=0, lt=2**63)
     reference_error: float = Field(0.02, gt=0.0, le=1.0)
     reference_error_of: Literal["total", "blocks"] = "blocks"
@@ -132,7 +132,7 @@ class Output(Frozen):
     brightest: int | None = Field(None, ge=1)
     colorspace: Colorspace = "rec709"
     pixel_type: Literal["half", "float"] = "float"
-    starburst: bool = True
+    starburst: StrictBool = True
 
 
 class Project(Frozen):

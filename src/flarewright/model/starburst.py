@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from pydantic import Field, model_validator
+from pydantic import Field, StrictBool, model_validator
 
 from .base import Frozen
 
@@ -45,7 +45,7 @@ class Dirt(Frozen):
     fingerprint: float = Field(0.0, ge=0.0, le=1.0)
     image: str | None = None
     seed: int = Field(0, ge=0, lt=2**63)
-    in_ghosts: bool = False
+    in_ghosts: StrictBool = False
 
     @model_validator(mode="after")
     def _diameters_rise(self) -> Dirt:
@@ -81,4 +81,4 @@ class Starburst(Frozen):
     size: float = Field(1.0, gt=0.0, le=1000.0)
     intensity: float = Field(1.0, ge=0.0)
     spiral_deg: float = Field(0.0, ge=0.0, le=90.0)
-    cats_eye: bool = False
+    cats_eye: StrictBool = False
