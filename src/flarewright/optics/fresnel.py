@@ -308,15 +308,13 @@ def band_pattern(
     ----------
     grid, areas, shares
         As in `band_intensity`.
-    window : Box
-        The part to keep.
+    window
+        As in `crop`.
 
     Returns
     -------
-    pattern : ndarray, shape (Ky, Kx), float32
-        0 along its border.
-    box : Box
-        What was kept.
+    ndarray, shape (Ky, Kx), float32, and Box
+        What `crop` returns.
     """
     real, imaginary, light = _wave(grid, areas, shares)
     (left, right), (bottom, top) = ranges = _ranges(grid, window)

@@ -81,9 +81,8 @@ def looking(
     entries = [None if way_in is None else find_entry(shot, way_in) for shot in shots]
     rows = _rows(shots)
 
-    def look(path: LightPath, traced: Sequence[Floats | None]) -> list[FinalPass]:
+    def look(path: LightPath, inside: Sequence[Region | None], traced: Sequence[Floats | None]) -> list[FinalPass]:
         changed = art.get(path.name, PLAIN)
-        inside = entries if path.entry is not None else [None] * len(shots)
         found: dict[int, FinalPass | None] = {}
 
         def at(k: int, around: Floats | None = None) -> FinalPass | None:
@@ -99,11 +98,12 @@ def looking(
         return [item for item in map(at, range(len(shots))) if item is not None]
 
     def look_at_all(group: Sequence[LightPath]) -> list[list[FinalPass]]:
+        # of one first mirror: all come in the same way
         inside = entries if group[0].entry is not None else [None] * len(shots)
         traced: list[Sequence[Floats | None]] = [[None] * len(group)] * len(shots)
         if len(group) > 1 and len(shots) < MANY:
             traced = [_first_look(shot, group, entry, quick) for shot, entry in zip(shots, inside, strict=True)]
-        return [look(path, [of_shot[k] for of_shot in traced]) for k, path in enumerate(group)]
+        return [look(path, inside, [of_shot[k] for of_shot in traced]) for k, path in enumerate(group)]
 
     return look_at_all
 
