@@ -9,8 +9,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernels.measure_edges import sum_along_rows, sum_changes_along_rows
+from ..kernels.measure_edges import sum_along_rows
 from ..kernels.measure_mesh import draw_with_changes, window_of
+from ..kernels.measure_normal import normal_equations
 from ..kernels.measure_pupil import DISC_NUMBERS, FIRST_DISC, FIRST_G, FIRST_I, SOFT
 from .normal import inverse, solution
 from .numbers import NUMBERS, Floats
@@ -190,14 +191,10 @@ def evaluate(
         total = weight.sum()
     cost = float((weight * residual**2).sum())
     count = int(np.count_nonzero(weight))
-    if not free.size:
-        return cost, count, np.zeros((0, 0)), np.zeros(0)
-    sum_changes_along_rows(changes)
-    jacobian = changes[:, :width].reshape(height * width, free.size)
-    weighted = jacobian * weight.reshape(-1, 1)
-    matrix, side = weighted.T @ jacobian, weighted.T @ residual.ravel()
+    matrix, side, mean = np.empty((free.size, free.size)), np.empty(free.size), np.empty(free.size)
+    if free.size:
+        normal_equations(changes, weight, residual, matrix, side, mean)
     if offset and total > 0.0:
-        mean = weighted.sum(axis=0)
         matrix -= np.outer(mean, mean) / total
     return cost, count, matrix, side
 

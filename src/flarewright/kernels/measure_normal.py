@@ -1,0 +1,74 @@
+"""Normal equations of a drawn picture's fit, straight from differences along rows.
+
+Small products by the thousand, in threads: a library that starts threads of its own for each costs several times the
+work, and its sums change with the number of threads.
+"""
+
+import numpy as np
+
+from ._jit import compiled, inner
+
+# pixels whose products are summed at once: the matrix is read and written once for all of them
+_TOGETHER = 8
+
+
+@compiled
+def normal_equations(changes, weight, residual, matrix, side, mean):
+    """Sum J' W J, J' W r and J' W 1 over pixels.
+
+    Parameters
+    ----------
+    changes : ndarray, shape (H, W + 1, Q), float64
+        Differences along rows of the derivatives J, as `draw_with_changes` fills them.
+    weight, residual : ndarray, shape (H, W), float64
+        W, at least 0, and r.
+    matrix : ndarray, shape (Q, Q), float64
+        Filled.
+    side, mean : ndarray, shape (Q,), float64
+        Filled: J' W r and J' W 1.
+    """
+    count = matrix.shape[0]
+    here = np.empty(count)
+    rows, weighted = np.empty((_TOGETHER, count)), np.empty((_TOGETHER, count))
+    matrix[:] = 0.0
+    side[:] = 0.0
+    mean[:] = 0.0
+    held = 0
+    for y in range(weight.shape[0]):
+        here[:] = 0.0
+        for x in range(weight.shape[1]):
+            for q in range(count):
+                here[q] += changes[y, x, q]
+            w = weight[y, x]
+            if w == 0.0:
+                continue
+            r = residual[y, x]
+            for q in range(count):
+                light = w * here[q]
+                rows[held, q] = here[q]
+                weighted[held, q] = light
+                side[q] += light * r
+                mean[q] += light
+            held += 1
+            if held == _TOGETHER:
+                _add_products(rows, weighted, matrix)
+                held = 0
+    rows[held:] = 0.0
+    weighted[held:] = 0.0
+    _add_products(rows, weighted, matrix)
+    for a in range(count):
+        for b in range(a):
+            matrix[a, b] = matrix[b, a]
+
+
+@inner
+def _add_products(rows, weighted, matrix):
+    """Add the products of `_TOGETHER` pixels to the matrix' upper triangle."""
+    count = matrix.shape[0]
+    for a in range(count):
+        w0, w1, w2, w3 = weighted[0, a], weighted[1, a], weighted[2, a], weighted[3, a]
+        w4, w5, w6, w7 = weighted[4, a], weighted[5, a], weighted[6, a], weighted[7, a]
+        for b in range(a, count):
+            first = (w0 * rows[0, b] + w1 * rows[1, b]) + (w2 * rows[2, b] + w3 * rows[3, b])
+            second = (w4 * rows[4, b] + w5 * rows[5, b]) + (w6 * rows[6, b] + w7 * rows[7, b])
+            matrix[a, b] += first + second
