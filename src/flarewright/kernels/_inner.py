@@ -7,17 +7,17 @@ is optimised and translated again. Of a kernel that nothing else calls, that fir
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, ClassVar
 
 from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler import CompilerBase, DefaultPassBuilder
 from numba.core.compiler_machinery import register_pass
 from numba.core.typed_passes import NativeLowering
+
+from ._compiler import KernelCompiler
 
 # Numba's stubs do not know these
 _Library: Any = JITCodeLibrary
 _Lowering: Any = NativeLowering
-_Compiler: Any = CompilerBase
 
 
 class _LinkedLibrary(_Library):  # type: ignore[misc]
@@ -53,12 +53,7 @@ class _LinkedLowering(_Lowering):  # type: ignore[misc]
         return True
 
 
-class InnerCompiler(_Compiler):  # type: ignore[misc]
-    """Numba's compiler with its last pass exchanged."""
+class InnerCompiler(KernelCompiler):
+    """Our compiler with its last pass exchanged."""
 
-    def define_pipelines(self) -> list[Any]:
-        """Return Numba's passes, `_LinkedLowering` in the place of its own."""
-        passes = DefaultPassBuilder.define_nopython_pipeline(self.state)
-        passes.passes = [(_LinkedLowering if one is NativeLowering else one, told) for one, told in passes.passes]
-        passes.finalize()
-        return [passes]
+    exchanged: ClassVar[dict[Any, Any]] = {**KernelCompiler.exchanged, NativeLowering: _LinkedLowering}

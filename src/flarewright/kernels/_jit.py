@@ -16,21 +16,23 @@ _FASTMATH = {"contract", "reassoc", "arcp", "nsz", "afn"}
 _njit: Any = njit
 # nothing takes a kernel's address, and calls from other kernels do not need it
 _OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": _FASTMATH, "no_cfunc_wrapper": True}
+_ROOT: dict[str, Any] = {}
 _INNER: dict[str, Any] = {"no_cpython_wrapper": True}
 # with another Numba its own compiler makes the same code, later
 with suppress(ImportError, AttributeError):
+    from ._compiler import KernelCompiler
     from ._inner import InnerCompiler
 
-    _INNER = {"pipeline_class": InnerCompiler}
+    _ROOT, _INNER = {"pipeline_class": KernelCompiler}, {"pipeline_class": InnerCompiler}
 
 
 def compiled(function: Callable[..., Any]) -> Any:
     """Compile a kernel that Python calls."""
     try:
-        return _njit(function, cache=True, **_OPTIONS)
+        return _njit(function, cache=True, **_ROOT, **_OPTIONS)
     except RuntimeError:
         # no folder to cache in can be written: every run compiles
-        return _njit(function, **_OPTIONS)
+        return _njit(function, **_ROOT, **_OPTIONS)
 
 
 def inner(function: Callable[..., Any], **options: Any) -> Any:
