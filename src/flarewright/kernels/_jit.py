@@ -26,13 +26,28 @@ with suppress(ImportError, AttributeError):
     _ROOT, _INNER = {"pipeline_class": KernelCompiler}, {"pipeline_class": InnerCompiler}
 
 
+def _as_numba_does(_: Any) -> None:
+    """Leave to Numba how it loads a kernel."""
+
+
+_load: Callable[[Any], None] = _as_numba_does
+with suppress(ImportError, AttributeError, KeyError):
+    from ._cached import load_lightly
+
+    _load = load_lightly
+
+
 def compiled(function: Callable[..., Any]) -> Any:
     """Compile a kernel that Python calls."""
     try:
-        return _njit(function, cache=True, **_ROOT, **_OPTIONS)
+        kernel = _njit(function, cache=True, **_ROOT, **_OPTIONS)
     except RuntimeError:
         # no folder to cache in can be written: every run compiles
         return _njit(function, **_ROOT, **_OPTIONS)
+    # plain Python where Numba does not compile
+    if hasattr(kernel, "_cache"):
+        _load(kernel)
+    return kernel
 
 
 def inner(function: Callable[..., Any], **options: Any) -> Any:
