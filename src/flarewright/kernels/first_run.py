@@ -77,6 +77,20 @@ ROOTS = {
         "i8[::1], i8[::1], f8[::1], f8[::1], f8[::1], f8[::1], f8, f8, f8, f8[::1], f8[::1], f8[:,:,::1]",
         0.6,
     ),
+    "seen": ("standing.seen_rays", "f8[:,::1], f8, f8[:,::1], f8, f8", 0.2),
+    "standing": ("standing.standing_rays", "f8[:,::1], i8[:,::1], b1[::1], i8, i8", 0.2),
+    "traced mirrors": (
+        "standing.traced_squares",
+        "i8[::1], i8[::1], f8[::1], f8[::1], f8[::1], f8[::1], f8, f8, f8, f8[::1], f8[::1], f8[:,::1]",
+        0.7,
+    ),
+    "shifts": ("standing.wide_shift", "f8[:,::1], f8[:,::1], f8, f8, f8", 0.3),
+    "path curves": (
+        "path_curves.multiply_mirrors",
+        "f8[:,:,::1], f8[:,::1], i8[:,::1], i8[::1], f8[:,:,::1], f8[:,::1]",
+        0.4,
+    ),
+    "bends": ("path_curves.compare_with_lines", "f8[:,::1], f8[:,::1], f8[:,::1], f8, f8[:,::1]", 0.3),
     "scatter": (
         "scatter.gather_scatter",
         "f8[::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[:,::1], f8, UniTuple(i8, 4), f8[:,:,::1], f8[:,::1], "

@@ -28,7 +28,7 @@ from .shapes import hit_shapes
 
 __all__ = [
     "ALIVE", "KEEP", "LAND", "LANES", "REFLECT", "REFRACT", "REL", "STOP", "STOP_X", "WEIGHT", "X", "Y", "bend",
-    "trace_hits", "trace_lanes", "trace_nodes",
+    "hit_rays", "trace_hits", "trace_lanes", "trace_nodes",
 ]  # fmt: skip
 
 
@@ -259,8 +259,8 @@ def trace_nodes(
     )
 
 
-@compiled
-def trace_hits(rows, actions, curvature, conic, z_vertex, n_gap, sensor_z, tilt, nearness, px, py, hits):
+@inner
+def hit_rays(rows, actions, curvature, conic, z_vertex, n_gap, sensor_z, tilt, nearness, px, py, hits):
     """Trace rays like `trace_lanes` and keep every hit: for drawings and for the size of surfaces.
 
     Parameters
@@ -312,3 +312,9 @@ def trace_hits(rows, actions, curvature, conic, z_vertex, n_gap, sensor_z, tilt,
             t = (sensor_z - z) / dz
             last = rows.shape[0] + 1
             hits[k, last, 0], hits[k, last, 1], hits[k, last, 2] = x + t * dx, y + t * dy, sensor_z
+
+
+@compiled
+def trace_hits(rows, actions, curvature, conic, z_vertex, n_gap, sensor_z, tilt, nearness, px, py, hits):
+    """Trace rays as `hit_rays` does, for Python; kernels call that."""
+    hit_rays(rows, actions, curvature, conic, z_vertex, n_gap, sensor_z, tilt, nearness, px, py, hits)

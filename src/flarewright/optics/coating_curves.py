@@ -14,7 +14,8 @@ from functools import cached_property, lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernels.trace import REFLECT, trace_hits
+from ..kernels.path_curves import compare_with_lines, multiply_mirrors
+from ..kernels.standing import traced_squares
 from ..model import Coating, Lens, Stop
 from .coatings import film_stack, stack_reflectance
 from .pack import PackedLens, SensorMirror
@@ -130,19 +131,10 @@ def passed(curves: CoatingCurves, paths: Sequence[LightPath], squares: Floats) -
     Mirrors reflect at the rays' angles; the many surfaces that are passed, whose part in the colour is small, transmit
     as at normal incidence.
     """
-    mirrors = np.array([path.mirrors for path in paths], dtype=np.intp).reshape(len(paths), -1)
-    before = curves.log_through
-    log = before[[path.rows[-1] + 1 for path in paths]]
-    for k, row in enumerate(mirrors.T):
-        # light goes forth as far as every other mirror and comes back as far as the one between; neither is passed
-        log += 2.0 * before[row] if k % 2 == 0 else -2.0 * before[row + 1]
-    place = np.clip(squares, 0.0, 1.0) * (SQUARES - 1)
-    cell = np.minimum(place.astype(np.intp), SQUARES - 2)
-    part = (place - cell)[..., None]
-    row = mirrors[:, None, :]
-    low, high = curves.reflectance[row, cell], curves.reflectance[row, cell + 1]
-    reflected: Floats = (low + part * (high - low)).prod(axis=2).mean(axis=1)
-    through: Floats = reflected * np.exp(log)
+    mirrors = np.array([path.mirrors for path in paths], dtype=np.int64).reshape(len(paths), -1)
+    ends = np.array([path.rows[-1] + 1 for path in paths], dtype=np.int64)
+    through = np.empty((len(paths), len(CURVE_NM)))
+    multiply_mirrors(curves.reflectance, curves.log_through, mirrors, ends, np.ascontiguousarray(squares), through)
     return through
 
 
@@ -163,10 +155,8 @@ def bends(through: Floats, traced_nm: Floats) -> Floats:
         the table.
     """
     at_traced, joined = _straight(tuple(traced_nm))
-    # not `@`: its library's threads wait busily beside ours
-    line = np.einsum("pw,wl->pl", np.einsum("pl,lw->pw", through, at_traced), joined)
-    dark = line <= 1e-9 * through.max(axis=1, keepdims=True)
-    bend: Floats = np.where(dark, 1.0, np.minimum(through / np.where(dark, 1.0, line), MOST_BEND))
+    bend = np.empty_like(through)
+    compare_with_lines(through, at_traced, joined, MOST_BEND, bend)
     return bend
 
 
@@ -195,25 +185,11 @@ def mirror_squares_traced(packed: PackedLens, path: LightPath, tilt: float, poin
     ndarray, shape (N, M)
         Squared sines on the side of the lower index, at the middle traced wavelength; 1 under total reflection. Only
         of the rays that reach the sensor's plane, so there may be fewer.
-
-    Notes
-    -----
-    A mirror turns a ray's direction by twice the cosine along its normal: |d' - d| = 2 cos.
     """
     n = packed.n_gap[len(packed.n_gap) // 2]
-    hits = np.empty((len(points), len(path.rows) + 2, 3))
-    trace_hits(
+    squares = np.empty((len(points), len(path.mirrors)))
+    count = traced_squares(
         path.rows, path.actions, packed.curvature, packed.form, packed.z_vertex, n, packed.sensor_z, tilt,
-        packed.nearness, np.ascontiguousarray(points[:, 0]), np.ascontiguousarray(points[:, 1]), hits,
+        packed.nearness, np.ascontiguousarray(points[:, 0]), np.ascontiguousarray(points[:, 1]), squares,
     )  # fmt: skip
-    # a ray that ends has no place from there on
-    hits = hits[np.isfinite(hits[:, -1]).all(axis=1)]
-    steps = np.flatnonzero(path.actions == REFLECT)
-    legs = hits[:, steps[:, None] + [1, 2]] - hits[:, steps[:, None] + [0, 1]]
-    legs /= np.sqrt((legs**2).sum(axis=3, keepdims=True))
-    cosine2 = 0.25 * ((legs[:, :, 1] - legs[:, :, 0]) ** 2).sum(axis=2)
-    rows = path.rows[steps]
-    forward = np.arange(len(steps)) % 2 == 0
-    n_in, n_out = np.where(forward, n[rows], n[rows + 1]), np.where(forward, n[rows + 1], n[rows])
-    squares: Floats = np.clip((1.0 - cosine2) * np.maximum(n_in / n_out, 1.0) ** 2, 0.0, 1.0)
-    return squares
+    return squares[:count]

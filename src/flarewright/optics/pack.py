@@ -94,7 +94,20 @@ class PackedLens:
         """The same for paths of four reflections: fourth root of the mean of R^4 (Hoelder)."""
         return np.asarray(np.mean(self.reflectance**4, axis=0) ** 0.25)
 
-    @property
+    @cached_property
+    def fitted(self) -> tuple[list[int], NDArray[np.float64], NDArray[np.float64]]:
+        """The wavelengths that stand for all, the ends and the middle one, rising, and their `n_gap` and `reflectance`.
+
+        Grids of all paths are traced at these: the tables are large, and to pick them out anew for each takes as long
+        as to trace some cells.
+        """
+        last = len(self.wavelengths_nm) - 1
+        waves = sorted({0, last // 2, last})
+        if len(waves) == last + 1:
+            return waves, self.n_gap, self.reflectance
+        return waves, self.n_gap[waves], self.reflectance[waves]
+
+    @cached_property
     def first_surface(self) -> int:
         """Row of the first surface; the stop may stand in front of it."""
         return int(np.flatnonzero(self.inv_semi)[0])

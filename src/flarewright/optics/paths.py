@@ -53,7 +53,7 @@ class LightPath:
         last = max(self.mirrors) if self.sensor else None
         return "-".join("sensor" if row == last else str(row) for row in self.mirrors)
 
-    @property
+    @cached_property
     def steps(self) -> NDArray[np.int64]:
         """Rows and actions, shape (2, S)."""
         return np.stack([self.rows, self.actions])

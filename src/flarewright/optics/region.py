@@ -33,9 +33,10 @@ _UNTRACED = np.empty((0, STOP_X))
 
 def tracing_arguments(packed: PackedLens, w: int | list[int], path: LightPath, tilt: float) -> Any:
     """List what every tracing kernel takes first."""
-    if w == list(range(len(packed.wavelengths_nm))):
-        # a list would copy them
-        return _listed(packed, packed.n_gap, packed.reflectance, path, tilt)
+    if isinstance(w, list):
+        waves, n_gap, reflectance = packed.fitted
+        if w == waves:
+            return _listed(packed, n_gap, reflectance, path, tilt)
     return _listed(packed, packed.n_gap[w], packed.reflectance[w], path, tilt)
 
 
@@ -171,8 +172,9 @@ def find_region(
         (*_looking_arguments(packed, w, path, tilt), *limits)
         for w in wavelengths_fitted(packed)[: 1 if quick else None]
     ]
-    finest = _finest(packed, front_box(packed, tilt))
-    box, cells = _looked_at(packed, tilt, within, quick)
+    front = front_box(packed, tilt)
+    finest = _finest(packed, front)
+    box, cells = _looked_at(packed, front, within, quick)
     whole = True
     held = np.array([np.inf, -np.inf, np.inf, -np.inf])
     for _ in range(4):
@@ -194,16 +196,16 @@ def find_region(
             held = join_boxes(held, spots)
         found = join_boxes(found, held)
         shrunk = _area(found) < 0.3 * _area(box)
-        roomy = _with_room(found, box, cells)
+        roomy = _with_room(found, box, cells) if quick else found
         box, cells, whole = found, cells_across(packed, FINER), False
         if not shrunk:
             break
-    return _region(roomy if quick else box, sums)
+    return _region(roomy, sums)
 
 
-def _looked_at(packed: PackedLens, tilt: float, within: Floats | None, quick: bool) -> tuple[Floats, tuple[int, int]]:
+def _looked_at(packed: PackedLens, front: Floats, within: Floats | None, quick: bool) -> tuple[Floats, tuple[int, int]]:
     """Return the part of the front that is looked at first, and its cells."""
-    box, cells = front_box(packed, tilt), cells_across(packed, PREPASS_QUICK if quick else PREPASS)
+    box, cells = front, cells_across(packed, PREPASS_QUICK if quick else PREPASS)
     if within is None:
         return box, cells
     # as dense as on the whole front
@@ -231,7 +233,7 @@ def first_look(
     ndarray, shape (P, N, 5 + 2 C)
         For each path, C the most crossings of the stop among them.
     """
-    box, cells = _looked_at(packed, tilt, within, quick)
+    box, cells = _looked_at(packed, front_box(packed, tilt), within, quick)
     x, y = (box[2 * k] + np.arange(cells[k] + 1) * ((box[2 * k + 1] - box[2 * k]) / cells[k]) for k in (0, 1))
     px, py = np.repeat(x, len(y)), np.tile(y, len(x))
     data = np.empty((len(paths), len(px), STOP_X + 2 * max(path.stop_crossings for path in paths)))

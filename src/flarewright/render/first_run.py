@@ -38,8 +38,9 @@ def compile_for_render(project: Project, threads: int | None = None) -> None:
     names = [*_TRACING, *scattering]
     if project.quality.mode == "final":
         names += ["draw" if iris.mask is None else "draw masked", "densities", "pixels", "double"]
-        if coated and not scattering:
-            names += ["hits"]
+        names += ["shifts"] if project.quality.bridge and project.quality.wavelengths > 1 else []
+        if coated and project.quality.bridge and project.quality.wavelengths > 1:
+            names += ["seen", "standing", "traced mirrors", "path curves", "bends"]
         # wide open, and with lights that have a size, rings are rarely seen: then it is compiled when it is called
         if (
             project.quality.ringing != "off"
@@ -53,7 +54,7 @@ def compile_for_render(project: Project, threads: int | None = None) -> None:
         from .ghosts import CROWD
 
         names += ["matrices", "path matrices", "row sums"]
-        names += ["mirrors"] if coated else []
+        names += ["mirrors", "path curves", "bends"] if coated else []
         if len(ghost_paths(settled.lens, project.quality.paths)) * len(project.lights) >= CROWD:
             names += ["ghosts' light"]
     if project.output.starburst:

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..kernels.bundle import draw_bundle, measure_bundle, node_densities
+from ..kernels.standing import wide_shift
 from ..kernels.trace import ALIVE, REL, STOP_X, X, Y
 from ..model import Quality
 from ..optics.border import mapped, points
@@ -432,22 +433,9 @@ def _bridges(
     most = min(MOST_BRIDGES, max(1, int(visibility / STEP_CONTRAST))) if visibility < float("inf") else MOST_BRIDGES
     if most == 1:
         return [1] * (len(traced) - 1)
-    pieces = []
-    for short, long in pairwise(traced):
-        passing = (short[:, ALIVE] * long[:, ALIVE] > 0.0) & (np.minimum(short[:, REL], long[:, REL]) <= 1.0)
-        # what a ray that ended holds may be infinite
-        with np.errstate(over="ignore", invalid="ignore"):
-            for column in range(STOP_X, short.shape[1], 2):
-                passing &= short[:, column] ** 2 + short[:, column + 1] ** 2 <= iris_radius**2
-        nodes = np.flatnonzero(passing)
-        x, y = short[nodes, X], short[nodes, Y]
-        across, along = long[nodes, X] - x, long[nodes, Y] - y
-        shift = (across * across + along * along)[x * x + y * y <= view_radius**2]
-        # the few nodes that fly farthest carry hardly any light
-        far = int(SHIFT_QUANTILE * (shift.size - 1))
-        wide = sqrt(np.partition(shift, far)[far]) * scale if shift.size else 0.0
-        pieces.append(min(max(ceil(wide / step_px), 1), most))
-    return pieces
+    # the few nodes that fly farthest carry hardly any light
+    gaps = [wide_shift(short, long, iris_radius, view_radius, SHIFT_QUANTILE) for short, long in pairwise(traced)]
+    return [min(max(ceil(gap * scale / step_px), 1), most) for gap in gaps]
 
 
 def _between(short: Floats, long: Floats, part: float) -> Floats:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernels.trace import ALIVE, REL, STOP_X, X, Y
+from ..kernels.standing import seen_rays, standing_rays
 from ..model import Lens
 from ..optics.bundle import Bundle
 from ..optics.coating_curves import CURVE_NM, bends, mirror_squares_traced, passed
@@ -48,7 +48,7 @@ def traced_bend(shot: Shot, path: LightPath, bundle: Bundle, to_pixels: Floats) 
     middle = held[len(held) // 2]
     chosen = spread_rays(bundle, (middle,), seen_of(shot, to_pixels), RAYS)
     if chosen.size == 0:
-        chosen = spread_rays(bundle, (middle,), lambda rays: _passes(rays, shot.opening.radius), RAYS)
+        chosen = spread_rays(bundle, (middle,), _anywhere(shot.opening.radius), RAYS)
     if chosen.size == 0:
         return None
     squares = mirror_squares_traced(shot.packed, path, shot.incidence.tilt, bundle.pupil[chosen])
@@ -78,19 +78,11 @@ def spread_rays(
         Nodes of the bundle, spread evenly over the pupil's area: a node comes as often as its triangles are large, for
         the grid is fine at rims and folds. Empty where none passes.
     """
-    triangles = bundle.triangles[:: max(1, len(bundle.triangles) // TRIANGLES)]
-    nodes = triangles.ravel()
-    x, y = bundle.pupil[nodes].T.reshape(2, -1, 3)
-    x, y = x[:, 1:] - x[:, :1], y[:, 1:] - y[:, :1]
-    share = np.repeat(np.abs(x[:, 0] * y[:, 1] - y[:, 0] * x[:, 1]), 3)
+    passing = np.ones(len(bundle.pupil), dtype=np.bool_)
     for w in waves:
-        rays = bundle.traced[w]
-        # a node belongs to some six triangles: it is asked once where that is less to ask
-        share *= passes(rays)[nodes] if len(rays) < nodes.size else passes(rays[nodes])
-    reached = np.cumsum(share)
-    if reached.size == 0 or not reached[-1] > 0.0:
-        return np.empty(0, dtype=np.intp)
-    chosen: NDArray[np.intp] = nodes[np.searchsorted(reached, (np.arange(count) + 0.5) / count * reached[-1])]
+        passing &= passes(bundle.traced[w])
+    step = max(1, len(bundle.triangles) // TRIANGLES)
+    chosen: NDArray[np.intp] = standing_rays(bundle.pupil, bundle.triangles, passing, step, count)
     return chosen
 
 
@@ -108,14 +100,32 @@ def seen_of(shot: Shot, to_pixels: Floats) -> Callable[[Floats], Bools]:
     callable
         From rays as in `optics.bundle.trace_points`, shape (N, 5 + 2 C), to a mask of shape (N,).
     """
-    width, height = shot.size_px
+    width, height = (float(side) for side in shot.size_px)
+    iris_radius, place = shot.opening.radius, np.empty((2, 3))
+    place[:, 0], place[:, 1:] = to_pixels[:2], _turned(shot, to_pixels)
 
     def seen(rays: Floats) -> Bools:
-        column, row = places_of(shot, to_pixels, rays[:, X], rays[:, Y])
-        lands = (column >= 0.0) & (column < width) & (row >= 0.0) & (row < height)
-        return np.asarray(_passes(rays, shot.opening.radius) & lands)
+        mask: Bools = seen_rays(rays, iris_radius, place, width, height)
+        return mask
 
     return seen
+
+
+def _anywhere(iris_radius: float) -> Callable[[Floats], Bools]:
+    """Tell which traced rays pass, wherever they land."""
+
+    def passes(rays: Floats) -> Bools:
+        mask: Bools = seen_rays(rays, iris_radius, np.zeros((2, 3)), np.inf, np.inf)
+        return mask
+
+    return passes
+
+
+def _turned(shot: Shot, to_pixels: Floats) -> Floats:
+    """Tell how columns and rows grow with x and y in the meridional frame, shape (2, 2), pixels per mm."""
+    # the upright picture is the meridional frame's, turned and upside down
+    turned: Floats = (-shot.incidence.axes * [to_pixels[2], -to_pixels[3]]).T
+    return turned
 
 
 def places_of(shot: Shot, to_pixels: Floats, x: Floats, y: Floats) -> tuple[Floats, Floats]:
@@ -133,18 +143,8 @@ def places_of(shot: Shot, to_pixels: Floats, x: Floats, y: Floats) -> tuple[Floa
     -------
     columns, rows : ndarray
     """
-    # the upright picture is the meridional frame's, turned and upside down
-    turned = (-shot.incidence.axes * [to_pixels[2], -to_pixels[3]]).T
+    turned = _turned(shot, to_pixels)
     return to_pixels[0] + turned[0, 0] * x + turned[0, 1] * y, to_pixels[1] + turned[1, 0] * x + turned[1, 1] * y
-
-
-def _passes(rays: Floats, iris_radius: float) -> Bools:
-    passing = (rays[:, ALIVE] > 0.0) & (rays[:, REL] <= 1.0)
-    # what a ray that ended holds may be infinite
-    with np.errstate(over="ignore", invalid="ignore"):
-        for column in range(STOP_X, rays.shape[1], 2):
-            passing &= rays[:, column] ** 2 + rays[:, column + 1] ** 2 <= iris_radius**2
-    return np.asarray(passing)
 
 
 def direct_bend(shot: Shot, lens: Lens) -> Floats | None:
