@@ -21,13 +21,12 @@ from .pattern import (
     PER_MM_X,
     PER_MM_Y,
     PICTURE,
-    PLACE_COLUMNS,
     ROWS,
     TABLE_COLUMNS,
-    TOGETHER,
     U_LOW,
     WAY,
     pattern_value,
+    room_to_weave,
 )
 from .raster import fill_polygon, plane_size
 
@@ -55,12 +54,12 @@ def mask_value(mask, half, u, v):
 @inner
 def mask_texture(mask, crossings, width):
     """Return what `fill_polygon` takes as its texture, for a picture so many pixels wide."""
-    wide = width + TOGETHER
-    return (
-        mask[0], np.zeros((crossings, TABLE_COLUMNS)), np.empty((0, 2)), np.zeros((crossings, PLACE_COLUMNS)),
-        np.zeros(wide, dtype=np.float32), np.zeros(wide, dtype=np.int32), np.zeros(wide, dtype=np.float32),
-        np.zeros(wide, dtype=np.float32),
-    )  # fmt: skip
+    places, light, where, beside, below = room_to_weave(crossings, width)
+    table = np.empty((crossings, TABLE_COLUMNS))
+    for k in range(crossings):
+        for m in range(TABLE_COLUMNS):
+            table[k, m] = 0.0
+    return mask[0], table, np.empty((0, 2)), places, light, where, beside, below
 
 
 @borrowing

@@ -4,7 +4,7 @@ from math import sqrt
 
 import numpy as np
 
-from ._jit import borrowing, inlined
+from ._jit import borrowing, inlined, inner
 from .vectors import LANES, multiply_between, multiply_taken
 
 # columns of a table of patterns, one row a crossing of the stop; lengths in mm, places as seen from the middle
@@ -192,6 +192,22 @@ def _near_corner(table, corners, k, blade, stops, count):
     return False
 
 
+@inner
+def room_to_weave(crossings, width):
+    """Return places, and light, where, beside and below, for `weave` in a picture so many pixels wide; all 0."""
+    wide = width + TOGETHER
+    places = np.empty((crossings, PLACE_COLUMNS))
+    light, where = np.empty(wide, dtype=np.float32), np.empty(wide, dtype=np.int32)
+    beside, below = np.empty(wide, dtype=np.float32), np.empty(wide, dtype=np.float32)
+    # loops compile in a tenth of what Numba's own zeros take
+    for k in range(crossings):
+        for m in range(PLACE_COLUMNS):
+            places[k, m] = 0.0
+    for m in range(wide):
+        light[m], where[m], beside[m], below[m] = 0.0, 0, 0.0, 0.0
+    return places, light, where, beside, below
+
+
 @inlined
 def weave(patterns, table, corners, places, light, where, beside, below, row, first, last):
     """Multiply the patterns at the centres of a row's pixels from `first` to `last`.
@@ -288,7 +304,8 @@ def weave(patterns, table, corners, places, light, where, beside, below, row, fi
             for m in range(count):
                 u = min(max(u0 + du * np.float32(m), u_low), u_high)
                 v = min(max(v0 + dv * np.float32(m), v_low), v_high)
-                light[begin + np.uint64(m)] *= pattern_value(patterns, table, corners, k, u, v)
+                # as other callers hand them over, for one compiled look-up
+                light[begin + np.uint64(m)] *= pattern_value(patterns, table, corners, k, np.float64(u), np.float64(v))
         if way in (ON_EDGE, ROUND):
             for m in range(0, count, LANES):
                 multiply_taken(light, begin + np.uint64(m), patterns, where, m)

@@ -22,12 +22,11 @@ from .pattern import (
     FINE,
     ON_EDGE,
     OPEN,
-    PLACE_COLUMNS,
-    TOGETHER,
     WAY,
     is_dark,
     pattern_value,
     place_in_pattern,
+    room_to_weave,
 )
 from .raster import add_to_pixel, fill_polygon, plane_size
 from .trace import STOP_X
@@ -65,12 +64,11 @@ def draw_ringing(
     corner, stops = np.empty((3, 3)), np.empty((crossings, _MOST, 2))
     spots, blocked = np.empty((pupil.shape[0], 2)), np.empty(pupil.shape[0], dtype=np.int64)
     deep = np.empty(pupil.shape[0], dtype=np.bool_)
-    places, no_blades = np.zeros((crossings, PLACE_COLUMNS)), np.empty((0, 4))
-    wide = width + TOGETHER
-    texture = (
-        patterns, table, corners, places, np.zeros(wide, dtype=np.float32), np.zeros(wide, dtype=np.int32),
-        np.zeros(wide, dtype=np.float32), np.zeros(wide, dtype=np.float32),
-    )  # fmt: skip
+    no_blades = np.empty((0, 4))
+    places, light, where, beside, below = room_to_weave(crossings, width)
+    texture = patterns, table, corners, places, light, where, beside, below
+    # a number of its own kind: with the constant, what it is handed to is compiled once more
+    three = np.int64(3)
     pixel_area = to_pixels[2] * to_pixels[3]
     for half in range(halves):
         mirror = 1.0 - 2.0 * half
@@ -123,7 +121,7 @@ def draw_ringing(
                 _place_in_stop(data, triangles, t, mirror, axes, stops)
                 dark = False
                 for k in range(crossings):
-                    dark = dark or is_dark(table, corners, k, stops[k], 3)
+                    dark = dark or is_dark(table, corners, k, stops[k], three)
                 if dark:
                     continue
                 flux, area = _triangle_flux(data, pupil, a, b, c)
@@ -192,7 +190,7 @@ def _place_in_stop(data, triangles, t, mirror, axes, stops):
 @borrowing
 def _gather_stops(data, triangles, start, end, mirror, axes, stops):
     """Fill in where a cell's middle and the nodes around it cross the stop."""
-    _put_in_stop(data, triangles[start, 0], mirror, axes, stops, 0)
+    _put_in_stop(data, triangles[start, 0], mirror, axes, stops, np.int64(0))
     for t in range(start, end):
         _put_in_stop(data, triangles[t, 1], mirror, axes, stops, t - start + 1)
 
@@ -204,7 +202,7 @@ def _places_over_triangle(corner, stops, table, corners, places):
     x2, y2 = corner[2, 0] - corner[0, 0], corner[2, 1] - corner[0, 1]
     inverse = 1.0 / (x1 * y2 - x2 * y1)
     for k in range(places.shape[0]):
-        places[k, WAY] = place_in_pattern(table, corners, k, stops[k], 3)
+        places[k, WAY] = place_in_pattern(table, corners, k, stops[k], np.int64(3))
         for q in range(2):
             d0, d1, d2 = stops[k, 0, q], stops[k, 1, q], stops[k, 2, q]
             gx, gy = slope_over(x1, y1, x2, y2, inverse, d1 - d0, d2 - d0)
