@@ -4,9 +4,15 @@ import numpy as np
 import pytest
 
 from flarewright.editor.files import project_for_lens
+from flarewright.kernels.bundle import measure_bundle
 from flarewright.model import Camera, Output
+from flarewright.optics.bundle import trace_bundle, trace_grid
+from flarewright.optics.paths import ghost_paths
 from flarewright.render.display import auto_exposure, view
+from flarewright.render.ghosts_final import find_final
+from flarewright.render.prepare import settle
 from flarewright.render.render import render
+from flarewright.render.shot import make_opening, make_shots
 
 
 @pytest.mark.parametrize("lens", ["tessar-brendel", "nikkor-85-f1.4"])
@@ -28,3 +34,29 @@ def test_what_a_screen_shows_is_the_whole_picture(lens):
     assert np.percentile(apart, 99.0) <= 3
     # and it is another picture, not the same one
     assert apart.any()
+
+
+def test_a_coarse_grid_holds_the_light_of_a_fine_one():
+    """Of fewer nodes where a ghost is small or faint, for a rim is halved only where its error asks for it."""
+    settled = settle(project_for_lens("tessar-brendel").replace(camera=Camera(size_px=(240, 135))))
+    shot = make_shots(settled, make_opening(settled, None))[0]
+    opening, tilt, scale = shot.opening, shot.incidence.tilt, float(shot.to_pixels[2])
+    fluxes, counts = [], []
+    for path in ghost_paths(settled.lens, "all"):
+        item = find_final(shot, path)
+        if item is None:
+            continue
+        for coarse in (False, True):
+            bundle = trace_grid(
+                shot.packed, path, tilt, (opening.radius, opening.inner), item.region,
+                tolerance=1.0, scale=scale, rough=5, coarse=coarse,
+            )  # fmt: skip
+            traced = trace_bundle(shot.packed, 1, bundle, tilt), bundle.pupil, bundle.triangles
+            sums = measure_bundle(*traced, path.stop_crossings, opening.blades, shot.incidence.axes, bundle.halves)
+            fluxes.append(sums[0])
+            counts.append(len(bundle.pupil))
+    fine, rough = np.reshape(fluxes, (-1, 2)).T
+    assert np.abs(rough - fine).max() < 2e-3 * fine.max()
+    assert rough.sum() == pytest.approx(fine.sum(), rel=1e-3)
+    fine_nodes, rough_nodes = np.reshape(counts, (-1, 2)).sum(axis=0)
+    assert rough_nodes < 0.9 * fine_nodes

@@ -32,7 +32,7 @@ DRAFT_WAVELENGTHS = 3
 SOON_WAVELENGTHS = 5
 # its faintest ghosts are left out that carry together no more than this part of all ghost light
 SOON_CULL = 3e-3
-SOON_TOLERANCE_PX = 0.5
+SOON_TOLERANCE_PX = 1.0
 NO_RINGS = (
     "the screen leaves out rings inside ghosts, which are slow through an image, dirt or cylinders and for spectral "
     "lines; files have them"

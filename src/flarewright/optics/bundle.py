@@ -19,6 +19,8 @@ Floats = NDArray[np.float64]
 # coarsest cells of a bundle's grid over half its region, and how often each may be halved; of a whole region twice as
 # many stand side by side
 GRID = (4, 8)
+# and of a ghost that is drawn for a screen
+COARSE_GRID = (3, 6)
 MAX_LEVEL = 6
 # cells that the rim crosses are halved at least this often, and once less where it may be rough
 RIM_LEVEL = 2
@@ -154,6 +156,7 @@ def trace_grid(
     fringe_px: float = 0.0,
     faint_radius: float = float("inf"),
     one_color: bool = False,
+    coarse: bool = False,
 ) -> Bundle:
     """Build the adaptive grid of a path.
 
@@ -183,6 +186,8 @@ def trace_grid(
         What crosses the stop farther out, mm, is not refined where there are fringes.
     one_color : bool
         Fit the middle wavelength alone.
+    coarse : bool
+        Begin with fewer cells, and halve those with a rim only where their errors ask for it.
 
     Returns
     -------
@@ -191,11 +196,12 @@ def trace_grid(
     fitted = sorted(wavelengths_fitted(packed)[: 1 if one_color else None])
     # the rim's error adds up along the rim of what passes, which may be little of the box
     rim_tolerance = flux_tolerance * 2.0**rough * sqrt(region.share)
-    rim_level = RIM_LEVEL - 1 if rough else RIM_LEVEL
+    rim_level = 0 if coarse else RIM_LEVEL - 1 if rough else RIM_LEVEL
+    cells = cells_across(packed, COARSE_GRID if coarse else GRID)
     pupil, data, triangles = build_mesh(
         *tracing_arguments(packed, fitted, path, tilt), path.stop_crossings, *iris,
-        region.box, *cells_across(packed, GRID), rim_level, MAX_LEVEL, tolerance, rim_tolerance, fringe_px,
-        faint_radius, scale, view_radius,
+        region.box, *cells, rim_level, MAX_LEVEL, tolerance, rim_tolerance, fringe_px, faint_radius, scale,
+        view_radius,
     )  # fmt: skip
     return Bundle(path, pupil, triangles, dict(zip(fitted, data, strict=True)), packed.halves)
 

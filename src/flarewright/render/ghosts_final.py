@@ -48,7 +48,7 @@ SHIFT_QUANTILE = 0.9
 # a step of colour or a ring fainter than this part of the picture's mean is not seen
 STEP_CONTRAST = 2e-3
 # and on a screen, whose steps are this many times coarser, the rim's error may be doubled so often
-SCREEN, SCREEN_ROUGH = 10.0, 3
+SCREEN, SCREEN_ROUGH = 10.0, 5
 # and a ghost this many times fainter still needs one colour only
 ONE_COLOR = 1.0 / 6.0
 # and where nothing but fringes ends a ghost, steps of this part of their scale sqrt(lambda L / 2)
@@ -253,7 +253,7 @@ def draw_final(
     bundle = trace_grid(
         shot.packed, path, tilt, (opening.radius, opening.inner), item.region,
         tolerance=quality.tolerance_px, scale=scale, view_radius=item.view_radius, one_color=few and one_color,
-        rough=detail + (SCREEN_ROUGH if quality.screen else 0),
+        rough=detail + (SCREEN_ROUGH if quality.screen else 0), coarse=quality.screen,
     )  # fmt: skip
     count = len(shot.packed.wavelengths_nm)
     bend = traced_bend(shot, path, bundle, item.to_pixels)
