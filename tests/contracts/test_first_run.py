@@ -5,6 +5,7 @@ import os
 import subprocess
 import sys
 import time
+from contextlib import nullcontext
 from pathlib import Path
 
 import pytest
@@ -206,6 +207,42 @@ def test_a_head_start_needs_a_cold_cache_that_can_be_told(tmp_path, monkeypatch)
     monkeypatch.delenv("NUMBA_CACHE_DIR")
     monkeypatch.setattr(os, "access", lambda path, mode: False)
     assert not helpers._surely_cold()
+
+
+@pytest.mark.parametrize(("rings", "more"), [(False, set()), (True, {"draw", "densities"})])
+def test_a_helper_draws_where_the_command_draws_rings(rings, more, monkeypatch):
+    begun = []
+
+    def start(share):
+        begun.append(set(share))
+        raise OSError
+
+    monkeypatch.setattr(helpers, "start", start)
+    monkeypatch.setattr(helpers, "_surely_cold", lambda: True)
+    for cores in (2, 3):
+        monkeypatch.setattr(helpers, "cores", lambda cores=cores: cores)
+        with helpers.head_start(rings):
+            pass
+    assert begun == [{"mesh", "nodes", "prepass"} | more, {"mesh", "nodes"}, {"prepass"}]
+
+
+@pytest.mark.parametrize(
+    ("words", "rings"),
+    [
+        ("render heliar-tronnier --light 1,2 --fstop 8 -o a.exr", True),
+        ("render --fstop=8 heliar-tronnier -o a.exr", True),
+        ("render heliar-tronnier --light 1,2 -o a.exr", False),
+        ("render heliar-tronnier --fstop 8 --ringing off -o a.exr", False),
+        ("render heliar-tronnier --fstop 8 --quality=draft -o a.exr", False),
+        ("ghosts heliar-tronnier --fstop 8", False),
+    ],
+)
+def test_rings_are_told_by_the_words(words, rings, monkeypatch):
+    asked = []
+    monkeypatch.setattr("flarewright.cli.app.head_start", lambda rings: asked.append(rings) or nullcontext())
+    monkeypatch.setattr("flarewright.cli.app._call", lambda words: 0)
+    assert run(words.split()) == 0
+    assert asked == [rings]
 
 
 @pytest.mark.parametrize(

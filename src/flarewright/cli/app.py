@@ -152,7 +152,7 @@ def run(arguments: Sequence[str]) -> int:
     if words in ([], ["lens"], ["coating"], ["project"], ["scene"], ["design"], ["measure"]):
         words.append("--help")
     try:
-        with head_start() if _traces(words) else nullcontext():
+        with head_start(_rings(words)) if _traces(words) else nullcontext():
             code = _call(words)
         sys.stdout.flush()
         return code
@@ -165,6 +165,13 @@ def run(arguments: Sequence[str]) -> int:
 def _traces(words: Sequence[str]) -> bool:
     """Tell whether a command is one that traces rays, on as many cores as there are."""
     return words[0] in ("render", "ghosts") and not {"-h", "--help", "--threads"} & set(words)
+
+
+def _rings(words: Sequence[str]) -> bool:
+    """Tell whether a command surely draws rings in ghosts: a render of final quality, stopped down by blades."""
+    flags = {word.split("=")[0] for word in words}
+    others = {"--quality", "--ringing", "--iris-image", "--project"}
+    return words[0] == "render" and "--fstop" in flags and not others & flags
 
 
 def _call(words: list[str]) -> int:

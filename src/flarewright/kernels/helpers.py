@@ -15,6 +15,8 @@ from pathlib import Path
 PATIENCE_S = 120.0
 # what every command compiles that traces rays, whatever it makes of them; with two cores one helper has it all
 TRACING = (("mesh", "nodes"), ("prepass",))
+# what is drawn without rings; where rings are drawn too, they alone take the command as long as all else its helper
+DRAWING = ("draw", "densities")
 # set for helpers, which start none themselves
 _MARK = "FLAREWRIGHT_HELPER"
 # of the process: those that began before the command knew what it needs
@@ -69,14 +71,19 @@ def helping(shares: Sequence[Sequence[str]]) -> Iterator[list[Helper]]:
 
 
 @contextmanager
-def head_start() -> Iterator[None]:
+def head_start(rings: bool = False) -> Iterator[None]:
     """Have what every tracing command needs compiled while it still reads its lens, where surely nothing is compiled.
 
     The command finds out who is at work by `ahead`. That a lens or project is wrong is told no later for it.
+
+    Parameters
+    ----------
+    rings : bool
+        Whether the command, by its words, draws ghosts with rings.
     """
     shares: Sequence[Sequence[str]] = ()
     if cores() > 1 and not is_helper() and _surely_cold():
-        shares = [sum(TRACING, ())] if cores() == 2 else TRACING
+        shares = [sum(TRACING, DRAWING if rings else ())] if cores() == 2 else TRACING
     with helping(shares) as helpers:
         _ahead[:] = helpers
         try:
