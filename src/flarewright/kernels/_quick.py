@@ -45,9 +45,11 @@ _kinds: dict[type, str] = {}
 
 def _inherited(flags: Any) -> Any:
     """Return the options that what is called inherits."""
-    copy: Any = None if flags is None else flags.copy()
+    if flags is None:
+        return None
+    copy = flags.copy()
     for name in _OWN:
-        if copy is not None and name in copy.options:
+        if name in copy.options:
             copy.discard(name)
     return copy
 

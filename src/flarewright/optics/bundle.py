@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from ..kernels.mesh import build_mesh
 from ..kernels.trace import STOP_X, trace_nodes
-from .pack import PackedLens
+from .pack import PackedLens, wavelengths_fitted
 from .paths import LightPath
-from .region import Region, cells_across, tracing_arguments, wavelengths_fitted
+from .region import Region, cells_across, tracing_arguments
 
 Floats = NDArray[np.float64]
 

@@ -101,9 +101,8 @@ class PackedLens:
         Grids of all paths are traced at these: the tables are large, and to pick them out anew for each takes as long
         as to trace some cells.
         """
-        last = len(self.wavelengths_nm) - 1
-        waves = sorted({0, last // 2, last})
-        if len(waves) == last + 1:
+        waves = sorted(wavelengths_fitted(self))
+        if len(waves) == len(self.wavelengths_nm):
             return waves, self.n_gap, self.reflectance
         return waves, self.n_gap[waves], self.reflectance[waves]
 
@@ -111,6 +110,12 @@ class PackedLens:
     def first_surface(self) -> int:
         """Row of the first surface; the stop may stand in front of it."""
         return int(np.flatnonzero(self.inv_semi)[0])
+
+
+def wavelengths_fitted(packed: PackedLens) -> list[int]:
+    """Choose the wavelengths that stand for all: the middle one, then the ends."""
+    last = len(packed.wavelengths_nm) - 1
+    return [last // 2, *(w for w in (0, last) if w != last // 2)]
 
 
 @dataclass(frozen=True)

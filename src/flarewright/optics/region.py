@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ..kernels.intersect import AXES, ORIGIN, sag_of_shape
 from ..kernels.prepass import PROBES, find_box
 from ..kernels.trace import STOP_X, trace_nodes
-from .pack import PackedLens
+from .pack import PackedLens, wavelengths_fitted
 from .paths import LightPath, together
 
 Floats = NDArray[np.float64]
@@ -326,12 +326,6 @@ def _around(found: Floats, box: Floats, cells: tuple[int, int]) -> Floats:
     high = max(found[3] - found[2], 4.0 * (box[3] - box[2]) / cells[1])
     grown = found + np.array([-wide, wide, -high, high])
     return np.array([max(grown[0], box[0]), min(grown[1], box[1]), max(grown[2], box[2]), min(grown[3], box[3])])
-
-
-def wavelengths_fitted(packed: PackedLens) -> list[int]:
-    """Choose the wavelengths that stand for all: the middle one, then the ends."""
-    last = len(packed.wavelengths_nm) - 1
-    return [last // 2, *(w for w in (0, last) if w != last // 2)]
 
 
 def _scan(

@@ -48,7 +48,7 @@ def traced_bend(shot: Shot, path: LightPath, bundle: Bundle, to_pixels: Floats) 
     middle = held[len(held) // 2]
     chosen = spread_rays(bundle, (middle,), seen_of(shot, to_pixels), RAYS)
     if chosen.size == 0:
-        chosen = spread_rays(bundle, (middle,), _anywhere(shot.opening.radius), RAYS)
+        chosen = spread_rays(bundle, (middle,), _seen(shot, np.zeros((2, 3)), (np.inf, np.inf)), RAYS)
     if chosen.size == 0:
         return None
     squares = mirror_squares_traced(shot.packed, path, shot.incidence.tilt, bundle.pupil[chosen])
@@ -100,25 +100,20 @@ def seen_of(shot: Shot, to_pixels: Floats) -> Callable[[Floats], Bools]:
     callable
         From rays as in `optics.bundle.trace_points`, shape (N, 5 + 2 C), to a mask of shape (N,).
     """
-    width, height = (float(side) for side in shot.size_px)
-    iris_radius, place = shot.opening.radius, np.empty((2, 3))
+    place = np.empty((2, 3))
     place[:, 0], place[:, 1:] = to_pixels[:2], _turned(shot, to_pixels)
+    return _seen(shot, place, shot.size_px)
+
+
+def _seen(shot: Shot, place: Floats, size_px: tuple[float, float]) -> Callable[[Floats], Bools]:
+    """Do the same for a picture of any size, infinite too, and places as in `kernels.standing.seen_rays`."""
+    iris_radius, width, height = shot.opening.radius, float(size_px[0]), float(size_px[1])
 
     def seen(rays: Floats) -> Bools:
         mask: Bools = seen_rays(rays, iris_radius, place, width, height)
         return mask
 
     return seen
-
-
-def _anywhere(iris_radius: float) -> Callable[[Floats], Bools]:
-    """Tell which traced rays pass, wherever they land."""
-
-    def passes(rays: Floats) -> Bools:
-        mask: Bools = seen_rays(rays, iris_radius, np.zeros((2, 3)), np.inf, np.inf)
-        return mask
-
-    return passes
 
 
 def _turned(shot: Shot, to_pixels: Floats) -> Floats:
