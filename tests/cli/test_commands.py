@@ -536,3 +536,12 @@ def test_a_reader_that_goes_away_causes_no_complaint():
         timeout=60,
     )
     assert done.stderr == ""
+
+
+def test_the_command_leaves_no_threads_to_the_library_of_matrices():
+    """They would spin beside ours; what a person has set stays. Known before NumPy is loaded, or it has no effect."""
+    code = "import os, sys, flarewright.cli as _; print(os.environ['OPENBLAS_NUM_THREADS'], 'numpy' in sys.modules)"
+    for own, wanted in (({}, "1 False"), ({"OPENBLAS_NUM_THREADS": "3"}, "3 False")):
+        environment = {key: value for key, value in os.environ.items() if key != "OPENBLAS_NUM_THREADS"} | own
+        told = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
+        assert told.stdout.strip() == wanted

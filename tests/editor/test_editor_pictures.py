@@ -377,6 +377,54 @@ def test_a_hand_is_followed_and_let_go(project):
     assert target_jpeg(screen)[:2] == b"\xff\xd8"
 
 
+def test_what_a_hand_holds_still_is_drawn_in_full():
+    session, _ = begin(None)
+    screen = Screen(session)
+    screen.start()
+    assert screen.wait(60.0)
+    drawn = []
+    show = screen.show
+
+    def told(picture):
+        drawn.append((picture.grade, picture.project.lights[0].field_deg))
+        show(picture)
+
+    screen.show = told
+    hand = Hand(screen)
+
+    def go(x):
+        assert hand.picture(partial(move_light, light=0, x=x, y=1.0), session.revision)
+
+    go(3.0)
+    assert not drawn
+    assert screen.wait(60.0)
+    assert drawn[-1] == ("final", (3.0, 1.0))
+    # nothing is decided by holding, and what is held is not drawn again when it is let go
+    assert session.project.lights[0].field_deg != (3.0, 1.0)
+    count, number = len(drawn), screen.number
+    session.do("move_light", {"light": 0, "x": 3.0, "y": 1.0})
+    assert screen.wait(60.0)
+    assert len(drawn) == count
+    assert screen.number > number
+    # a hand on its way sees none of that
+    drawn.clear()
+    for x in (4.0, 4.1, 4.2):
+        go(x)
+    go(4.3)
+    assert not drawn
+    # a hand that lets go elsewhere than it was seen last, and one that goes back to where it came from
+    session.do("move_light", {"light": 0, "x": 4.5, "y": 1.0})
+    assert screen.wait(60.0)
+    assert {place for _, place in drawn} == {(4.5, 1.0)}
+    go(5.0)
+    assert screen.wait(60.0)
+    go(4.5)
+    screen.rest()
+    assert screen.wait(60.0)
+    assert screen.picture.project == session.project
+    assert screen.picture.grade == "final"
+
+
 def test_every_ghost_of_the_picture_has_rays_in_the_cross_section():
     """Also those that fill little of the entrance, or that only a corner of the blades lets through."""
     project = project_for_lens("canon-28-80")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from flarewright.editor.files import project_for_lens
 from flarewright.kernels.bundle import measure_bundle
 from flarewright.model import D65, BlackBody, Camera, Dirt, Iris, Light, Lines, Output, Project, Quality
 from flarewright.optics.bundle import trace_bundle, trace_grid
@@ -14,6 +15,7 @@ from flarewright.optics.spectrum import band_weights
 from flarewright.render import looking, moved_wings
 from flarewright.render.few_colors import gathered_weights
 from flarewright.render.few_spectra import few_spectra
+from flarewright.render.ghosts_final import find_final
 from flarewright.render.many_stars import Stars, draw_stars
 from flarewright.render.path_color import seen_of
 from flarewright.render.prepare import settle
@@ -246,4 +248,33 @@ def test_gathered_weights_keep_the_flux_of_every_wavelength():
     flux = np.array([
         _flux(bundle, trace_bundle(shot.packed, w, bundle, tilt), path, shot) for w in range(count)
     ])  # fmt: skip
-    assert flux[list(shown)] @ gathered == pytest.approx(flux @ weights, rel=5e-3)
+    assert tuple(gathered) == shown
+    assert flux[list(shown)] @ np.array(list(gathered.values())) == pytest.approx(flux @ weights, rel=5e-3)
+
+
+@pytest.mark.parametrize("one_color", [False, True])
+def test_a_dark_wavelength_leaves_its_light_to_bright_ones(one_color):
+    """A coating that quenches the middle of the spectrum: drawn are its ends, or the brightest, with all the light."""
+    settled = settle(project_for_lens("canon-28-80"))
+    (shot,) = make_shots(settled, make_opening(settled, None))
+    tilt, opening = shot.incidence.tilt, shot.opening
+    (path,) = [path for path in ghost_paths(settled.lens) if path.name == "14-8"]
+    item = find_final(shot, path)
+    bundle = trace_grid(
+        shot.packed, path, tilt, (opening.radius, opening.inner), item.region,
+        tolerance=0.25, scale=float(shot.to_pixels[2]), one_color=one_color,
+    )  # fmt: skip
+    weights, shown = shot.weights(shot.packed.wavelengths_nm), tuple(sorted(bundle.traced))
+    flux = np.array([
+        _flux(bundle, trace_bundle(shot.packed, w, bundle, tilt), path, shot) for w in range(len(weights))
+    ])  # fmt: skip
+    middle = len(weights) // 2
+    assert flux[middle] < 0.1 * flux.max()
+    everything = shot.packed, bundle, tilt, weights, shown, seen_of(shot, np.append(shot.to_pixels[:2], [1e-3, 1e-3]))
+    assert gathered_weights(*everything) is None
+    gathered = gathered_weights(*everything, careful=False)
+    assert tuple(gathered) == ((int(flux.argmax()),) if one_color else tuple(w for w in shown if w != middle))
+    light = sum(flux[w] * rgb for w, rgb in gathered.items())
+    # forty-eight rays tell how much a wavelength passes
+    whole = flux @ weights
+    np.testing.assert_allclose(light, whole, atol=0.03 * np.abs(whole).max())

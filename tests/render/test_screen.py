@@ -60,3 +60,20 @@ def test_a_coarse_grid_holds_the_light_of_a_fine_one():
     assert rough.sum() == pytest.approx(fine.sum(), rel=1e-3)
     fine_nodes, rough_nodes = np.reshape(counts, (-1, 2)).sum(axis=0)
     assert rough_nodes < 0.9 * fine_nodes
+
+
+def test_a_starburst_for_a_screen_is_that_of_a_file():
+    """Its middle, white at the exposure that shows ghosts, is not drawn as finely, and nothing of that is seen."""
+    project = project_for_lens("tessar-brendel").replace(
+        camera=Camera(size_px=(480, 270)), output=Output(layers="passes")
+    )
+    exact, seen = (
+        {layer.name: layer.pixels for layer in render(each).layers}
+        for each in (project, project.replace(quality=project.quality.replace(screen=True)))
+    )
+    bursts = seen["starburst"], exact["starburst"]
+    np.testing.assert_allclose(*(burst.sum(axis=(0, 1)) for burst in bursts), rtol=1e-3)
+    exposure = auto_exposure(exact["ghosts"])
+    for stops, most in ((exposure, 2), (exposure - 5.0, 6)):
+        codes = [view(burst, stops, "srgb").astype(int) for burst in bursts]
+        assert np.abs(codes[0] - codes[1]).max() <= most

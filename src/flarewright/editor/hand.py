@@ -91,6 +91,7 @@ class Hand:
                 # the hand has let go meanwhile, and the final picture needs all the time there is
                 return None
             self.screen.moved = project
+            self.screen.hold(project, revision)
         # the next one is drawn while this one is packed
         data = jpeg(self._pixels(drawn), QUALITY)
         return Moved(project, data, time.perf_counter() - begun)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import threading
+import time
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
@@ -13,6 +15,7 @@ from numpy.typing import NDArray
 
 from ..errors import FlarewrightError
 from ..model import Project
+from ..render.display import view_sum
 from . import studio
 from .jobs import Check, Lane, Overtaken
 from .seen import Seen
@@ -24,6 +27,8 @@ from .view import View
 
 # of a picture that rests
 QUALITY = 92
+# a hand that has not moved for so long is looking, and sees no draft any more
+HOLD_S, POLL_S = 0.15, 0.02
 
 
 class Screen:
@@ -51,6 +56,8 @@ class Screen:
         self.final_s = math.inf
         self._lane = Lane("pictures")
         self._busy: tuple[Project, View] | None = None
+        # set when a hand has let go of what it held still
+        self._let_go = threading.Event()
         session.listeners.append(self._heard)
 
     def start(self) -> None:
@@ -65,13 +72,12 @@ class Screen:
         if event["type"] != "changed":
             return
         project, view = self.session.project, self.session.view
-        wanted = (
-            studio.pictured(project),
-            view.replace(exposure_stops=None, found_stops=None, look="srgb", plate=None, plate_stops=0.0),
-        )
+        wanted = _wanted(project, view)
+        self._let_go.set()
         if wanted == self._busy and not self.problem:
-            # only the way it is shown has changed
-            self._publish()
+            # only the way it is shown has changed; what a hand was shown is newer than the last picture
+            if self.moved is None:
+                self._publish()
             return
         self._busy = wanted
         self._lane.submit(lambda check: self._work(project, view, check))
@@ -129,10 +135,43 @@ class Screen:
             self._busy = None
             return True
 
+    def hold(self, project: Project, revision: int) -> None:
+        """Draw what a hand holds as if it had let go, unless it moves on soon.
+
+        Parameters
+        ----------
+        project : Project
+            As the hand has it.
+        revision : int
+            Of the session that the hand sees.
+        """
+        with self.session.lock:
+            if revision != self.session.revision:
+                return
+            view, let_go = self.session.view, threading.Event()
+            self._busy, self._let_go = _wanted(project, view), let_go
+
+            def work(check: Check) -> None:
+                moves_until = time.monotonic() + HOLD_S
+                while not let_go.wait(POLL_S) and time.monotonic() < moves_until:
+                    check()
+                check()
+                self._work(project, view, check)
+
+            self._lane.submit(work)
+
     def rest(self) -> None:
         """Go on with the final picture after a drag that changed nothing."""
-        if self._busy is None:
+        if self._busy != _wanted(self.session.project, self.session.view):
             self._heard({"type": "changed"})
+
+
+def _wanted(project: Project, view: View) -> tuple[Project, View]:
+    """Return what of a project and a view decides what is drawn."""
+    return (
+        studio.pictured(project),
+        view.replace(exposure_stops=None, found_stops=None, look="srgb", plate=None, plate_stops=0.0),
+    )
 
 
 def packed(screen: Screen) -> bytes:
@@ -152,6 +191,10 @@ def shown_pixels(screen: Screen) -> NDArray[np.uint8]:
 
 def pixels_of_picture(screen: Screen, picture: Picture) -> NDArray[np.uint8]:
     """Return sRGB pixels of a picture as the session's view has it."""
-    view, light = screen.session.view, studio.light_of(picture, screen.match)
+    view = screen.session.view
+    if view.look == "srgb" and view.plate is None:
+        gain = studio.ghost_gain(picture, screen.match)
+        return view_sum(picture.ghosts, picture.rest, screen.exposure_stops, ghost_gain=gain)
+    light = studio.light_of(picture, screen.match)
     plate = plate_for(view, (light.shape[1], light.shape[0]))
     return pixels_of(light, screen.exposure_stops, view, plate)

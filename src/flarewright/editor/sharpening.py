@@ -65,7 +65,9 @@ def sharpen(screen: Screen, project: Project, view: View, check: Check) -> None:
     seen_first = not working and screen.final_s > SEEN_FIRST_S
     if not working:
         if screen.final_s > LATE_S:
-            screen.show(studio.take(project, "soon", view, progress=_progress(screen, "traced picture", check)))
+            soon = studio.take(project, "soon", view, progress=_progress(screen, "traced picture", check))
+            check()
+            screen.show(soon)
         if seen_first:
             _look(screen, project, "final", check)
         final = studio.take(project, "final", view, progress=_progress(screen, "final picture", check))

@@ -40,6 +40,7 @@ NO_RINGS = (
 # gains of a draft's ghosts: their step, the least and the largest
 # (one that a rim hides now may come out as the hand goes on, so it is never dimmed altogether)
 STEP, LEAST, MOST = 2.0**0.25, 2.0**-1.5, 2.0
+EVEN = (1.0, 1.0, 1.0)
 
 
 @dataclass(frozen=True)
@@ -214,7 +215,7 @@ class Match:
         Of a grey picture, whose brightness means nothing, so that it is seen at this exposure.
     """
 
-    gain: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    gain: tuple[float, float, float] = EVEN
     exposure_stops: float = 0.0
     grey: float = 1.0
     levels: Levels = ()
@@ -285,11 +286,15 @@ def light_of(picture: Picture, match: Match) -> Floats:
 
 def ghosts_of(picture: Picture, match: Match) -> Floats:
     """Return the ghosts alone, matched as in `light_of`."""
+    gain = ghost_gain(picture, match)
+    return picture.ghosts if gain == EVEN else np.asarray(picture.ghosts * np.array(gain, dtype=np.float32))
+
+
+def ghost_gain(picture: Picture, match: Match) -> tuple[float, float, float]:
+    """Return what matches the ghosts of a picture, R, G, B."""
     if picture.grey:
-        return np.asarray(picture.ghosts * np.float32(match.grey))
-    if picture.grade not in ("moving", "draft"):
-        return picture.ghosts
-    return np.asarray(picture.ghosts * np.array(match.gain, dtype=np.float32))
+        return (match.grey, match.grey, match.grey)
+    return match.gain if picture.grade in ("moving", "draft") else EVEN
 
 
 def lens_name(project: Project) -> str:

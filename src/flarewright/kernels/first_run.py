@@ -33,7 +33,7 @@ ROOTS = {
     ),
     "prepass": (
         "prepass.find_box",
-        f"{_GEOMETRY}, f8[::1], f8[:,::1], f8, f8, f8, i8, f8, f8, f8[::1], i8, i8, f8, f8, f8[:,::1]",
+        f"{_GEOMETRY}, f8[::1], f8[:,::1], f8, f8, f8, i8, f8, f8, f8[::1], i8, i8, i8, f8, f8, f8[:,::1]",
         2.1,
     ),
     "draw": ("bundle.draw_bundle", f"{_BUNDLE}, f8[::1], i8, f8[:,::1], none, {_CANVAS}, i8", 2.6),

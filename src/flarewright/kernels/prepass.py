@@ -57,7 +57,7 @@ def rejected(data, nodes, crossings, iris_radius, slack):
 @compiled
 def find_box(
     rows, actions, curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, tilt, nearness,
-    crossings, iris_radius, view_radius, box, nx, ny, finest_x, finest_y, traced,
+    crossings, iris_radius, view_radius, box, nx, ny, few_cells, finest_x, finest_y, traced,
 ):  # fmt: skip
     """Bound the part of the pupil that a path accepts, and estimate what it carries.
 
@@ -75,6 +75,9 @@ def find_box(
         x0, x1, y0, y1 of the pupil to look at.
     nx, ny : int
         Cells of the pre-pass.
+    few_cells : int
+        Where fewer than these are kept, spots are looked for between the samples: FEW_CELLS, or 1 where a second spot
+        beside what was found is too little.
     finest_x, finest_y : float
         How near to each other samples need to stand where a spot may hide between those of the cells, mm.
     traced : ndarray, shape ((nx + 1) (ny + 1), >= 5 + 2 C)
@@ -134,7 +137,7 @@ def find_box(
             kept[a * ny + b] = 1
             accepted += 1
             sums[4] += 1.0
-    if accepted < FEW_CELLS:
+    if accepted < few_cells:
         # a spot smaller than a cell may hide between the samples
         corners = np.empty((nx * ny, 2))
         n_doubtful = 0

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..kernels.intersect import AXES, ORIGIN, sag_of_shape
-from ..kernels.prepass import PROBES, find_box
+from ..kernels.prepass import FEW_CELLS, PROBES, find_box
 from ..kernels.trace import STOP_X, trace_nodes
 from .pack import PackedLens, wavelengths_fitted
 from .paths import LightPath, together
@@ -158,7 +158,8 @@ def find_region(
     within : ndarray, shape (4,), optional
         A box that holds the region; None: the whole front.
     quick : bool
-        Look at the middle wavelength alone, in half as many places, and leave more room around for the others.
+        Look at the middle wavelength alone, in half as many places, and leave more room around for the others; look no
+        closer at what is not small, nor for a second spot beside what was found.
     traced : ndarray, optional
         The path's part of `first_look`, with the same light, `within` and `quick`.
 
@@ -175,10 +176,10 @@ def find_region(
     front = front_box(packed, tilt)
     finest = _finest(packed, front)
     box, cells = _looked_at(packed, front, within, quick)
-    whole = True
+    whole, few_cells = True, 1 if quick else FEW_CELLS
     held = np.array([np.inf, -np.inf, np.inf, -np.inf])
     for _ in range(4):
-        found, sums, spots = _scan(packed, middle, box, cells, finest, traced if whole else None)
+        found, sums, spots = _scan(packed, middle, box, cells, finest, traced if whole else None, few_cells)
         plenty = sums[4] >= (SPECK if whole else SMALL_REGION)
         near, few = box, cells_across(packed, COARSE) if plenty else cells
         if whole and sums[4] > 0.0:
@@ -198,7 +199,7 @@ def find_region(
         shrunk = _area(found) < 0.3 * _area(box)
         roomy = _with_room(found, box, cells) if quick else found
         box, cells, whole = found, cells_across(packed, FINER), False
-        if not shrunk:
+        if not shrunk or (quick and sums[4] >= SPECK):
             break
     return _region(roomy, sums)
 
@@ -335,9 +336,10 @@ def _scan(
     cells: tuple[int, int],
     finest: tuple[float, float],
     traced: Floats | None = None,
+    few_cells: int = FEW_CELLS,
 ) -> tuple[Floats, Floats, Floats]:
     """Run the pre-pass over a box at one wavelength."""
-    found, sums, spots = find_box(*arguments, box, *cells, *finest, _UNTRACED if traced is None else traced)
+    found, sums, spots = find_box(*arguments, box, *cells, few_cells, *finest, _UNTRACED if traced is None else traced)
     if packed.halves == 1:
         # the kernel counts every ray for its mirror image too
         sums[:3] *= 0.5

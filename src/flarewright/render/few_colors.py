@@ -34,7 +34,7 @@ def gathered_weights(
     seen: Callable[[Floats], Bools],
     *,
     careful: bool = True,
-) -> Floats | None:
+) -> dict[int, Floats] | None:
     """Give the light of all traced wavelengths to a few of them.
 
     Parameters
@@ -47,27 +47,29 @@ def gathered_weights(
     weights : ndarray, shape (W, 3)
         What each wavelength adds to each channel.
     shown : tuple of int
-        The wavelengths that are drawn, rising.
+        The wavelengths that are drawn where they are bright enough, rising.
     seen : callable
         Tells which traced rays (`optics.bundle.trace_points`) pass and land in the picture.
     careful : bool
-        Whether to look where the path is cut and lands at the ends of the spectrum.
+        Whether to look where the path is cut and lands at the ends of the spectrum, and to draw all of `shown` or none.
 
     Returns
     -------
-    ndarray, shape (len(shown), 3), or None
-        What each drawn wavelength adds in place of its neighbours too. None where they cannot: no ray is seen, the
-        path is dark at one of them, or it is cut elsewhere, or lands elsewhere, at the ends of the spectrum.
+    dict of int to ndarray, shape (3,), or None
+        The wavelengths that are drawn, rising, and what each adds in place of its neighbours too: those of `shown` that
+        are not dark, or the brightest of all where all of these are. None where they cannot stand for the others: no
+        ray is seen; or, for who is careful, the path is dark at one of them, or it is cut elsewhere, or lands
+        elsewhere, at the ends of the spectrum.
 
     Notes
     -----
-    A wavelength is split between its neighbours among those shown, linearly, as `optics.spectrum.band_weights` splits
+    A wavelength is split between its neighbours among those drawn, linearly, as `optics.spectrum.band_weights` splits
     the spectrum, times what it passes in comparison with them: coatings reflect by wavelength, and a ghost keeps its
     flux in each. The comparison is the mean over the same rays, spread over the bundle.
     """
     count = len(weights)
     if len(shown) == count:
-        return weights
+        return dict(enumerate(weights))
     where = spread_rays(bundle, shown, seen, SAMPLE)
     if where.size == 0 or (careful and not _seen_alike(packed, bundle, tilt, shown, seen)):
         return None
@@ -76,17 +78,19 @@ def gathered_weights(
         held[w][where] if w in held else trace_points(packed, w, bundle.path, tilt, places) for w in range(count)
     ])  # fmt: skip
     flux = np.where(seen(rays), rays[:, WEIGHT], 0.0).reshape(count, -1).sum(axis=1)
-    drawn = flux[list(shown)]
-    if not drawn.min() > LEAST_PART * flux.max():
+    # where a coating quenches a path in the middle of the spectrum, little of its light needs to be there
+    least = LEAST_PART * flux.max()
+    drawn = tuple(w for w in shown if flux[w] > least) or (int(flux.argmax()),)
+    if careful and drawn != shown:
         return None
-    gathered: Floats = (_hats(count, shown) * flux / drawn[:, None]) @ weights
-    return gathered
+    gathered = (_hats(count, drawn) * flux / flux[list(drawn), None]) @ weights
+    return dict(zip(drawn, gathered, strict=True))
 
 
 @lru_cache(maxsize=64)
-def _hats(count: int, shown: tuple[int, ...]) -> Floats:
-    """Return how wavelengths are split between those that are drawn, shape (len(shown), count)."""
-    return np.stack([np.interp(np.arange(count), shown, row) for row in np.eye(len(shown))])
+def _hats(count: int, drawn: tuple[int, ...]) -> Floats:
+    """Return how wavelengths are split between those that are drawn, shape (len(drawn), count)."""
+    return np.stack([np.interp(np.arange(count), drawn, row) for row in np.eye(len(drawn))])
 
 
 def _seen_alike(

@@ -324,8 +324,8 @@ def _drawn_in_few(
     weights = gathered_weights(shot.packed, bundle, shot.incidence.tilt, colors, shown, seen, careful=careful)
     if weights is None:
         return False
-    for w, rgb in zip(shown, weights, strict=True):
-        data = bundle.traced[w]
+    for w, rgb in weights.items():
+        data = trace_bundle(shot.packed, w, bundle, shot.incidence.tilt)
         draw_bundle(
             data, bundle.pupil, bundle.triangles, node_densities(data, bundle.pupil, bundle.triangles),
             path.stop_crossings, opening.blades, opening.levels, shot.incidence.axes, to_pixels, shot.gain,

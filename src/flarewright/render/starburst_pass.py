@@ -204,6 +204,7 @@ def _one_light(
     size = (width + 2 * margin[0], height + 2 * margin[1])
     picture: NDArray[np.floating] | None = None
     smear = math.radians(scene.look.spiral_deg)
+    quality = scene.settled.project.quality
     turns = ((np.arange(SPIRAL_COPIES) + 0.5) / SPIRAL_COPIES - 0.5) * smear if smear > 0.0 else np.zeros(1)
     for turn, made in zip(turns, _patterns(scene, shot, turns), strict=True):
         pattern = made
@@ -222,7 +223,8 @@ def _one_light(
             fine_nm,
             shot.weights(fine_nm) * (flux * pattern.transmittance / len(turns))[:, None],
             pattern=pattern,
-            split=NEAR_SPLIT if scene.settled.project.quality.mode != "draft" else 1,
+            # the middle of a starburst is white on a screen
+            split=1 if quality.mode == "draft" or quality.screen else NEAR_SPLIT,
             threads=threads,
         )
         picture = drawn if picture is None else picture + drawn

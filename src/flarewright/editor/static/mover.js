@@ -14,6 +14,7 @@ export function mover(app, shown) {
   self.want = (values, time) => { self.live = true; next = { values, time }; pump(); };
   self.stop = () => { self.live = false; next = null; };
   self.busy = () => under > 0;
+  self.asked = () => sent;
   // what is under way ends final pictures: whoever wants one waits for it
   self.idle = async () => { while (under > 0) await new Promise((done) => { setTimeout(done, 5); }); };
 

@@ -222,11 +222,19 @@ export function viewport(canvas, app) {
     redraw();
   };
   self.refresh = latest(async (fade) => {
+    const asked = self.mover.asked();
+    // what a hand holds still gets sharper, until it moves on: then this picture is of a place that it has left
+    const left = () => {
+      if (!self.mover.live || (!self.mover.busy() && self.mover.asked() === asked)) return false;
+      self.shownNumber = app.state.picture.number;
+      return true;
+    };
+    if (left()) return;
     const answer = await fetch(`/api/picture?n=${app.state.picture.number}`);
     if (!answer.ok) throw new Error((await answer.json()).error);
-    if (self.mover.live) return;
     const grade = app.state.picture.grade;
     const bitmap = await createImageBitmap(await answer.blob());
+    if (left()) return;
     self.show(bitmap, fade);
     self.shownGrade = grade;
     self.shownNumber = app.state.picture.number;
