@@ -110,6 +110,11 @@ MISTAKES = [
         "semi_diameter = 55.7",
         "row 2: a semi_diameter of 55.7 mm does not fit the surface, which turns back 55.65 mm from the axis",
     ),
+    (
+        "semi_diameter = 12.5",
+        "semi_diameter = 12.5, asphere = [0.01]",
+        "row 2: the asphere's terms lift its rim by 244 mm, more than its semi_diameter of 12.5 mm",
+    ),
     ("n_d = 1.649", "n_d = 0.9", "row 2: n_d is 0.9: it must be above 1"),
     ("n_d = 1.649, ", "", "row 2: v_d alone is no glass"),
     ("v_d = 33.8", "v_d = 0", "row 2: v_d is 0: it must be above 5"),
@@ -425,6 +430,7 @@ air_surfaces = st.builds(
     semi_diameter_estimated=st.booleans(),
     coating=st.none() | coatings,
 ).map(lambda row: row.replace(semi_diameter=min(row.semi_diameter, row.equator)) if row.semi_diameter else row)
+air_surfaces = air_surfaces.map(lambda row: row.replace(asphere=()) if row.lifted > (row.semi_diameter or 0.0) else row)
 surfaces = st.builds(lambda surface, medium: surface.replace(medium=medium), air_surfaces, media)
 texts = st.text(st.characters(codec="utf-8"), max_size=30)
 
@@ -531,6 +537,7 @@ BEYOND_THE_SCHEMA = (
     "holds the stop",
     "shares row",
     "does not fit the surface",
+    "lift its rim",
 )
 
 

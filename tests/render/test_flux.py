@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from pupil_sum import D_LINE, by_name, count, layer_flux, layers_of, mono, path_of, picture, scene, shots_of
 
-from flarewright.model import D65, Everywhere, Iris, Light, QuarterWave
+from flarewright.model import D65, Everywhere, Iris, Light, Project, QuarterWave
 from flarewright.optics.ghosts import ghost_table
 from flarewright.optics.paths import ghost_paths
 from flarewright.optics.region import find_region
@@ -485,3 +485,18 @@ def test_a_path_that_passes_the_picture_by_is_no_light_in_it():
             assert count(shot, path, project.iris).on_sensor == 0.0
     assert far > 0
     assert replace(shot, size_px=(64, 36)).view_radius == pytest.approx(np.hypot(4.0, 2.25))
+
+
+def test_a_black_picture_is_told():
+    lit, dark = (
+        render(
+            Project(
+                lens="tessar-brendel",
+                lights=(Light(field_deg=(8.0, 4.0), intensity=value),),
+                camera={"size_px": (48, 27)},
+            )
+        )
+        for value in (1.0, 0.0)
+    )
+    told = [any("picture is black" in remark for remark in each.remarks) for each in (lit, dark)]
+    assert told == [False, True]

@@ -44,6 +44,8 @@ from .text_file import read_toml
 
 # by which a rim may pass its surface's own end: numbers are rounded
 ROUNDED = 1e-6
+# terms that lift a rim by more than so many times its height are in other units
+MOST_LIFTED = 1.0
 MOST_ROWS = 500
 """Lenses of photography end at some sixty rows; beyond this the file is no lens."""
 
@@ -286,6 +288,12 @@ def _surface(
         problems.append(
             f"row {k}: a semi_diameter of {semi:g} mm does not fit the surface, which turns back "
             f"{surface.equator:g} mm from the axis: correct it, or leave it out and it is estimated"
+        )
+        return None
+    if semi is not None and surface.lifted > MOST_LIFTED * semi:
+        problems.append(
+            f"row {k}: the asphere's terms lift its rim by {surface.lifted:.3g} mm, more than its semi_diameter of "
+            f"{semi:g} mm: check their units (1/mm^3, 1/mm^5, ...)"
         )
         return None
     return surface

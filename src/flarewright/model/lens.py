@@ -92,6 +92,12 @@ class Surface(Frozen):
         )
 
     @property
+    def lifted(self) -> float:
+        """How far the terms of an asphere lift its rim from the conic, mm; 0 where the rim is not known."""
+        semi = self.semi_diameter or 0.0
+        return abs(sum(term * semi ** (2 * k + 4) for k, term in enumerate(self.asphere)))
+
+    @property
     def displaced(self) -> bool:
         """Whether it sits beside the axis or askew."""
         return any(self.decentre or ()) or any(self.tilt_deg or ())

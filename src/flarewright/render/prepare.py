@@ -306,7 +306,7 @@ def _medium(plate: Plate, what: str, remarks: list[str]) -> Medium:
     try:
         medium, finding = attach(glass, plate.n_d, plate.v_d)
     except GlassError as error:
-        raise ProjectError(f"{what}: {error}") from None
+        raise ProjectError(f"{what}: {error} (on the command line an index in the name's place, 1.52:2)") from None
     remarks.extend(media_remarks([(0, finding)], what))
     return medium
 

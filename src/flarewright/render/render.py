@@ -37,6 +37,7 @@ Progress = Callable[[float, str], None]
 
 BESIDE_PX = 1_000_000
 """The starburst of a larger picture is not made beside its ghosts: together they hold 100 MB more at 1080p."""
+BLACK = "the picture is black: no light comes through the lens to the sensor"
 
 
 @dataclass(frozen=True)
@@ -137,6 +138,8 @@ def render(
     others = [graded(layer, art.gain.get("ghosts", 1.0)) for layer in drawn.others]
     whole = beauty(passes, project.camera.size_px)
     layers = (whole,) if project.output.layers == "beauty" else (whole, *passes, *others)
+    if not any(layer.pixels.any() for layer in passes):
+        told = (*told, BLACK)
     account = drawn.ledger
     if ledger and account is None:
         from .ledger import trace_ledger
