@@ -14,7 +14,8 @@ from ..kernels.trace import KEEP, LAND, REFLECT, REFRACT, STOP
 from ..model import Lens
 
 
-@dataclass(frozen=True)
+# nobody makes two that are alike (`steps_between`)
+@dataclass(frozen=True, eq=False)
 class LightPath:
     """The rows a ray meets in order, and what it does there.
 

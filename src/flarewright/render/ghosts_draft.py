@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -80,18 +81,23 @@ def draft_colors(shot: Shot, paths: Sequence[LightPath]) -> Floats:
 def _steps(shot: Shot, paths: Sequence[LightPath]) -> tuple[tuple[Any, ...], tuple[float, float, float, float], Floats]:
     """List what kernels take of paths; of the light's way in: entrance, slope, slope across and nearness; the axes."""
     packed = shot.packed
-    starts = np.cumsum([0, *(len(path.rows) for path in paths)])
     slope, axes = float(np.tan(shot.incidence.tilt)), shot.incidence.axes
     slope_x, nearness = 0.0, packed.nearness / shot.incidence.tilt_cosine
     if packed.curvature_x is not None:
         # its two meridians are the lens' own, whatever the light's
         slope_x, slope = float(axes[1, 0]) * slope, float(axes[1, 1]) * slope
         axes = np.eye(2)
-    steps = (
-        np.concatenate([path.rows for path in paths]), np.concatenate([path.actions for path in paths]), starts,
-        np.array([path.stop_crossings for path in paths]), packed.curvature, packed.curvature_x, packed.z_vertex,
-    )  # fmt: skip
+    steps = (*_in_a_row(tuple(paths)), packed.curvature, packed.curvature_x, packed.z_vertex)
     return steps, (float(packed.semi[packed.first_surface]), slope, slope_x, nearness), axes
+
+
+# a moving hand asks for the same ones again and again
+@lru_cache(maxsize=64)
+def _in_a_row(paths: tuple[LightPath, ...]) -> tuple[NDArray[np.int64], ...]:
+    """Join the rows and the actions of paths; tell where each begins, and how often it crosses the stop."""
+    starts = np.cumsum([0, *(len(path.rows) for path in paths)])
+    steps = np.concatenate([path.steps for path in paths], axis=1)
+    return steps[0], steps[1], starts, np.array([path.stop_crossings for path in paths])
 
 
 def seen_small(shot: Shot, times: int) -> Shot:
