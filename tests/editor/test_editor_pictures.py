@@ -1,5 +1,6 @@
 """Pictures of the editor: hit test, outline, matched drafts, working views, looks."""
 
+from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from itertools import pairwise
 
@@ -412,6 +413,14 @@ def test_what_a_hand_holds_still_is_drawn_in_full():
         go(x)
     go(4.3)
     assert not drawn
+    # nor does a slow picture of it let the final one of its last place begin
+    hold, held = screen.hold, []
+    screen.hold = lambda project, revision: (held.append(project.lights[0].field_deg[0]), hold(project, revision))
+    with ThreadPoolExecutor(3) as pool:
+        asked = [pool.submit(go, 4.0 + 0.1 * k) for k in range(12)]
+        for each in asked:
+            each.result()
+    assert len(held) < 12
     # a hand that lets go elsewhere than it was seen last, and one that goes back to where it came from
     session.do("move_light", {"light": 0, "x": 4.5, "y": 1.0})
     assert screen.wait(60.0)

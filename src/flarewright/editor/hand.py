@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import threading
 import time
 from collections.abc import Callable
@@ -57,6 +58,9 @@ class Hand:
     def __init__(self, screen: Screen) -> None:
         self.screen = screen
         self._one = threading.Lock()
+        # so many pictures were asked for
+        self._asked = itertools.count(1)
+        self._newest = 0
         self._scale = 0
         self._leaning = 0
         self._sheets: tuple[Sheet, ...] = ()
@@ -77,6 +81,7 @@ class Hand:
             None where the hand has let go already.
         """
         session = self.screen.session
+        number = self._newest = next(self._asked)
         # the final picture of a place that the hand has left is of no use
         if not self.screen.interrupt(revision):
             return None
@@ -91,7 +96,9 @@ class Hand:
                 # the hand has let go meanwhile, and the final picture needs all the time there is
                 return None
             self.screen.moved = project
-            self.screen.hold(project, revision)
+            # a hand that asks for more moves on
+            if number == self._newest:
+                self.screen.hold(project, revision)
         # the next one is drawn while this one is packed
         data = jpeg(self._pixels(drawn), QUALITY)
         return Moved(project, data, time.perf_counter() - begun)

@@ -102,11 +102,15 @@ class Screen:
 
     def show(self, picture: Picture) -> None:
         """Show another picture."""
-        self.picture, self.problem, self.moved = picture, "", None
+        data = None
         # a background may be gone: whoever asks for the picture is told
         with suppress(FlarewrightError):
             # packed before anybody asks, while nothing else is drawn
-            self.packed = (self.number + 1, jpeg(shown_pixels(self), QUALITY))
+            data = jpeg(pixels_of_picture(self, picture), QUALITY)
+        # no state may be told of the new picture with the old number
+        self.picture, self.problem, self.moved = picture, "", None
+        if data is not None:
+            self.packed = (self.number + 1, data)
         self._publish()
 
     def _publish(self) -> None:

@@ -223,21 +223,21 @@ export function viewport(canvas, app) {
   };
   self.refresh = latest(async (fade) => {
     const asked = self.mover.asked();
-    // what a hand holds still gets sharper, until it moves on: then this picture is of a place that it has left
-    const left = () => {
-      if (!self.mover.live || (!self.mover.busy() && self.mover.asked() === asked)) return false;
-      self.shownNumber = app.state.picture.number;
-      return true;
-    };
-    if (left()) return;
-    const answer = await fetch(`/api/picture?n=${app.state.picture.number}`);
+    // what comes meanwhile is asked for anew
+    const { number, grade, current } = app.state.picture;
+    // what a hand holds still gets sharper, until it moves on; neither then nor when it has let go elsewhere does a
+    // picture of another place take that place's
+    const late = () => (self.mover.live
+      ? self.mover.busy() || self.mover.asked() !== asked || current
+      : self.shownGrade === 'moving' && !current);
+    if (late()) return;
+    const answer = await fetch(`/api/picture?n=${number}`);
     if (!answer.ok) throw new Error((await answer.json()).error);
-    const grade = app.state.picture.grade;
     const bitmap = await createImageBitmap(await answer.blob());
-    if (left()) return;
+    if (late()) return;
     self.show(bitmap, fade);
     self.shownGrade = grade;
-    self.shownNumber = app.state.picture.number;
+    self.shownNumber = number;
     if (['soon', 'final', 'working'].includes(grade)) { self.afterwards?.(); self.afterwards = null; }
     if (grade === 'soon' && self.released) self.stats.soon = performance.now() - self.released;
     if (grade === 'final' && self.released) { self.stats.final = performance.now() - self.released; self.released = 0; }
@@ -267,6 +267,7 @@ export function viewport(canvas, app) {
   self.mover = mover(app, (bitmap, lights) => {
     self.show(bitmap, false);
     self.shownGrade = 'moving';
+    self.shownNumber = -1;
     app.lightsMoved(lights);
   });
   self.stats = self.mover.stats;
