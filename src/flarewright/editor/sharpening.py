@@ -65,9 +65,7 @@ def sharpen(screen: Screen, project: Project, view: View, check: Check) -> None:
     seen_first = not working and screen.final_s > SEEN_FIRST_S
     if not working:
         if screen.final_s > LATE_S:
-            soon = studio.take(project, "soon", view, progress=_progress(screen, "traced picture", check))
-            check()
-            screen.show(soon)
+            _show_soon(screen, project, view, check)
         if seen_first:
             _look(screen, project, "final", check)
         final = studio.take(project, "final", view, progress=_progress(screen, "final picture", check))
@@ -89,6 +87,13 @@ def sharpen(screen: Screen, project: Project, view: View, check: Check) -> None:
     check()
     if screen.idle is not None:
         screen.idle()
+
+
+def _show_soon(screen: Screen, project: Project, view: View, check: Check) -> None:
+    """Trace a project as well as a screen can show it, unless something newer waits by then."""
+    soon = studio.take(project, "soon", view, progress=_progress(screen, "traced picture", check))
+    check()
+    screen.show(soon)
 
 
 def _look(screen: Screen, project: Project, grade: studio.Grade, check: Check) -> None:
