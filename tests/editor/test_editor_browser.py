@@ -118,6 +118,10 @@ def test_drafts_do_not_jump_in_brightness(tab):
     # a hand that holds still sees what it would when letting go
     tab.until("flarewright.view.shownGrade === 'final'")
     held = level()
+    # what is said of the light is the hand's, not the project's
+    numbers = tab.js("flarewright.view.mover.lights[0]")
+    assert numbers != tab.state()["lights"][0]["field_deg"]
+    assert tab.js("document.querySelector('#panel input').value") == f"{numbers[0]:.2f}"
     # and goes on with drafts
     mouse.move(first[0] - 60, first[1] + 26)
     tab.until("flarewright.view.shownGrade === 'moving'")

@@ -16,6 +16,7 @@ from flarewright.editor.screen import Screen, packed, shown_pixels
 from flarewright.editor.seen import Seen, SeenGhost, alone, is_there, outline, see, under
 from flarewright.editor.session import begin
 from flarewright.editor.shown import FALSE_COLOURS, jpeg, pixels_of, plate_for
+from flarewright.editor.snapshot import ghosts_of
 from flarewright.editor.view import View
 from flarewright.editor.viewing import outline_png, picked, target_jpeg
 from flarewright.errors import ProjectError
@@ -402,11 +403,16 @@ def test_what_a_hand_holds_still_is_drawn_in_full():
     assert drawn[-1] == ("final", (3.0, 1.0))
     # nothing is decided by holding, and what is held is not drawn again when it is let go
     assert session.project.lights[0].field_deg != (3.0, 1.0)
-    count, number = len(drawn), screen.number
+    count, number, events = len(drawn), screen.number, []
+    session.listeners.append(lambda event: events.append(event["type"]))
+    assert not ghosts_of(screen)["fresh"]
     session.do("move_light", {"light": 0, "x": 3.0, "y": 1.0})
     assert screen.wait(60.0)
     assert len(drawn) == count
     assert screen.number > number
+    # the table of ghosts is the project's now
+    assert events.count("ghosts") == 1
+    assert ghosts_of(screen)["fresh"]
     # a hand on its way sees none of that
     drawn.clear()
     for x in (4.0, 4.1, 4.2):

@@ -73,11 +73,15 @@ class Screen:
             return
         project, view = self.session.project, self.session.view
         wanted = _wanted(project, view)
+        held = not self._let_go.is_set()
         self._let_go.set()
         if wanted == self._busy and not self.problem:
             # only the way it is shown has changed; what a hand was shown is newer than the last picture
             if self.moved is None:
                 self._publish()
+            if held:
+                # what was seen while a hand held it is the project's from now on
+                self.session.tell({"type": "ghosts"})
             return
         self._busy = wanted
         self._lane.submit(lambda check: self._work(project, view, check))

@@ -46,6 +46,9 @@ function update() {
   const state = app.state;
   for (const part of parts) part.update?.(state);
   panels[app.tab].update?.(state);
+  // a hand may hold its light elsewhere
+  const { live, lights } = app.view.mover;
+  if (live && lights && app.tab === 'light') panels.light.moved?.(lights[app.light]);
   $('problem').hidden = !state.picture.problem;
   $('problem').textContent = state.picture.problem ? `${sentence(state.picture.problem)} The last good picture is shown.` : '';
   document.title = `${state.clean ? '' : '• '}${fileName(state)} – Flarewright`;
