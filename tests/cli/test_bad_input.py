@@ -355,7 +355,11 @@ COMMAND_LINES = {
     "zoom to a position that is none": (["render", "canon-70-200", *GOOD, "--zoom", "macro"], "no position 'macro'"),
     "zoom below nothing": (["render", "canon-70-200", *GOOD, "--zoom", "-5"], "not to -5 mm"),
     "filter without thickness": ([*H, *GOOD, "--filter", "N-BK7"], "--filter 'N-BK7' is no plate"),
-    "filter of no glass": ([*H, *GOOD, "--filter", "UNOBTAINIUM:2"], "an index in the name's place"),
+    "filter of no glass": (
+        [*H, *GOOD, "--filter", "UNOBTAINIUM:2"],
+        "'UNOBTAINIUM' is not in the catalogue: give n_d and v_d instead (on the command line an index in the name's "
+        "place",
+    ),
     "filter of no thickness": ([*H, *GOOD, "--filter", "N-BK7:0"], "--filter 'N-BK7:0'"),
     "filter of thin air": ([*H, *GOOD, "--filter", "1.0:2"], "--filter '1.0:2'"),
     "cover glass that does not fit": ([*H, *GOOD, "--cover-glass", "N-BK7:90:40"], "does not fit behind"),

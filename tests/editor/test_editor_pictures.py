@@ -440,6 +440,26 @@ def test_what_a_hand_holds_still_is_drawn_in_full():
     assert screen.picture.grade == "final"
 
 
+def test_a_view_that_changes_while_a_picture_is_packed_is_shown(monkeypatch):
+    session, _ = begin(None)
+    screen = Screen(session)
+    screen.start()
+    assert screen.wait(60.0)
+    encode = [jpeg]
+
+    def changed(pixels, quality):
+        data = jpeg(pixels, quality)
+        if encode:
+            encode.pop()
+            session.set_view({"exposure_stops": screen.exposure_stops + 3.0})
+        return data
+
+    monkeypatch.setattr("flarewright.editor.screen.jpeg", changed)
+    screen.show(screen.picture)
+    assert not encode
+    assert packed(screen) == jpeg(shown_pixels(screen), 92)
+
+
 def test_every_ghost_of_the_picture_has_rays_in_the_cross_section():
     """Also those that fill little of the entrance, or that only a corner of the blades lets through."""
     project = project_for_lens("canon-28-80")

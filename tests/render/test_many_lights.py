@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from flarewright.editor.files import project_for_lens
 from flarewright.kernels.bundle import measure_bundle
+from flarewright.kernels.trace import WEIGHT
 from flarewright.model import D65, BlackBody, Camera, Dirt, Iris, Light, Lines, Output, Project, Quality
 from flarewright.optics.bundle import trace_bundle, trace_grid
 from flarewright.optics.diffraction import Soil, pupil_pattern
@@ -278,3 +281,7 @@ def test_a_dark_wavelength_leaves_its_light_to_bright_ones(one_color):
     # forty-eight rays tell how much a wavelength passes
     whole = flux @ weights
     np.testing.assert_allclose(light, whole, atol=0.03 * np.abs(whole).max())
+    # mirrors that reflect nothing have no colour, and no weight that is not a number
+    dark = replace(shot.packed, reflectance=np.zeros_like(shot.packed.reflectance))
+    unlit = {w: np.where(np.arange(data.shape[1]) == WEIGHT, 0.0, data) for w, data in bundle.traced.items()}
+    assert gathered_weights(dark, replace(bundle, traced=unlit), *everything[2:], careful=False) is None

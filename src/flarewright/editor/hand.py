@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import threading
 import time
 from collections.abc import Callable
@@ -58,9 +57,8 @@ class Hand:
     def __init__(self, screen: Screen) -> None:
         self.screen = screen
         self._one = threading.Lock()
-        # so many pictures were asked for
-        self._asked = itertools.count(1)
-        self._newest = 0
+        # what was asked for last
+        self._newest: object = None
         self._scale = 0
         self._leaning = 0
         self._sheets: tuple[Sheet, ...] = ()
@@ -81,7 +79,7 @@ class Hand:
             None where the hand has let go already.
         """
         session = self.screen.session
-        number = self._newest = next(self._asked)
+        ticket = self._newest = object()
         # the final picture of a place that the hand has left is of no use
         if not self.screen.interrupt(revision):
             return None
@@ -97,7 +95,7 @@ class Hand:
                 return None
             self.screen.moved = project
             # a hand that asks for more moves on
-            if number == self._newest:
+            if ticket is self._newest:
                 self.screen.hold(project, revision)
         # the next one is drawn while this one is packed
         data = jpeg(self._pixels(drawn), QUALITY)
@@ -126,14 +124,13 @@ class Hand:
         view = screen.session.view
         if isinstance(drawn, Picture):
             return pixels_of_picture(screen, drawn)
-        if view.look == "srgb" and view.plate is None:
-            gain, exposure = screen.match.gain, screen.exposure_stops
-            if len(drawn.stars) > 1:
-                return view_sum(drawn.ghosts, drawn.rest, exposure, ghost_gain=gain)
+        if view.plain and len(drawn.stars) == 1:
+            # the sheet as it lies, not moved onto a picture of its own first
             (star,) = drawn.stars
             return view_sum(
-                drawn.ghosts, star.sheet.pixels, exposure, ghost_gain=gain, rest_gain=star.gain, corner=star.corner
-            )
+                drawn.ghosts, star.sheet.pixels, screen.exposure_stops,
+                ghost_gain=screen.match.gain, rest_gain=star.gain, corner=star.corner,
+            )  # fmt: skip
         return pixels_of_picture(screen, Picture(screen.session.project, "moving", drawn.ghosts, drawn.rest, 0.0))
 
     def _lean(self, seconds: float) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import threading
-import time
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
@@ -28,7 +27,7 @@ from .view import View
 # of a picture that rests
 QUALITY = 92
 # a hand that has not moved for so long is looking, and sees no draft any more
-HOLD_S, POLL_S = 0.15, 0.02
+HOLD_S = 0.15
 
 
 class Screen:
@@ -56,7 +55,7 @@ class Screen:
         self.final_s = math.inf
         self._lane = Lane("pictures")
         self._busy: tuple[Project, View] | None = None
-        # set when a hand has let go of what it held still
+        # set when a hand has let go of what it held still, or moved on
         self._let_go = threading.Event()
         session.listeners.append(self._heard)
 
@@ -106,15 +105,13 @@ class Screen:
 
     def show(self, picture: Picture) -> None:
         """Show another picture."""
-        data = None
+        packed = self.packed
         # a background may be gone: whoever asks for the picture is told
         with suppress(FlarewrightError):
-            # packed before anybody asks, while nothing else is drawn
-            data = jpeg(pixels_of_picture(self, picture), QUALITY)
+            # packed before anybody asks, while nothing else is drawn; outdated where the view changes meanwhile
+            packed = (self.number + 1, jpeg(pixels_of_picture(self, picture), QUALITY))
         # no state may be told of the new picture with the old number
-        self.picture, self.problem, self.moved = picture, "", None
-        if data is not None:
-            self.packed = (self.number + 1, data)
+        self.picture, self.problem, self.moved, self.packed = picture, "", None, packed
         self._publish()
 
     def _publish(self) -> None:
@@ -141,6 +138,7 @@ class Screen:
                 return False
             self._lane.cancel()
             self._busy = None
+            self._let_go.set()
             return True
 
     def hold(self, project: Project, revision: int) -> None:
@@ -157,12 +155,11 @@ class Screen:
             if revision != self.session.revision:
                 return
             view, let_go = self.session.view, threading.Event()
+            self._let_go.set()
             self._busy, self._let_go = _wanted(project, view), let_go
 
             def work(check: Check) -> None:
-                moves_until = time.monotonic() + HOLD_S
-                while not let_go.wait(POLL_S) and time.monotonic() < moves_until:
-                    check()
+                let_go.wait(HOLD_S)
                 check()
                 self._work(project, view, check)
 
@@ -200,7 +197,7 @@ def shown_pixels(screen: Screen) -> NDArray[np.uint8]:
 def pixels_of_picture(screen: Screen, picture: Picture) -> NDArray[np.uint8]:
     """Return sRGB pixels of a picture as the session's view has it."""
     view = screen.session.view
-    if view.look == "srgb" and view.plate is None:
+    if view.plain:
         gain = studio.ghost_gain(picture, screen.match)
         return view_sum(picture.ghosts, picture.rest, screen.exposure_stops, ghost_gain=gain)
     light = studio.light_of(picture, screen.match)

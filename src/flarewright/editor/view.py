@@ -40,3 +40,8 @@ class View(Frozen):
     safe_frame: bool = False
     plate: str | None = None
     plate_stops: float = Field(0.0, ge=-30.0, le=30.0)
+
+    @property
+    def plain(self) -> bool:
+        """Whether a picture is shown by the sRGB curve and nothing else."""
+        return self.look == "srgb" and self.plate is None

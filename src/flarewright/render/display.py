@@ -91,7 +91,7 @@ def view_sum(
     rest_gain: Sequence[float] = (1.0, 1.0, 1.0),
     corner: tuple[int, int] = (0, 0),
 ) -> NDArray[np.uint8]:
-    """Return `view` of a sum by the sRGB curve, in a fraction of its time: for pictures of a moving hand.
+    """Return `view` of a sum by the sRGB curve, in a fraction of its time: for pictures that are only looked at.
 
     Parameters
     ----------

@@ -58,8 +58,8 @@ def gathered_weights(
     dict of int to ndarray, shape (3,), or None
         The wavelengths that are drawn, rising, and what each adds in place of its neighbours too: those of `shown` that
         are not dark, or the brightest of all where all of these are. None where they cannot stand for the others: no
-        ray is seen; or, for who is careful, the path is dark at one of them, or it is cut elsewhere, or lands
-        elsewhere, at the ends of the spectrum.
+        ray is seen, or none carries light; or, for who is careful, the path is dark at one of them, or it is cut
+        elsewhere, or lands elsewhere, at the ends of the spectrum.
 
     Notes
     -----
@@ -81,7 +81,7 @@ def gathered_weights(
     # where a coating quenches a path in the middle of the spectrum, little of its light needs to be there
     least = LEAST_PART * flux.max()
     drawn = tuple(w for w in shown if flux[w] > least) or (int(flux.argmax()),)
-    if careful and drawn != shown:
+    if least == 0.0 or (careful and drawn != shown):
         return None
     gathered = (_hats(count, drawn) * flux / flux[list(drawn), None]) @ weights
     return dict(zip(drawn, gathered, strict=True))

@@ -48,7 +48,7 @@ function update() {
   panels[app.tab].update?.(state);
   // a hand may hold its light elsewhere
   const { live, lights } = app.view.mover;
-  if (live && lights && app.tab === 'light') panels.light.moved?.(lights[app.light]);
+  if (live && lights) writeLights(lights);
   $('problem').hidden = !state.picture.problem;
   $('problem').textContent = state.picture.problem ? `${sentence(state.picture.problem)} The last good picture is shown.` : '';
   document.title = `${state.clean ? '' : '• '}${fileName(state)} – Flarewright`;
@@ -98,13 +98,16 @@ app.choose = (name, walking = false) => {
 };
 app.chooseWish = (number) => { app.wish = number; app.ghost = null; app.view.outline = null; panels[app.tab].update?.(app.state); app.view.redraw(); };
 app.chooseLight = (k) => { if (app.light !== k) { app.light = k; panels[app.tab].update?.(app.state); } };
+function writeLights(lights) {
+  if (app.tab === 'light') panels.light.moved?.(lights[app.light]);
+}
 // writing numbers costs a layout of the panel: some ten times a second is enough for the eye
 let wrote = 0;
 app.lightsMoved = (lights) => {
   const now = performance.now();
   if (app.tab !== 'light' || now - wrote < 90) return;
   wrote = now;
-  panels.light.moved?.(lights[app.light]);
+  writeLights(lights);
 };
 app.hint = () => {
   const { stack, at } = app.view;
