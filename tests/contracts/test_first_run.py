@@ -23,6 +23,9 @@ from flarewright.kernels import first_run, helpers
 helpers.cores = lambda: int(sys.argv[1])
 import flarewright.render.first_run as plan
 plan.cores = helpers.cores
+planned = set()
+together = plan.compile_together
+plan.compile_together = lambda names, processes: (planned.update(names), together(names, processes))
 code = run(sys.argv[2:])
 found = {}
 for name in first_run.ROOTS:
@@ -33,6 +36,7 @@ for name in first_run.ROOTS:
         "called": [str(types) for types in kernel.signatures],
         "compiled": kernel.stats.cache_misses.get(first_run.types(name), 0),
         "expected": str(first_run.types(name)),
+        "planned": name in planned,
     }
 print(json.dumps({"code": code, "roots": found}))
 """
@@ -66,6 +70,14 @@ def test_a_cold_command_writes_what_a_warm_one_writes(tmp_path):
     assert {name for name in again if again[name]["called"]} == called
     kernels = {path.name.split("-")[0] for path in (tmp_path / "cache").rglob("*.nbi")}
     assert kernels == {ROOTS[name][0] for name in called}
+
+
+def test_what_a_command_calls_is_compiled_while_its_helper_works(tmp_path):
+    # at seven wavelengths some ghosts are drawn at a few of them
+    words = ("heliar-tronnier", "--light", "12,7", "--size", "192x108", "--no-png")
+    roots, _ = watched("render", *words, "-o", tmp_path / "a.exr", cores=2, cache=tmp_path / "cache")
+    assert roots["seen"]["called"]
+    assert {name for name in roots if roots[name]["called"]} == {name for name in roots if roots[name]["planned"]}
 
 
 @pytest.mark.parametrize(

@@ -39,8 +39,8 @@ def compile_for_render(project: Project, threads: int | None = None) -> None:
     if project.quality.mode == "final":
         names += ["draw" if iris.mask is None else "draw masked", "densities", "pixels", "double"]
         if project.quality.bridge and project.quality.wavelengths > 1:
-            names += ["shifts"]
-            names += ["seen", "standing", "traced mirrors", "path curves", "bends"] if coated else []
+            names += ["shifts", "seen", "standing"]
+            names += ["traced mirrors", "path curves", "bends"] if coated else []
         # wide open, and with lights that have a size, rings are rarely seen: then it is compiled when it is called
         if (
             project.quality.ringing != "off"
