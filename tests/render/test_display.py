@@ -101,6 +101,8 @@ def test_beauty_adds_windows_and_cuts_what_lies_outside():
     expected = np.ones((4, 6, 3))
     expected[:2, 4:] += 2.0
     np.testing.assert_array_equal(total.pixels, expected)
+    # and leaves the layers alone
+    assert (a.pixels == 1.0).all()
     assert beauty([a, b]).window == (0, 0, 7, 4)
     assert not beauty([], (3, 2)).pixels.any()
     with pytest.raises(FlarewrightError):

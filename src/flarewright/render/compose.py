@@ -43,10 +43,16 @@ def beauty(layers: Sequence[Layer], size_px: tuple[int, int] | None = None) -> L
             max(1, *(layer.window[1] + layer.window[3] for layer in layers)),
         )
     width, height = size_px
-    total = np.zeros((height, width, 3), np.float32)
-    for layer in layers:
+    whole = (0, 0, width, height)
+    rest = list(layers)
+    if rest and rest[0].window == whole:
+        # a copy is made sooner than a sum with nothing
+        total = rest.pop(0).pixels.astype(np.float32)
+    else:
+        total = np.zeros((height, width, 3), np.float32)
+    for layer in rest:
         x, y, w, h = layer.window
         left, top, right, bottom = max(x, 0), max(y, 0), min(x + w, width), min(y + h, height)
         if left < right and top < bottom:
             total[top:bottom, left:right] += layer.pixels[top - y : bottom - y, left - x : right - x]
-    return Layer("beauty", total, (0, 0, width, height))
+    return Layer("beauty", total, whole)

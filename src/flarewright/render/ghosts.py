@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernels.raster import sum_rows
+from ..kernels.raster import sum_rows, summed_rows
 from ..model import Layer, Quality
 from ..optics.color import luminance_weights
 from ..optics.paths import LightPath
@@ -273,6 +273,7 @@ def _draft(
     def draw(group: list[int]) -> list[Plane | None]:
         width, height = shots[0].size_px
         sheets: list[NDArray[np.float64] | None] = [None] * DETAILS
+        planes: list[Plane | None]
         sheets[0] = picture = np.zeros((height, width, 3))
         mine = sorted(k for k in group if k in place)
         ghosts, places = [paths[k] for k in mine], [place[k] for k in mine]
@@ -295,9 +296,7 @@ def _draft(
             for path, changed in by_hand:
                 if changed.framed and not changed.alone:
                     draw_draft_by_hand(shot, path, changed, picture)
-        for sheet in sheets:
-            if sheet is not None:
-                sum_rows(sheet)
+        planes = [None if sheet is None else _summed(sheet) for sheet in sheets]
         # blurring is linear, so ghosts of one blur are blurred together
         alike: dict[object, list[tuple[Shot, LightPath, PathArt]]] = {}
         for number, (shot, (path, changed)) in enumerate(product(points, by_hand)):
@@ -305,11 +304,11 @@ def _draft(
                 key = ("ramp", number) if changed.ramps else changed.blur
                 alike.setdefault(key, []).append((shot, path, changed))
         for blurred in alike.values():
-            picture += draft_alone([(shot, path) for shot, path, _ in blurred], [art for *_, art in blurred])
-        _add_spread_drafts(wide, [paths[k] for k in group], art, sheets)
+            _add_to(planes, 0, draft_alone([(shot, path) for shot, path, _ in blurred], [art for *_, art in blurred]))
+        _add_spread_drafts(wide, [paths[k] for k in group], art, planes)
         for k in group:
             meter.step(f"ghost {paths[k].name}")
-        return list(sheets)
+        return planes
 
     named = [paths[k] for k in order]
     total, layers = _collect(shots, order, named, singles, art, draw, pool, most=_DRAFT_CHUNKS)
@@ -318,7 +317,7 @@ def _draft(
 
 def _add_spread_drafts(
     shots: Sequence[Shot], paths: Sequence[LightPath], art: Mapping[str, PathArt],
-    sheets: list[NDArray[np.float64] | None],
+    planes: list[Plane | None],
 ) -> None:  # fmt: skip
     """Add paraxial ghosts of area lights, those of one spread together, to a picture of each resolution."""
     marked: list[NDArray[np.float64] | None] = [None] * DETAILS
@@ -335,17 +334,23 @@ def _add_spread_drafts(
             halved = halvings(source, float("inf"), DETAILS - 1)
             ghosts, changes = [(shot, path) for path, *_ in together], [changed for _, changed, _ in together]
             if changes[0].alone:
-                _add_to(sheets, 0, draft_alone(ghosts, changes, source, halved))
+                _add_to(planes, 0, draft_alone(ghosts, changes, source, halved))
             else:
                 mark_spread(ghosts, changes, source, halved, marked)
     for detail, marks in enumerate(marked):
         if marks is not None:
-            _add_to(sheets, detail, spread_light(marks))
+            _add_to(planes, detail, spread_light(marks))
 
 
-def _add_to(sheets: list[NDArray[np.float64] | None], detail: int, light: NDArray[np.float64]) -> None:
-    held = sheets[detail]
-    sheets[detail] = light if held is None else np.add(held, light, out=held)
+def _summed(sheet: NDArray[np.float64]) -> NDArray[np.float32]:
+    pixels = np.empty(sheet.shape, dtype=np.float32)
+    summed_rows(sheet, pixels)
+    return pixels
+
+
+def _add_to(planes: list[Plane | None], detail: int, light: NDArray[np.float64]) -> None:
+    held = planes[detail]
+    planes[detail] = light if held is None else np.add(held, light, out=held, casting="same_kind")
 
 
 def _rank_draft(shots: Sequence[Shot], paths: Sequence[LightPath], art: Mapping[str, PathArt]) -> list[int]:
