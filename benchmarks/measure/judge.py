@@ -155,10 +155,12 @@ def found_ghosts(model: GhostModel, pose: dict[str, Any], sigma: NDArray[np.floa
     """Return what a model shows at a constellation above the noise, away from the light."""
     found = []
     size = sigma.shape[1], sigma.shape[0]
+    # a copy is validated, and the cells of what is no ghost take long
+    bare = model.replace(sprites=())
     for ghost in model.ghosts:
         if not ghost.visible_deg[0] <= pose["constellation_deg"] <= ghost.visible_deg[1]:
             continue
-        alone = cast(GhostModel, model.replace(ghosts=(ghost,)))
+        alone = cast(GhostModel, bare.replace(ghosts=(ghost,)))
         green = draw(alone, pose["constellation_deg"], pose["roll_deg"], size)[..., 1]
         seen = footprint(green)
         if seen is None:
