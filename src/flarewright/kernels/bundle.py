@@ -28,6 +28,8 @@ SHARED_BIT = 61
 SHARED = np.int64(1 << SHARED_BIT)
 # a cell whose density departs from a plane by more than this part is drawn triangle by triangle
 ROUGH = 5e-3
+# a cell whose flux departs by more than this part from what its nodes' densities make is drawn with each triangle's own
+UNEVEN = 0.01
 
 
 @borrowing
@@ -125,6 +127,8 @@ def draw_bundle(
             end = start + 1
             while end < triangles.shape[0] and triangles[end, 0] == triangles[start, 0]:
                 end += 1
+            # what a node's density of 1 is worth all over the cell; 0: each triangle has its own flux
+            common = 0.0
             if end - start >= 4:
                 count = _gather_cell(spots, blocked, triangles, start, end, width, height, polygon)
                 alike = 1.0
@@ -134,11 +138,13 @@ def draw_bundle(
                         start = end
                         continue
                 if count > 0 and alike > 0.0:
-                    flux, area = 0.0, 0.0
+                    flux, area, meant = 0.0, 0.0, 0.0
                     for t in range(start, end):
-                        part, spread = _triangle_flux(data, pupil, triangles[t, 0], triangles[t, 1], triangles[t, 2])
+                        a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+                        part, spread = _triangle_flux(data, pupil, a, b, c)
                         flux += part * gain
                         area += spread
+                        meant += abs(spread) * (densities[a] + densities[b] + densities[c]) / 3.0
                     drawn = abs(area) * pixel_area
                     fits, base, gx, gy, dense_low, dense_high = _plane_over_cell(
                         spots, densities, triangles, start, end, flux / drawn, gain / pixel_area, drawn
@@ -150,6 +156,11 @@ def draw_bundle(
                         fill_polygon(polygon, count, base, gx, gy, dense_low, dense_high, rgb, plane)
                         start = end
                         continue
+                    # the cell has its flux; a triangle's own would show, for its sides are chords
+                    common = flux / meant if meant > 0.0 else 0.0
+                    # beside a fold densities of nodes say little
+                    if abs(common - gain) > UNEVEN * gain:
+                        common = 0.0
             # not a function of its own: handing it a dozen arrays would cost as much as the triangle
             for t in range(start, end):
                 a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
@@ -162,6 +173,8 @@ def draw_bundle(
                     continue
                 flux, area = _triangle_flux(data, pupil, a, b, c)
                 flux *= gain
+                if common > 0.0:
+                    flux = common * abs(area) * (densities[a] + densities[b] + densities[c]) / 3.0
                 whole = blocked[a] | blocked[b] | blocked[c] == 0
                 if whole and mask is None:
                     if left >= 0.0 and top >= 0.0 and int(left) == int(right) and int(top) == int(bottom):

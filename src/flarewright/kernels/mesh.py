@@ -8,8 +8,8 @@ from .trace import ALIVE, REL, STOP_X, WEIGHT, X, Y, trace_lanes
 
 # a FLAT leaf is good enough without its edges' middles, a LEAF needs them
 UNKNOWN, LEAF, SPLIT, EMPTY, FLAT = 0, 1, 2, 3, 4
-# away from the rim positions may err by this part of the cell
-INNER_BEND = 0.02
+# away from the rim positions may err by this part of the cell: twice that in area, which shows as triangles
+INNER_BEND = 0.005
 # cells in fringes are no larger than this many pixels: of a small one most often one edge tells the pattern
 FRINGE_CELL = 128.0
 # cells whose rays all end, but not at one surface, are halved so often
