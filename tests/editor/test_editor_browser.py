@@ -162,6 +162,71 @@ def test_a_click_chooses_among_all_ghosts_there(tab):
     assert tab.state()["by_hand"] == 1
 
 
+def test_a_drag_goes_on_whatever_is_selected(tab):
+    """A selection would be dragged itself, and what the browser ends is kept."""
+    tab.page.evaluate("document.activeElement.blur()")
+    tab.page.keyboard.press("Control+a")
+    assert "Open" not in tab.js("String(getSelection())")
+    tab.js("{ window.ended = []; for (const each of ['dragstart', 'pointercancel'])"
+           "document.getElementById('view').addEventListener(each, (event) => ended.push(each)); }")  # fmt: skip
+    first = tab.light()
+    tab.drag(first, (first[0] - 60, first[1] + 30))
+    tab.rest()
+    assert tab.js("ended") == []
+    assert tab.state()["steps"]["at"] == 1
+    before = tab.state()["lights"][0]["field_deg"]
+    mouse = tab.page.mouse
+    mouse.move(*tab.light())
+    mouse.down()
+    mouse.move(first[0] - 90, first[1] + 30, steps=4)
+    tab.js("document.getElementById('view').dispatchEvent(new PointerEvent('pointercancel'))")
+    mouse.move(first[0] + 90, first[1] + 30, steps=4)
+    tab.until("flarewright.state.steps.at === 2")
+    assert tab.state()["lights"][0]["field_deg"][0] < before[0]
+    mouse.up()
+    tab.rest()
+
+
+def test_the_foot_and_the_hint_say_what_is_shown(tab):
+    def hint():
+        return tab.page.locator("#hint").inner_text()
+
+    def click():
+        tab.page.mouse.click(*tab.at(0.62, 0.52))
+        tab.until("flarewright.view.stack.length > 1 && document.getElementById('hint').textContent.includes('scroll')")
+
+    click()
+    # the ghosts are no longer under that place when the picture is zoomed, or the light moved
+    tab.page.mouse.move(*tab.at(0.3, 0.3))
+    tab.page.mouse.wheel(0, -100)
+    tab.until("flarewright.view.zoom !== 1 && !flarewright.view.stack.length")
+    assert hint() == f"Ghost {tab.js('flarewright.ghost')}"
+    tab.page.keyboard.press("f")
+    click()
+    first = tab.light()
+    tab.page.mouse.move(*first)
+    tab.page.mouse.down()
+    tab.page.mouse.move(first[0] - 40, first[1], steps=4)
+    tab.until("document.getElementById('grade').textContent.startsWith('moving')")
+    tab.page.mouse.up()
+    tab.rest()
+    assert tab.js("document.getElementById('grade').textContent").startswith("final")
+    assert tab.js("flarewright.view.stack.length") == 0
+    click()
+    tab.tab("target")
+    tab.page.click("#wish-add")
+    tab.until("flarewright.wish === 0")
+    assert hint() == ""
+    tab.until("!document.querySelector('#section .head').textContent.includes('ghost')")
+    click()
+    said = tab.js("flarewright.deed('choose_lens', { lens: 'tessar-brendel' })"
+                  ".then(() => document.getElementById('grade').textContent)")  # fmt: skip
+    assert not said.startswith("final")
+    assert hint() == ""
+    tab.rest()
+    assert tab.js("document.getElementById('grade').textContent").startswith("final")
+
+
 def test_edit_cells_undo_five_redo_five(tab, tmp_path):
     tab.tab("lens")
 

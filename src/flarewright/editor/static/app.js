@@ -18,6 +18,10 @@ app.under = under;
 const $ = (id) => document.getElementById(id);
 
 // ------------------------------------------------------------------------------------------------------------- state
+const ghostsOf = (s) => JSON.stringify([s.lens.name, s.lens.rows.map((row) => row.stop)]);
+// what decides where ghosts lie, as it was told last: a hand writes into the state before it is told
+const placesOf = (s) => JSON.stringify([s.lights, s.lens, s.camera, s.iris, s.view.grey, s.view.unclipped]);
+let places = '';
 function take(state) {
   if (app.state && state.revision < app.state.revision) return;
   const old = app.state;
@@ -27,8 +31,11 @@ function take(state) {
   app.state = state;
   app.light = Math.min(app.light, state.lights.length - 1);
   const shot = (s) => JSON.stringify([s.lights, s.lens, s.camera, s.iris, s.dirt, s.coating, s.pass_gain, s.by_hand, s.view.grey, s.view.unclipped]);
-  // another lens has other ghosts
-  if (old && old.lens.name !== state.lens.name) Object.assign(app, { ghost: null, wish: null });
+  // another lens has other ghosts, and so has one whose rows have other numbers
+  if (old && ghostsOf(old) !== ghostsOf(state)) { Object.assign(app, { ghost: null, wish: null }); app.hint(); }
+  const now = placesOf(state);
+  if (places !== now) app.view.forget();
+  places = now;
   const moved = !old || shot(old) !== shot(state);
   if (moved) {
     app.view.outline = null;
@@ -96,7 +103,15 @@ app.choose = (name, walking = false) => {
   panels[app.tab].update?.(app.state);
   app.hint();
 };
-app.chooseWish = (number) => { app.wish = number; app.ghost = null; app.view.outline = null; panels[app.tab].update?.(app.state); app.view.redraw(); };
+app.chooseWish = (number) => {
+  Object.assign(app, { wish: number, ghost: null });
+  app.view.outline = null;
+  app.view.forget();
+  drawSection();
+  panels[app.tab].update?.(app.state);
+  app.hint();
+  app.view.redraw();
+};
 app.chooseLight = (k) => { if (app.light !== k) { app.light = k; panels[app.tab].update?.(app.state); } };
 function writeLights(lights) {
   if (app.tab === 'light') panels.light.moved?.(lights[app.light]);
@@ -286,11 +301,25 @@ function working(words, part) {
   what.textContent = meter.hidden ? '' : words;
   bar.style.width = `${100 * part}%`;
 }
-const GRADES = { moving: 'moving', draft: 'draft, by matrices', soon: 'by traced rays, getting sharper', final: 'final, by traced rays', working: 'working view, by matrices' };
+app.status = status;
+const GRADES = { moving: 'moving, by matrices', draft: 'draft, by matrices', soon: 'by traced rays, getting sharper', final: 'final, by traced rays', working: 'working view, by matrices' };
 const FIRST = 'drawing the first picture; the very first on a machine takes some ten seconds';
+function gradeWords({ grade: drawn, seconds, number, current, problem }) {
+  const { mover, shownGrade, shownNumber } = app.view;
+  if (!drawn) return FIRST;
+  if (problem) return 'the last good picture';
+  // what a hand holds is of no project yet, but it is what is shown
+  if (!mover.live && !current) return shownGrade === 'moving' ? GRADES.moving : 'the picture before, until the new one is drawn';
+  const words = GRADES[shownGrade] ?? GRADES[drawn];
+  if (shownNumber !== number || !seconds) return words;
+  return `${words} · ${seconds < 1 ? `${Math.round(seconds * 1000)} ms` : `${seconds.toFixed(1)} s`}`;
+}
 function status() {
+  if (!app.state) return;
   const { picture, frame, camera } = app.state;
-  grade.textContent = `${GRADES[picture.grade] ?? FIRST}${picture.seconds ? ` · ${picture.seconds < 1 ? `${Math.round(picture.seconds * 1000)} ms` : `${picture.seconds.toFixed(1)} s`}` : ''}`;
+  const words = gradeWords(picture);
+  // a hand asks for this with each of its pictures
+  if (grade.textContent !== words) grade.textContent = words;
   size.textContent = `${camera.size_px.join(' × ')} px · ${frame.sensor.map((mm) => Number(mm.toFixed(2))).join(' × ')} mm`;
   remark.textContent = app.state.remarks.join(' · ');
   remark.title = app.state.remarks.join('\n');
