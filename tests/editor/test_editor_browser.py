@@ -265,6 +265,41 @@ def test_edit_cells_undo_five_redo_five(tab, tmp_path):
     assert tab.state()["lens"]["rows"] == done
 
 
+def test_a_refused_number_does_not_stay(tab):
+    stops = tab.js("document.querySelector('input[name=exposure]').value")
+    tab.page.fill("input[name=exposure]", "1000")
+    tab.page.press("input[name=exposure]", "Enter")
+    tab.until(told("Exposure must be at most 60"))
+    tab.until(f"document.querySelector('input[name=exposure]').value === '{stops}'")
+    tab.tab("ghosts")
+    tab.page.click("[data-ghost] >> nth=0")
+    tab.page.fill("input[name=ghost_gain]", "-3")
+    tab.page.press("input[name=ghost_gain]", "Enter")
+    tab.until(told("Gain must be at least 0"))
+    tab.until("document.querySelector('input[name=ghost_gain]').value === '1'")
+    assert "×" not in tab.page.locator("tr.chosen").inner_text()
+
+
+def test_a_cell_of_another_lens_is_not_written(tab):
+    tab.tab("lens")
+    box = tab.page.locator("input[data-row='0'][data-column='radius']")
+    box.click()
+    box.press_sequentially("44")
+    # meanwhile another tab has chosen another lens
+    tab.js("fetch('/api/do', { method: 'POST', body: JSON.stringify({ name: 'choose_lens',"
+           " values: { lens: 'tessar-brendel' } }) })")  # fmt: skip
+    tab.until("flarewright.state.lens.shipped === 'tessar-brendel'")
+    box.press("Enter")
+    tab.until("document.querySelector('.wrong').textContent.includes('another one')")
+    tab.rest()
+    radius = tab.state()["lens"]["rows"][0]["radius"]
+    assert tab.state()["lens"]["shipped"] == "tessar-brendel"
+    assert box.input_value() == radius
+    box.fill("30")
+    box.press("Enter")
+    tab.until("flarewright.state.lens.rows[0].radius === '30'")
+
+
 def test_a_broken_lens_keeps_the_last_good_picture(tab):
     tab.tab("lens")
     good = tab.shown()

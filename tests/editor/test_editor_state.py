@@ -9,7 +9,7 @@ from flarewright.editor import history as past
 from flarewright.editor.autosave import Saved, autosave_path, read_autosave, write_autosave
 from flarewright.editor.deeds import DEEDS, done
 from flarewright.editor.edit_ghosts import Hand, hand, soloed
-from flarewright.editor.edit_lens import own_lens, prescription
+from flarewright.editor.edit_lens import own_lens, prescription, table_of
 from flarewright.editor.edit_wishes import direction, new_discs, target_project
 from flarewright.editor.jobs import Gate, Lane
 from flarewright.editor.session import begin
@@ -152,6 +152,41 @@ def test_a_refused_deed_leaves_everything_as_it_was(project):
         assert "\n" not in str(told.value)
     assert session.history is before
     assert json.dumps(str(session.project))
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "said"),
+    [
+        ("set_dirt", {"values": {"dust_per_mm2": -1}}, "dust per mm² must be at least 0, not -1"),
+        ("set_cell", {"row": 0, "column": "n_d", "text": "-1"}, "row 0: index n_d must be more than 1, not -1.0"),
+        ("set_cell", {"row": 0, "column": "v_d", "text": "x"}, "row 0: Abbe number V_d 'x' is no number; write"),
+        ("set_cell", {"row": 0, "column": "semi_diameter", "text": "-1"}, "row 0: semi-diameter must be more than 0"),
+        ("set_ghost", {"name": "8-6", "values": {"gain": -3}}, "gain must be at least 0, not -3"),
+        ("set_pass_gain", {"name": "ghosts", "gain": -3}, "gain of the ghosts must be at least 0, not -3"),
+        ("set_iris", {"values": {"roughness_um": -3}}, "roughness must be at least 0, not -3"),
+    ],
+)
+def test_what_is_refused_is_said_in_words(project, name, values, said):
+    with pytest.raises(FlarewrightError) as told:
+        done(project, name, values)
+    assert str(told.value).startswith(said)
+
+
+def test_a_deed_on_a_row_is_none_on_a_row_of_another_lens():
+    session, _ = begin(None)
+    with pytest.raises(FlarewrightError, match=r"^exposure must be at most 60, not 1000$"):
+        session.set_view({"exposure_stops": 1000})
+    seen = table_of(session.project)
+    session.do("set_cell", {"row": 1, "column": "thickness", "text": "4"}, table=seen)
+    # another cell is still that of this lens
+    session.do("set_cell", {"row": 0, "column": "radius", "text": "33"}, table=seen)
+    for name, values in (("add_row", {"row": 1}), ("choose_lens", {"lens": "tessar-brendel"})):
+        session.do(name, values)
+        before = session.project
+        with pytest.raises(FlarewrightError, match="the lens has become another one"):
+            session.do("set_cell", {"row": 0, "column": "radius", "text": "44"}, table=seen)
+        assert session.project is before
+    session.keeper.close()
 
 
 def test_every_deed_is_tried_here():

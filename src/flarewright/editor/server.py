@@ -73,7 +73,9 @@ def _state(desk: Desk, _request: Request, _body: Any) -> Any:
 
 
 def _do(desk: Desk, _request: Request, body: Any) -> Any:
-    desk.session.do(str(body["name"]), dict(body.get("values", {})), str(body.get("group", "")))
+    table = body.get("table")
+    group = str(body.get("group", ""))
+    desk.session.do(str(body["name"]), dict(body.get("values", {})), group, None if table is None else str(table))
     return desk.state()
 
 

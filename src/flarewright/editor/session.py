@@ -15,7 +15,7 @@ from ..model import Project
 from . import history as past
 from .autosave import Saved, autosave_path, read_autosave
 from .deeds import done
-from .edit_lens import sentence
+from .edit_lens import sentence, table_of
 from .files import open_any, project_path, sample_project, save_project
 from .keeper import Keeper, claim
 from .view import View
@@ -52,9 +52,17 @@ class Session:
         for listener in tuple(self.listeners):
             listener(event)
 
-    def do(self, name: str, values: dict[str, Any], group: str = "") -> None:
-        """Do something to the project (`deeds.DEEDS`), or refuse it and leave everything as it was."""
+    def do(self, name: str, values: dict[str, Any], group: str = "", table: str | None = None) -> None:
+        """Do something to the project (`deeds.DEEDS`), or refuse it and leave everything as it was.
+
+        `table` is the prescription that a deed on one of its rows was meant for (`edit_lens.table_of`).
+        """
         with self.lock:
+            if table is not None and table != table_of(self.project):
+                raise ProjectError(
+                    "the lens has become another one since this row was shown, so nothing was written; choose the row "
+                    "again in the table as it is now"
+                )
             project, label = done(self.project, name, values)
             self._move(past.committed(self.history, project, label, group))
 

@@ -66,24 +66,28 @@ const fileName = (state) => (state.file ? state.file.split(/[\\/]/).pop() : stat
 
 // In the order in which they were asked for, so that the last word of a hand is the last.
 let line = Promise.resolve();
-app.deed = (name, values, group = '') => {
-  line = line.then(() => post('/api/do', { name, values, group })).then(take);
+app.deed = (name, values, group = '', table = null) => {
+  line = line.then(() => post('/api/do', { name, values, group, table: typeof table === 'function' ? table() : table })).then(take);
   const answer = line;
   line = line.catch(() => {});
-  return answer.catch((error) => { complain(error); reload(); throw error; });
+  // what was refused stands nowhere on the page any more
+  return answer.catch((error) => { complain(error); reload(); loadGhosts(); throw error; });
 };
+// the rows that the page shows: a deed on one of them is none on a row of another lens
+app.table = () => app.state.lens.table;
 const slow = new Map();
 // A slider may ask faster than the server answers: only its newest value is sent.
-app.lively = (name, values, group, key = name) => {
+app.lively = (name, values, group, key = name, table = null) => {
   if (!slow.has(key)) slow.set(key, latest((...asked) => app.deed(...asked).catch(() => {})));
-  slow.get(key)(name, values, group);
+  slow.get(key)(name, values, group, table);
 };
 // Keys come faster than answers: the page knows at once what was asked for, and nothing that was asked is dropped.
 let asked = {};
 const sendView = latest(async () => {
   const values = asked;
   asked = {};
-  if (Object.keys(values).length) take(await post('/api/view', values));
+  if (!Object.keys(values).length) return;
+  try { take(await post('/api/view', values)); } catch (error) { complain(error); reload(); }
 });
 app.setView = (values) => {
   Object.assign(asked, values);
