@@ -118,6 +118,32 @@ def test_saving_makes_the_autosave_clean_and_the_file_wins(project, tmp_path):
     assert third.file == str(path)
 
 
+def test_undo_of_open_leads_back_to_the_file(tmp_path):
+    session, _ = begin(None)
+    session.do("move_light", {"light": 0, "x": 4.0, "y": 2.0})
+    path = session.save(str(tmp_path / "shot.toml"))
+    session.open("tessar-brendel")
+    assert session.file is None
+    session.do("set_iris", {"values": {"blades": 8}})
+    session.undo()
+    session.undo()
+    assert session.file == str(path)
+    session.redo()
+    assert session.file is None
+    session.undo()
+    session.keeper.close()
+    again, _ = begin(None)
+    assert again.file == str(path)
+    again.redo()
+    assert again.file is None
+    again.undo()
+    # saved under another name, it goes on with that one, and so do the steps before
+    other = again.save(str(tmp_path / "other.toml"))
+    again.undo()
+    assert again.file == str(other)
+    again.keeper.close()
+
+
 def test_without_a_name_the_last_file_is_opened_again(tmp_path):
     session, _ = begin(None)
     session.do("move_light", {"light": 0, "x": 4.0, "y": 2.0})
