@@ -368,6 +368,19 @@ def test_the_exported_exr_is_a_render_of_the_project(tab, tmp_path):
     np.testing.assert_array_equal(exr.layers[0].pixels, wanted["beauty"].pixels)
 
 
+def test_a_project_is_saved_under_another_name(tab, tmp_path):
+    for name, keys in (("one.toml", "Control+s"), ("two.toml", "Control+Shift+s")):
+        tab.page.keyboard.press(keys)
+        tab.page.fill("dialog input[name=path]", str(tmp_path / name))
+        tab.page.keyboard.press("Enter")
+        tab.until(f"flarewright.state.file?.endsWith({json.dumps(name)}) && flarewright.state.clean")
+        assert (tmp_path / name).is_file()
+    # the name so far is the one that is changed
+    tab.page.click("#export")
+    tab.page.click("[role=menuitem]:has-text('Save as')")
+    assert tab.page.locator("dialog input[name=path]").input_value() == str(tmp_path / "two.toml")
+
+
 def test_nothing_is_lost_when_the_server_is_killed(tab):
     tab.drag(tab.light(), tab.at(0.4, 0.3))
     tab.tab("iris")

@@ -231,7 +231,7 @@ function header() {
     h('span', { class: 'brand' }, 'Flarewright'),
     button('Open', openFile, { tip: 'Open a project, a lens file or a lens by its name (O).', id: 'open' }),
     button('Save', () => save(), { tip: 'Save the project file (Ctrl+S).', id: 'save' }),
-    button('Export ▾', (event) => menu(event.currentTarget, exports), { id: 'export', tip: 'Pictures, lens, project, table of ghosts, or the command that renders the saved project.' }),
+    button('Export ▾', (event) => menu(event.currentTarget, exports), { id: 'export', tip: 'The project under another name, pictures, lens, table of ghosts, or the command that renders the saved project.' }),
     file, h('span', { class: 'split' }), undo, redo, h('span', { class: 'gap' }), exposed, auto, look,
     button('?', help, { kind: 'quiet', tip: 'All shortcuts (?).', 'aria-label': 'Help', id: 'help' }),
   );
@@ -251,6 +251,7 @@ function header() {
   };
 }
 const exports = [
+  ['Save as…', saveAs, 'Save the project under another name, and go on with that file (Ctrl+Shift+S).'],
   ['EXR with layers', () => download('exr'), 'Rendered at the size and quality of the project; takes as long as a render.'],
   ['PNG as shown', () => download('png')],
   ['Lens file', () => download('lens')],
@@ -287,8 +288,9 @@ function asking(title, words, value, work) {
   box.focus(); box.select();
 }
 function openFile() { asking('Open', 'A project file, a lens file, or a lens’ name. Files can also be dropped on the page.', '', (text) => text.trim() && app.ask('/api/open', { text })); }
+function saveAs() { asking('Save', 'Where the project file shall lie, like shot.toml.', app.state.file ?? 'flare.toml', save); }
 async function save(text = app.state.file) {
-  if (!text) { asking('Save', 'Where the project file shall lie, like shot.toml.', 'flare.toml', save); return; }
+  if (!text) { saveAs(); return; }
   const state = await app.ask('/api/save', { text });
   if (state) toast(state.told, 'good');
 }
@@ -371,7 +373,7 @@ const KEYS = [
   ['S', 'solo the chosen ghost'], ['M', 'mute the chosen ghost'], ['N  P', 'next, previous ghost of the list'],
   ['T', 'play the light’s path, stop'], ['K', 'key the light at this time'], [', .', 'previous, next key'],
   ['X', 'show or hide the cross-section'], ['1 – 7', 'panels'], ['W', 'physical, target, wipe, side by side'], ['Ctrl+Z', 'undo'],
-  ['Ctrl+Shift+Z', 'redo'], ['Ctrl+S', 'save'], ['O', 'open'], ['Esc', 'let go of the ghost'], ['?', 'this sheet'],
+  ['Ctrl+Shift+Z', 'redo'], ['Ctrl+S', 'save'], ['Ctrl+Shift+S', 'save under another name'], ['O', 'open'], ['Esc', 'let go of the ghost'], ['?', 'this sheet'],
 ];
 function help() { dialog('Keys and hands', h('div', { class: 'keys' }, ...KEYS.flatMap(([key, words]) => [h('kbd', {}, key), h('span', {}, words)]))); }
 let nudging = null;
@@ -389,7 +391,7 @@ addEventListener('keydown', (event) => {
   const typing = event.target.matches('input:not([type=range]):not([type=checkbox]), select, textarea');
   if (event.ctrlKey || event.metaKey) {
     const key = event.key.toLowerCase();
-    if (key === 's') { event.preventDefault(); document.activeElement.blur(); save(); }
+    if (key === 's') { event.preventDefault(); document.activeElement.blur(); if (event.shiftKey) saveAs(); else save(); }
     if (typing) return;
     if (key === 'z') { event.preventDefault(); app.ask(event.shiftKey ? '/api/redo' : '/api/undo'); }
     if (key === 'y') { event.preventDefault(); app.ask('/api/redo'); }
