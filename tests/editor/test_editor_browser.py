@@ -162,6 +162,75 @@ def test_a_click_chooses_among_all_ghosts_there(tab):
     assert tab.state()["by_hand"] == 1
 
 
+def test_a_drag_goes_on_whatever_is_selected(tab):
+    """A selection would be dragged itself, and what the browser ends is kept."""
+    tab.page.evaluate("document.activeElement.blur()")
+    tab.page.keyboard.press("Control+a")
+    assert "Open" not in tab.js("String(getSelection())")
+    tab.js("{ window.ended = []; for (const each of ['dragstart', 'pointercancel'])"
+           "document.getElementById('view').addEventListener(each, (event) => ended.push(each)); }")  # fmt: skip
+    first = tab.light()
+    tab.drag(first, (first[0] - 60, first[1] + 30))
+    tab.rest()
+    assert tab.js("ended") == []
+    assert tab.state()["steps"]["at"] == 1
+    before = tab.state()["lights"][0]["field_deg"]
+    mouse = tab.page.mouse
+    mouse.move(*tab.light())
+    mouse.down()
+    mouse.move(first[0] - 90, first[1] + 30, steps=4)
+    tab.js("document.getElementById('view').dispatchEvent(new PointerEvent('pointercancel'))")
+    mouse.move(first[0] + 90, first[1] + 30, steps=4)
+    tab.until("flarewright.state.steps.at === 2")
+    assert tab.state()["lights"][0]["field_deg"][0] < before[0]
+    mouse.up()
+    tab.rest()
+
+
+def test_the_foot_and_the_hint_say_what_is_shown(tab):
+    def hint():
+        return tab.page.locator("#hint").inner_text()
+
+    def click():
+        tab.page.mouse.click(*tab.at(0.62, 0.52))
+        tab.until("flarewright.view.stack.length > 1 && document.getElementById('hint').textContent.includes('scroll')")
+
+    click()
+    # the ghosts are no longer under that place when the picture is zoomed, or the light moved
+    tab.page.mouse.move(*tab.at(0.3, 0.3))
+    tab.page.mouse.wheel(0, -100)
+    tab.until("flarewright.view.zoom !== 1 && !flarewright.view.stack.length")
+    assert hint() == f"Ghost {tab.js('flarewright.ghost')}"
+    tab.page.keyboard.press("f")
+    click()
+    first = tab.light()
+    # a busy machine may show it for a moment only
+    tab.js("{ window.read = []; const grade = document.getElementById('grade');"
+           "new MutationObserver(() => read.push(grade.textContent)).observe(grade, {childList: true}); }")  # fmt: skip
+    tab.page.mouse.move(*first)
+    tab.page.mouse.down()
+    tab.page.mouse.move(first[0] - 40, first[1], steps=4)
+    tab.until("read.some((words) => words.startsWith('moving'))")
+    tab.page.mouse.up()
+    tab.rest()
+    assert tab.js("document.getElementById('grade').textContent").startswith("final")
+    assert tab.js("flarewright.view.stack.length") == 0
+    click()
+    tab.tab("target")
+    tab.page.click("#wish-add")
+    tab.until("flarewright.wish === 0")
+    assert hint() == ""
+    tab.until("!document.querySelector('#section .head').textContent.includes('ghost')")
+    click()
+    said, shown = tab.js("flarewright.deed('choose_lens', {lens: 'tessar-brendel'}).then(() => {const a = flarewright;"
+                         "return [document.getElementById('grade').textContent, a.state.picture.current"
+                         "&& a.view.shownNumber === a.state.picture.number]; })")  # fmt: skip
+    assert shown or not said.startswith("final")
+    assert hint() == ""
+    tab.rest()
+    assert tab.js("document.getElementById('grade').textContent").startswith("final")
+
+
 def test_edit_cells_undo_five_redo_five(tab, tmp_path):
     tab.tab("lens")
 
@@ -198,6 +267,41 @@ def test_edit_cells_undo_five_redo_five(tab, tmp_path):
     box.press("Enter")
     tab.until("document.querySelector('.wrong').textContent.includes('N-NOTHING')")
     assert tab.state()["lens"]["rows"] == done
+
+
+def test_a_refused_number_does_not_stay(tab):
+    stops = tab.js("document.querySelector('input[name=exposure]').value")
+    tab.page.fill("input[name=exposure]", "1000")
+    tab.page.press("input[name=exposure]", "Enter")
+    tab.until(told("Exposure must be at most 60"))
+    tab.until(f"document.querySelector('input[name=exposure]').value === '{stops}'")
+    tab.tab("ghosts")
+    tab.page.click("[data-ghost] >> nth=0")
+    tab.page.fill("input[name=ghost_gain]", "-3")
+    tab.page.press("input[name=ghost_gain]", "Enter")
+    tab.until(told("Gain must be at least 0"))
+    tab.until("document.querySelector('input[name=ghost_gain]').value === '1'")
+    assert "×" not in tab.page.locator("tr.chosen").inner_text()
+
+
+def test_a_cell_of_another_lens_is_not_written(tab):
+    tab.tab("lens")
+    box = tab.page.locator("input[data-row='0'][data-column='radius']")
+    box.click()
+    box.press_sequentially("44")
+    # meanwhile another tab has chosen another lens
+    tab.js("fetch('/api/do', { method: 'POST', body: JSON.stringify({ name: 'choose_lens',"
+           " values: { lens: 'tessar-brendel' } }) })")  # fmt: skip
+    tab.until("flarewright.state.lens.shipped === 'tessar-brendel'")
+    box.press("Enter")
+    tab.until("document.querySelector('.wrong').textContent.includes('another one')")
+    tab.rest()
+    radius = tab.state()["lens"]["rows"][0]["radius"]
+    assert tab.state()["lens"]["shipped"] == "tessar-brendel"
+    assert box.input_value() == radius
+    box.fill("30")
+    box.press("Enter")
+    tab.until("flarewright.state.lens.rows[0].radius === '30'")
 
 
 def test_a_broken_lens_keeps_the_last_good_picture(tab):
@@ -266,6 +370,19 @@ def test_the_exported_exr_is_a_render_of_the_project(tab, tmp_path):
     wanted = {layer.name: layer for layer in render(project).layers}
     assert [layer.name for layer in exr.layers] == list(wanted)
     np.testing.assert_array_equal(exr.layers[0].pixels, wanted["beauty"].pixels)
+
+
+def test_a_project_is_saved_under_another_name(tab, tmp_path):
+    for name, keys in (("one.toml", "Control+s"), ("two.toml", "Control+Shift+s")):
+        tab.page.keyboard.press(keys)
+        tab.page.fill("dialog input[name=path]", str(tmp_path / name))
+        tab.page.keyboard.press("Enter")
+        tab.until(f"flarewright.state.file?.endsWith({json.dumps(name)}) && flarewright.state.clean")
+        assert (tmp_path / name).is_file()
+    # the name so far is the one that is changed
+    tab.page.click("#export")
+    tab.page.click("[role=menuitem]:has-text('Save as')")
+    assert tab.page.locator("dialog input[name=path]").input_value() == str(tmp_path / "two.toml")
 
 
 def test_nothing_is_lost_when_the_server_is_killed(tab):

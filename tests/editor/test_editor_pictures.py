@@ -525,3 +525,29 @@ def test_rounding_draws_no_border_beside_a_ghost():
     pixels[2:5, 2:5] = 1e-8
     pixels[2:5, 6] = 3e-22
     assert np.argwhere(_lit(pixels)).max() == 4
+
+
+def test_a_black_picture_sets_no_exposure(project):
+    """An exposure of 0 was found, which left everything black when the light came back."""
+    session, _ = begin(None)
+    screen = Screen(session)
+    session.put(project.replace(f_number=16.0, lights=(Light(field_deg=(-80.0, 0.0)),)), "Begin in the dark")
+    assert screen.wait(60.0)
+    # nothing was found that could be kept for the next time
+    assert session.view.found_stops is None
+    session.do("move_light", {"light": 0, "x": 6.0, "y": 3.0})
+    assert screen.wait(60.0)
+    found = screen.exposure_stops
+    assert found == session.view.found_stops == studio.exposure_of(screen.picture)
+    session.do("move_light", {"light": 0, "x": -80.0, "y": 0.0})
+    assert screen.wait(60.0)
+    with pytest.raises(ProjectError, match="there is no ghost to expose for"):
+        screen.expose()
+    assert screen.exposure_stops == found
+    # another lens chosen in the dark is exposed when it is seen
+    session.do("choose_lens", {"lens": "tessar-brendel"})
+    assert screen.wait(60.0)
+    session.do("move_light", {"light": 0, "x": 6.0, "y": 3.0})
+    assert screen.wait(60.0)
+    assert screen.exposure_stops == studio.exposure_of(screen.picture) != found
+    session.keeper.close()

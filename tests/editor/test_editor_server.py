@@ -2,6 +2,7 @@
 
 import json
 import threading
+import time
 import urllib.error
 import urllib.request
 from pathlib import Path
@@ -171,6 +172,40 @@ def test_a_hand_is_followed_through_a_socket(desk):
         assert "did not understand" in ask_for(socket, number=5, light="first", x="3", y="1")[0]["error"]
     with pytest.raises(Exception, match=r"403|1008|rejected"), connect(address, origin="http://evil.example"):
         pass
+
+
+def test_a_hand_that_vanishes_has_let_go(desk):
+    from websockets.sync.client import connect
+
+    def current():
+        return told(desk, "/api/state")[1]["picture"]["current"]
+
+    def rests(wanted):
+        end = time.monotonic() + 60.0
+        while current() != wanted and time.monotonic() < end:
+            time.sleep(0.02)
+        return current() == wanted
+
+    address = desk.address.replace("http", "ws") + "/ws/moving"
+    moved = json.dumps({"number": 1, "light": 0, "x": "3", "y": "1", "revision": desk.session.revision})
+    with connect(address) as socket:
+        socket.send(moved)
+        socket.recv()
+        # held still, it is drawn as if it had let go
+        assert rests(False)
+        assert desk.screen.wait(60.0)
+    assert rests(True)
+    # the hand of another page is not disturbed
+    with connect(address) as other:
+        with connect(address) as socket:
+            socket.send(moved)
+            socket.recv()
+            other.send(moved)
+            other.recv()
+        assert rests(False)
+        assert desk.screen.wait(60.0)
+        assert not current()
+    assert rests(True)
 
 
 def test_strangers_are_kept_out(desk):

@@ -9,7 +9,7 @@ from flarewright.editor import history as past
 from flarewright.editor.autosave import Saved, autosave_path, read_autosave, write_autosave
 from flarewright.editor.deeds import DEEDS, done
 from flarewright.editor.edit_ghosts import Hand, hand, soloed
-from flarewright.editor.edit_lens import own_lens, prescription
+from flarewright.editor.edit_lens import own_lens, prescription, table_of
 from flarewright.editor.edit_wishes import direction, new_discs, target_project
 from flarewright.editor.jobs import Gate, Lane
 from flarewright.editor.session import begin
@@ -118,6 +118,32 @@ def test_saving_makes_the_autosave_clean_and_the_file_wins(project, tmp_path):
     assert third.file == str(path)
 
 
+def test_undo_of_open_leads_back_to_the_file(tmp_path):
+    session, _ = begin(None)
+    session.do("move_light", {"light": 0, "x": 4.0, "y": 2.0})
+    path = session.save(str(tmp_path / "shot.toml"))
+    session.open("tessar-brendel")
+    assert session.file is None
+    session.do("set_iris", {"values": {"blades": 8}})
+    session.undo()
+    session.undo()
+    assert session.file == str(path)
+    session.redo()
+    assert session.file is None
+    session.undo()
+    session.keeper.close()
+    again, _ = begin(None)
+    assert again.file == str(path)
+    again.redo()
+    assert again.file is None
+    again.undo()
+    # saved under another name, it goes on with that one, and so do the steps before
+    other = again.save(str(tmp_path / "other.toml"))
+    again.undo()
+    assert again.file == str(other)
+    again.keeper.close()
+
+
 def test_without_a_name_the_last_file_is_opened_again(tmp_path):
     session, _ = begin(None)
     session.do("move_light", {"light": 0, "x": 4.0, "y": 2.0})
@@ -152,6 +178,41 @@ def test_a_refused_deed_leaves_everything_as_it_was(project):
         assert "\n" not in str(told.value)
     assert session.history is before
     assert json.dumps(str(session.project))
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "said"),
+    [
+        ("set_dirt", {"values": {"dust_per_mm2": -1}}, "dust per mm² must be at least 0, not -1"),
+        ("set_cell", {"row": 0, "column": "n_d", "text": "-1"}, "row 0: index n_d must be more than 1, not -1.0"),
+        ("set_cell", {"row": 0, "column": "v_d", "text": "x"}, "row 0: Abbe number V_d 'x' is no number; write"),
+        ("set_cell", {"row": 0, "column": "semi_diameter", "text": "-1"}, "row 0: semi-diameter must be more than 0"),
+        ("set_ghost", {"name": "8-6", "values": {"gain": -3}}, "gain must be at least 0, not -3"),
+        ("set_pass_gain", {"name": "ghosts", "gain": -3}, "gain of the ghosts must be at least 0, not -3"),
+        ("set_iris", {"values": {"roughness_um": -3}}, "roughness must be at least 0, not -3"),
+    ],
+)
+def test_what_is_refused_is_said_in_words(project, name, values, said):
+    with pytest.raises(FlarewrightError) as told:
+        done(project, name, values)
+    assert str(told.value).startswith(said)
+
+
+def test_a_deed_on_a_row_is_none_on_a_row_of_another_lens():
+    session, _ = begin(None)
+    with pytest.raises(FlarewrightError, match=r"^exposure must be at most 60, not 1000$"):
+        session.set_view({"exposure_stops": 1000})
+    seen = table_of(session.project)
+    session.do("set_cell", {"row": 1, "column": "thickness", "text": "4"}, table=seen)
+    # another cell is still that of this lens
+    session.do("set_cell", {"row": 0, "column": "radius", "text": "33"}, table=seen)
+    for name, values in (("add_row", {"row": 1}), ("choose_lens", {"lens": "tessar-brendel"})):
+        session.do(name, values)
+        before = session.project
+        with pytest.raises(FlarewrightError, match="the lens has become another one"):
+            session.do("set_cell", {"row": 0, "column": "radius", "text": "44"}, table=seen)
+        assert session.project is before
+    session.keeper.close()
 
 
 def test_every_deed_is_tried_here():

@@ -82,7 +82,8 @@ def write_autosave(path: Path, saved: Saved) -> None:
         "version": VERSION, "file": saved.file, "clean": saved.clean, "at": saved.history.at - first,
         "view": saved.view.model_dump(mode="json"),
         "moments": [
-            {"label": m.label, "group": m.group, "project": m.project.model_dump(mode="json")} for m in moments
+            {"label": m.label, "group": m.group, "file": m.file, "project": m.project.model_dump(mode="json")}
+            for m in moments
         ],
     }  # fmt: skip
     text = json.dumps(data, allow_nan=False)
@@ -97,7 +98,9 @@ def read_autosave(path: Path) -> Saved | None:
         if data["version"] != VERSION:
             return None
         moments = tuple(
-            Moment(Project.model_validate(m["project"]), str(m["label"]), str(m["group"])) for m in data["moments"]
+            # what was written before steps knew their file has one for all
+            Moment(Project.model_validate(m["project"]), str(m["label"]), str(m["group"]), m.get("file", data["file"]))
+            for m in data["moments"]
         )
         at = int(data["at"])
         if not 0 <= at < len(moments):

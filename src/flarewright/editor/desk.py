@@ -23,6 +23,8 @@ class Desk:
         self.screen, self.solver = Screen(session), Solver(session)
         self.hand = Hand(self.screen)
         self.screen.idle = self.hand.prepare
+        # the page whose hand moved last
+        self.followed: WebSocket | None = None
         self._tabs: set[asyncio.Queue[dict[str, Any]]] = set()
         self._loop: asyncio.AbstractEventLoop | None = None
         session.listeners.append(self._heard)

@@ -9,6 +9,7 @@ from math import atan, degrees, isfinite, radians, tan
 from typing import Any
 
 import numpy as np
+from pydantic import ValidationError
 
 from ..errors import FlarewrightError, GlassError, LensError
 from ..io.coating_text import UNCOATED, coating_from, format_coating
@@ -22,6 +23,20 @@ from ..render.prepare import as_lens, first_order
 
 COLUMNS = ("radius", "thickness", "glass", "n_d", "v_d", "semi_diameter", "coating")
 MOST_ROWS = 200
+# fields as the page calls them; the others by their own words, without units
+SPOKEN = {
+    "n_d": "index n_d", "v_d": "Abbe number V_d", "semi_diameter": "semi-diameter", "thickness": "gap",
+    "exposure_stops": "exposure", "plate_stops": "brightness of the background", "dust_per_mm2": "dust per mm²",
+    "scratches_per_cm2": "scratches per cm²", "scratch_um": "scratch width", "scratch_mm": "scratch length",
+    "f_number": "f-number", "sensor_reflectance": "what the sensor reflects",
+    "gain.ghosts": "gain of the ghosts", "gain.starburst": "gain of the starburst", "gain.scatter": "gain of the haze",
+    "size_px": "size of the picture", "sensor_mm": "size of the sensor", "at_s": "time",
+    "field_deg": "angle of the light",
+}  # fmt: skip
+UNITS = ("mm", "um", "nm", "deg", "px", "s", "k", "stops")
+BOUNDS = {
+    "greater than or equal to": "at least", "less than or equal to": "at most", "greater than": "more than",
+}  # fmt: skip
 DISTORTION_STEP_DEG, DISTORTION_TO_DEG = 2.0, 80.0
 
 
@@ -69,7 +84,10 @@ def set_cell(project: Project, row: int, column: str, text: str) -> Project:
             raise LensError(f"row {row} is the stop: it has a thickness only, its opening follows from the f-number")
         new: Row = old.replace(thickness=_number(words, row, column))
     else:
-        new = _changed(old, row, column, words)
+        try:
+            new = _changed(old, row, column, words)
+        except ValidationError as error:
+            raise LensError(f"row {row}: {sentence(error)}") from None
     rows = (*lens.rows[:row], new, *lens.rows[row + 1 :])
     if column == "coating" and not isinstance(project.coating, AsLens):
         # the cell shows what the row wears, so that is what it changes
@@ -124,12 +142,13 @@ def _medium(old: Surface, row: int, column: str, words: str) -> Any:
 
 
 def _number(words: str, row: int, column: str) -> float:
+    like = {"n_d": "like 1.5168", "v_d": "like 64.2"}.get(column, "in mm, like 12.5")
     try:
         value = float(words.replace(",", "."))
     except ValueError:
-        raise LensError(f"row {row}: {column} {words!r} is no number; write it in mm, like 12.5") from None
+        raise LensError(f"row {row}: {spoken(column)} {words!r} is no number; write it {like}") from None
     if not isfinite(value):
-        raise LensError(f"row {row}: {column} {words!r} is no finite number; write it in mm, like 12.5")
+        raise LensError(f"row {row}: {spoken(column)} {words!r} is no finite number; write it {like}")
     return value
 
 
@@ -374,13 +393,41 @@ def set_lens_facts(project: Project, values: dict[str, Any]) -> Project:
 
 def sentence(error: Exception) -> str:
     """Return one sentence for whatever refused an edit."""
-    from pydantic import ValidationError
-
     from ..io.sentences import validation_sentences
 
     if isinstance(error, ValidationError):
-        return "; ".join(validation_sentences(error))
+        return "; ".join(_said(told) for told in validation_sentences(error))
     return " ".join(str(error).split())
+
+
+def _said(told: str) -> str:
+    """Say what a field must be in words; `told` is "dust_per_mm2: input should be greater than or equal to 0"."""
+    where, colon, what = told.partition(": ")
+    if not colon or not where.replace(".", "").replace("_", "").isalnum():
+        return told
+    for code, words in BOUNDS.items():
+        what = what.replace(code, words)
+    bound = what.removeprefix("input should be ")
+    return f"{spoken(where)}: {what}" if bound == what else f"{spoken(where)} must be {bound}"
+
+
+def spoken(field: str) -> str:
+    """Return what a person calls a field: "dust per mm²" for "dirt.dust_per_mm2"."""
+    if field in SPOKEN:
+        return SPOKEN[field]
+    parts = [part for part in field.split(".") if not part.isdigit()] or [field]
+    return SPOKEN.get(parts[-1]) or " ".join(part for part in parts[-1].split("_") if part not in UNITS) or field
+
+
+def table_of(project: Project) -> str:
+    """Return what tells one table of rows from another: a deed on a row of it is none on a row of the other."""
+    lens = project.lens
+    if isinstance(lens, str):
+        try:
+            lens = as_lens(lens)
+        except FlarewrightError:
+            return str(lens)
+    return f"{lens.name}, {len(lens.rows)} rows, stop {lens.stop_row}"
 
 
 @dataclass(frozen=True)

@@ -20,11 +20,14 @@ class Moment:
         What was done, for a person: "Move the light".
     group : str
         Changes of one group follow each other as one step: all positions of a slider while it is held.
+    file : str or None
+        The project file that it belongs to.
     """
 
     project: Project
     label: str
     group: str = ""
+    file: str | None = None
 
 
 @dataclass(frozen=True)
@@ -40,6 +43,11 @@ class History:
         return self.moments[self.at].project
 
     @property
+    def file(self) -> str | None:
+        """The project file of the present moment."""
+        return self.moments[self.at].file
+
+    @property
     def undo_label(self) -> str:
         """What undo would take back; empty at the beginning."""
         return self.moments[self.at].label if self.at > 0 else ""
@@ -50,12 +58,12 @@ class History:
         return self.moments[self.at + 1].label if self.at + 1 < len(self.moments) else ""
 
 
-def begun(project: Project, label: str = "Open") -> History:
+def begun(project: Project, label: str = "Open", file: str | None = None) -> History:
     """Return a history of one moment."""
-    return History((Moment(project, label),))
+    return History((Moment(project, label, file=file),))
 
 
-def committed(history: History, project: Project, label: str, group: str = "") -> History:
+def committed(history: History, project: Project, label: str, group: str = "", *, file: str | None = None) -> History:
     """Add a project; what was undone before is forgotten.
 
     Parameters
@@ -65,20 +73,33 @@ def committed(history: History, project: Project, label: str, group: str = "") -
     label : str
     group : str
         When it is that of the present moment, which is the last, the new project takes its place.
+    file : str or None
+        The project file that it belongs to.
 
     Returns
     -------
     History
-        The same where the project is the present one; no longer than `MOST`.
+        The same where project and file are the present ones; no longer than `MOST`.
     """
-    if project == history.present:
+    if project == history.present and file == history.file:
         return history
     last = history.moments[history.at]
     kept = history.moments[: history.at + 1]
     if group and group == last.group and history.at > 0 and history.at + 1 == len(history.moments):
         kept = kept[:-1]
-    moments = (*kept, Moment(project, label, group))[-MOST:]
+    moments = (*kept, Moment(project, label, group, file))[-MOST:]
     return History(moments, len(moments) - 1)
+
+
+def filed(history: History, file: str | None) -> History:
+    """Give the present moment another file, and so those around it that had the same: they are one project."""
+    old, first, last = history.file, history.at, history.at
+    while first > 0 and history.moments[first - 1].file == old:
+        first -= 1
+    while last + 1 < len(history.moments) and history.moments[last + 1].file == old:
+        last += 1
+    own = tuple(replace(moment, file=file) for moment in history.moments[first : last + 1])
+    return replace(history, moments=(*history.moments[:first], *own, *history.moments[last + 1 :]))
 
 
 def undone(history: History) -> History:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import FlarewrightError
+from ..errors import FlarewrightError, ProjectError
 from ..model import Project
 from ..render.display import view_sum
 from . import studio
@@ -43,6 +43,8 @@ class Screen:
         self.picture: Picture | None = None
         self.seen: Seen | None = None
         self.match = Match()
+        # False while the lens has shown no ghost that its exposure could be found for
+        self.exposed = True
         self.problem = ""
         self.number = 0
         # the picture as it is sent, of this number
@@ -125,8 +127,17 @@ class Screen:
         return self.match.exposure_stops if own is None else own
 
     def expose(self) -> None:
-        """Find the exposure anew, by what is shown now."""
+        """Find the exposure anew, by what is shown now.
+
+        Raises
+        ------
+        ProjectError
+            Nothing is seen that could be exposed for; the exposure stays.
+        """
+        if self.picture is not None and studio.is_dark(self.picture):
+            raise ProjectError("there is no ghost to expose for; move the light until one is seen, and try again")
         if self.picture is not None:
+            self.exposed = True
             self.match = replace(self.match, exposure_stops=studio.exposure_of(self.picture, self.match))
             self.session.remember(self.match.exposure_stops)
         self.session.set_view({"exposure_stops": None})

@@ -73,7 +73,9 @@ def _state(desk: Desk, _request: Request, _body: Any) -> Any:
 
 
 def _do(desk: Desk, _request: Request, body: Any) -> Any:
-    desk.session.do(str(body["name"]), dict(body.get("values", {})), str(body.get("group", "")))
+    table = body.get("table")
+    group = str(body.get("group", ""))
+    desk.session.do(str(body["name"]), dict(body.get("values", {})), group, None if table is None else str(table))
     return desk.state()
 
 
@@ -124,7 +126,8 @@ def _moving(desk: Desk, request: Request, _body: Any) -> Any:
 async def _follow(desk: Desk, socket: WebSocket) -> None:
     """Answer the questions of a hand as they come: a line of JSON, then the picture.
 
-    A socket costs browser and server less a picture than requests do.
+    A socket costs browser and server less a picture than requests do. A hand that vanishes with its page has let go
+    without a word: then the project's own picture comes back, unless the hand of another page has moved since.
     """
     await socket.accept()
     tasks: set[asyncio.Task[None]] = set()
@@ -132,6 +135,7 @@ async def _follow(desk: Desk, socket: WebSocket) -> None:
     async def answer(asked: dict[str, Any]) -> None:
         head: dict[str, Any] = {"number": asked.get("number")}
         picture = b""
+        desk.followed = socket
         try:
             found = await run_in_threadpool(_moved, desk, asked)
             if found is not None:
@@ -151,7 +155,13 @@ async def _follow(desk: Desk, socket: WebSocket) -> None:
             tasks.add(task)
             task.add_done_callback(tasks.discard)
     except (WebSocketDisconnect, ValueError):
-        return
+        pass
+    finally:
+        # what is still being drawn would end the picture that rests
+        await asyncio.gather(*tasks, return_exceptions=True)
+        if desk.followed is socket:
+            desk.followed = None
+            await run_in_threadpool(desk.screen.rest)
 
 
 def _target(desk: Desk, _request: Request, _body: Any) -> Any:

@@ -15,7 +15,7 @@ from ..model import Project
 from . import history as past
 from .autosave import Saved, autosave_path, read_autosave
 from .deeds import done
-from .edit_lens import sentence
+from .edit_lens import sentence, table_of
 from .files import open_any, project_path, sample_project, save_project
 from .keeper import Keeper, claim
 from .view import View
@@ -35,12 +35,18 @@ class Session:
 
     def __init__(self, saved: Saved, keeper: Keeper) -> None:
         self.lock = threading.RLock()
-        self.history, self.view, self.file = saved.history, saved.view, saved.file
+        self.history, self.view = past.filed(saved.history, saved.file), saved.view
         self.clean = saved.clean
         self.revision = 0
         self.listeners: list[Listener] = []
         self.keeper = keeper
-        self._stamp = _changed_ns(self.file)
+        # when project files were changed as far as this session knows
+        self._stamps = {self.file: _changed_ns(self.file)}
+
+    @property
+    def file(self) -> str | None:
+        """The project file that is edited: that of the present moment, for undo may lead back to another one."""
+        return self.history.file
 
     @property
     def project(self) -> Project:
@@ -52,16 +58,24 @@ class Session:
         for listener in tuple(self.listeners):
             listener(event)
 
-    def do(self, name: str, values: dict[str, Any], group: str = "") -> None:
-        """Do something to the project (`deeds.DEEDS`), or refuse it and leave everything as it was."""
+    def do(self, name: str, values: dict[str, Any], group: str = "", table: str | None = None) -> None:
+        """Do something to the project (`deeds.DEEDS`), or refuse it and leave everything as it was.
+
+        `table` is the prescription that a deed on one of its rows was meant for (`edit_lens.table_of`).
+        """
         with self.lock:
+            if table is not None and table != table_of(self.project):
+                raise ProjectError(
+                    "the lens has become another one since this row was shown, so nothing was written; choose the row "
+                    "again in the table as it is now"
+                )
             project, label = done(self.project, name, values)
-            self._move(past.committed(self.history, project, label, group))
+            self._move(past.committed(self.history, project, label, group, file=self.file))
 
     def put(self, project: Project, label: str) -> None:
         """Take a whole project as the next moment."""
         with self.lock:
-            self._move(past.committed(self.history, project, label))
+            self._move(past.committed(self.history, project, label, file=self.file))
 
     def undo(self) -> None:
         """Go back a moment."""
@@ -98,15 +112,16 @@ class Session:
         """
         with self.lock:
             place = project_path(text)
-            if str(place) == self.file and (now := _changed_ns(self.file)) not in (None, self._stamp):
-                self._stamp = now
+            now = _changed_ns(self.file)
+            if str(place) == self.file and now not in (None, self._stamps.get(self.file, now)):
+                self._stamps[self.file] = now
                 raise ProjectError(
                     f"{place.name} was changed by another program since it was opened here; save again to overwrite "
                     "it, or save under another name"
                 )
             path = save_project(self.project, text)
-            self.file, self.clean = str(path), True
-            self._stamp = _changed_ns(self.file)
+            self.history, self.clean = past.filed(self.history, str(path)), True
+            self._stamps[self.file] = _changed_ns(self.file)
             self._changed()
             return path
 
@@ -114,9 +129,9 @@ class Session:
         """Open another project or lens; undo leads back."""
         with self.lock:
             project, file = open_any(text)
-            self.history = past.committed(self.history, project, f"Open {Path(text).name}")
-            self.file, self.clean = file, file is not None
-            self._stamp = _changed_ns(file)
+            self.history = past.committed(self.history, project, f"Open {Path(text).name}", file=file)
+            self.clean = file is not None
+            self._stamps[file] = _changed_ns(file)
             self._changed()
 
     def _move(self, history: past.History) -> None:
@@ -182,8 +197,8 @@ def _begun(saved: Saved | None, given: tuple[Project, str | None] | None, keeper
     if given is None and saved is not None and saved.file is not None and Path(saved.file).is_file():
         # what was saved may have been changed by other programs since
         project, file = open_any(saved.file)
-        return Session(replace(saved, history=past.committed(saved.history, project, "Open")), keeper), ""
+        return Session(replace(saved, history=past.committed(saved.history, project, "Open", file=file)), keeper), ""
     project, file = (sample_project(), None) if given is None else given
     view = View() if saved is None else saved.view.replace(found_stops=None)
-    fresh = Saved(past.begun(project), view, file, clean=file is not None)
+    fresh = Saved(past.begun(project, file=file), view, file, clean=file is not None)
     return Session(fresh, keeper), ""

@@ -45,6 +45,7 @@ def sharpen(screen: Screen, project: Project, view: View, check: Check) -> None:
     if shown is None and view.found_stops is not None:
         screen.match = Match(exposure_stops=view.found_stops)
     fresh = view.found_stops is None if shown is None else studio.lens_name(shown.project) != studio.lens_name(project)
+    fresh = fresh or not screen.exposed
     changed = shown is None or not studio.same_scene(shown.project, project)
     working = view.grey or view.unclipped
     followed = screen.moved is not None and studio.same_scene(screen.moved, project)
@@ -55,7 +56,7 @@ def sharpen(screen: Screen, project: Project, view: View, check: Check) -> None:
         if fresh:
             # a grey picture tells nothing of the exposure
             plain = studio.take(project, "draft", View()) if draft.grey else draft
-            screen.match = Match(exposure_stops=studio.exposure_of(plain))
+            screen.match = Match(exposure_stops=_exposure(screen, plain))
         elif changed:
             screen.match = replace(screen.match, levels=())
         if draft.grey and (fresh or shown is None or not shown.grey):
@@ -72,8 +73,9 @@ def sharpen(screen: Screen, project: Project, view: View, check: Check) -> None:
         check()
         screen.final_s = final.seconds
         if fresh:
-            screen.match = replace(screen.match, exposure_stops=studio.exposure_of(final))
-            screen.session.remember(screen.match.exposure_stops)
+            screen.match = replace(screen.match, exposure_stops=_exposure(screen, final))
+            if screen.exposed:
+                screen.session.remember(screen.match.exposure_stops)
         screen.show(final)
         if draft is None:
             # for the next hand; the picture does not wait for it
@@ -87,6 +89,12 @@ def sharpen(screen: Screen, project: Project, view: View, check: Check) -> None:
     check()
     if screen.idle is not None:
         screen.idle()
+
+
+def _exposure(screen: Screen, picture: Picture) -> float:
+    """Find the exposure of a lens; a black picture has none, so that of before is held until a ghost is seen."""
+    screen.exposed = not studio.is_dark(picture)
+    return studio.exposure_of(picture) if screen.exposed else screen.match.exposure_stops
 
 
 def _show_soon(screen: Screen, project: Project, view: View, check: Check) -> None:

@@ -9,7 +9,7 @@ from ..io.spectrum_text import spectrum_text
 from ..model import Project
 from ..render.prepare import as_lens
 from .edit_ghosts import hand, soloed
-from .edit_lens import prescription
+from .edit_lens import prescription, table_of
 from .edit_path import length_s
 from .edit_shot import coating_text
 from .edit_wishes import direction
@@ -44,7 +44,7 @@ def state_of(screen: Screen, solver: Solver) -> dict[str, Any]:
         "redo": history.redo_label,
         "steps": {"at": history.at, "count": len(history.moments)},
         "lens": _lens(project, table.facts, table.problem)
-        | {"rows": list(table.rows), "distortion": list(table.distortion)},
+        | {"table": table_of(project), "rows": list(table.rows), "distortion": list(table.distortion)},
         "lights": [_light(project, k) for k in range(len(project.lights))],
         "camera": project.camera.model_dump(mode="json") | {"sensor": list(project.camera.sensor)},
         "iris": _iris(project),

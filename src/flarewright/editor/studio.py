@@ -279,6 +279,11 @@ def exposure_of(picture: Picture, match: Match | None = None) -> float:
     return auto_exposure(ghosts_of(picture, match or Match()))
 
 
+def is_dark(picture: Picture) -> bool:
+    """Tell whether a picture has no ghost that an exposure could be found for."""
+    return not bool(picture.ghosts.max(initial=0.0) > 0.0)
+
+
 def light_of(picture: Picture, match: Match) -> Floats:
     """Return the whole picture, a draft's ghosts matched to what final ones would be."""
     return np.asarray(ghosts_of(picture, match) + picture.rest)

@@ -18,6 +18,10 @@ app.under = under;
 const $ = (id) => document.getElementById(id);
 
 // ------------------------------------------------------------------------------------------------------------- state
+const ghostsOf = (s) => JSON.stringify([s.lens.name, s.lens.rows.map((row) => row.stop)]);
+// what decides where ghosts lie, as it was told last: a hand writes into the state before it is told
+const placesOf = (s) => JSON.stringify([s.lights, s.lens, s.camera, s.iris, s.view.grey, s.view.unclipped]);
+let places = '';
 function take(state) {
   if (app.state && state.revision < app.state.revision) return;
   const old = app.state;
@@ -27,8 +31,11 @@ function take(state) {
   app.state = state;
   app.light = Math.min(app.light, state.lights.length - 1);
   const shot = (s) => JSON.stringify([s.lights, s.lens, s.camera, s.iris, s.dirt, s.coating, s.pass_gain, s.by_hand, s.view.grey, s.view.unclipped]);
-  // another lens has other ghosts
-  if (old && old.lens.name !== state.lens.name) Object.assign(app, { ghost: null, wish: null });
+  // another lens has other ghosts, and so has one whose rows have other numbers
+  if (old && ghostsOf(old) !== ghostsOf(state)) { Object.assign(app, { ghost: null, wish: null }); app.hint(); }
+  const now = placesOf(state);
+  if (places !== now) app.view.forget();
+  places = now;
   const moved = !old || shot(old) !== shot(state);
   if (moved) {
     app.view.outline = null;
@@ -59,24 +66,28 @@ const fileName = (state) => (state.file ? state.file.split(/[\\/]/).pop() : stat
 
 // In the order in which they were asked for, so that the last word of a hand is the last.
 let line = Promise.resolve();
-app.deed = (name, values, group = '') => {
-  line = line.then(() => post('/api/do', { name, values, group })).then(take);
+app.deed = (name, values, group = '', table = null) => {
+  line = line.then(() => post('/api/do', { name, values, group, table: typeof table === 'function' ? table() : table })).then(take);
   const answer = line;
   line = line.catch(() => {});
-  return answer.catch((error) => { complain(error); reload(); throw error; });
+  // what was refused stands nowhere on the page any more
+  return answer.catch((error) => { complain(error); reload(); loadGhosts(); throw error; });
 };
+// the rows that the page shows: a deed on one of them is none on a row of another lens
+app.table = () => app.state.lens.table;
 const slow = new Map();
 // A slider may ask faster than the server answers: only its newest value is sent.
-app.lively = (name, values, group, key = name) => {
+app.lively = (name, values, group, key = name, table = null) => {
   if (!slow.has(key)) slow.set(key, latest((...asked) => app.deed(...asked).catch(() => {})));
-  slow.get(key)(name, values, group);
+  slow.get(key)(name, values, group, table);
 };
 // Keys come faster than answers: the page knows at once what was asked for, and nothing that was asked is dropped.
 let asked = {};
 const sendView = latest(async () => {
   const values = asked;
   asked = {};
-  if (Object.keys(values).length) take(await post('/api/view', values));
+  if (!Object.keys(values).length) return;
+  try { take(await post('/api/view', values)); } catch (error) { complain(error); reload(); }
 });
 app.setView = (values) => {
   Object.assign(asked, values);
@@ -96,7 +107,15 @@ app.choose = (name, walking = false) => {
   panels[app.tab].update?.(app.state);
   app.hint();
 };
-app.chooseWish = (number) => { app.wish = number; app.ghost = null; app.view.outline = null; panels[app.tab].update?.(app.state); app.view.redraw(); };
+app.chooseWish = (number) => {
+  Object.assign(app, { wish: number, ghost: null });
+  app.view.outline = null;
+  app.view.forget();
+  drawSection();
+  panels[app.tab].update?.(app.state);
+  app.hint();
+  app.view.redraw();
+};
 app.chooseLight = (k) => { if (app.light !== k) { app.light = k; panels[app.tab].update?.(app.state); } };
 function writeLights(lights) {
   if (app.tab === 'light') panels.light.moved?.(lights[app.light]);
@@ -212,7 +231,7 @@ function header() {
     h('span', { class: 'brand' }, 'Flarewright'),
     button('Open', openFile, { tip: 'Open a project, a lens file or a lens by its name (O).', id: 'open' }),
     button('Save', () => save(), { tip: 'Save the project file (Ctrl+S).', id: 'save' }),
-    button('Export ▾', (event) => menu(event.currentTarget, exports), { id: 'export', tip: 'Pictures, lens, project, table of ghosts, or the command that renders the saved project.' }),
+    button('Export ▾', (event) => menu(event.currentTarget, exports), { id: 'export', tip: 'The project under another name, pictures, lens, table of ghosts, or the command that renders the saved project.' }),
     file, h('span', { class: 'split' }), undo, redo, h('span', { class: 'gap' }), exposed, auto, look,
     button('?', help, { kind: 'quiet', tip: 'All shortcuts (?).', 'aria-label': 'Help', id: 'help' }),
   );
@@ -232,6 +251,7 @@ function header() {
   };
 }
 const exports = [
+  ['Save as…', saveAs, 'Save the project under another name, and go on with that file (Ctrl+Shift+S).'],
   ['EXR with layers', () => download('exr'), 'Rendered at the size and quality of the project; takes as long as a render.'],
   ['PNG as shown', () => download('png')],
   ['Lens file', () => download('lens')],
@@ -268,8 +288,9 @@ function asking(title, words, value, work) {
   box.focus(); box.select();
 }
 function openFile() { asking('Open', 'A project file, a lens file, or a lens’ name. Files can also be dropped on the page.', '', (text) => text.trim() && app.ask('/api/open', { text })); }
+function saveAs() { asking('Save', 'Where the project file shall lie, like shot.toml.', app.state.file ?? 'flare.toml', save); }
 async function save(text = app.state.file) {
-  if (!text) { asking('Save', 'Where the project file shall lie, like shot.toml.', 'flare.toml', save); return; }
+  if (!text) { saveAs(); return; }
   const state = await app.ask('/api/save', { text });
   if (state) toast(state.told, 'good');
 }
@@ -286,11 +307,25 @@ function working(words, part) {
   what.textContent = meter.hidden ? '' : words;
   bar.style.width = `${100 * part}%`;
 }
-const GRADES = { moving: 'moving', draft: 'draft, by matrices', soon: 'by traced rays, getting sharper', final: 'final, by traced rays', working: 'working view, by matrices' };
+app.status = status;
+const GRADES = { moving: 'moving, by matrices', draft: 'draft, by matrices', soon: 'by traced rays, getting sharper', final: 'final, by traced rays', working: 'working view, by matrices' };
 const FIRST = 'drawing the first picture; the very first on a machine takes some ten seconds';
+function gradeWords({ grade: drawn, seconds, number, current, problem }) {
+  const { mover, shownGrade, shownNumber } = app.view;
+  if (!drawn) return FIRST;
+  if (problem) return 'the last good picture';
+  // what a hand holds is of no project yet, but it is what is shown
+  if (!mover.live && !current) return shownGrade === 'moving' ? GRADES.moving : 'the picture before, until the new one is drawn';
+  const words = GRADES[shownGrade] ?? GRADES[drawn];
+  if (shownNumber !== number || !seconds) return words;
+  return `${words} · ${seconds < 1 ? `${Math.round(seconds * 1000)} ms` : `${seconds.toFixed(1)} s`}`;
+}
 function status() {
+  if (!app.state) return;
   const { picture, frame, camera } = app.state;
-  grade.textContent = `${GRADES[picture.grade] ?? FIRST}${picture.seconds ? ` · ${picture.seconds < 1 ? `${Math.round(picture.seconds * 1000)} ms` : `${picture.seconds.toFixed(1)} s`}` : ''}`;
+  const words = gradeWords(picture);
+  // a hand asks for this with each of its pictures
+  if (grade.textContent !== words) grade.textContent = words;
   size.textContent = `${camera.size_px.join(' × ')} px · ${frame.sensor.map((mm) => Number(mm.toFixed(2))).join(' × ')} mm`;
   remark.textContent = app.state.remarks.join(' · ');
   remark.title = app.state.remarks.join('\n');
@@ -338,7 +373,7 @@ const KEYS = [
   ['S', 'solo the chosen ghost'], ['M', 'mute the chosen ghost'], ['N  P', 'next, previous ghost of the list'],
   ['T', 'play the light’s path, stop'], ['K', 'key the light at this time'], [', .', 'previous, next key'],
   ['X', 'show or hide the cross-section'], ['1 – 7', 'panels'], ['W', 'physical, target, wipe, side by side'], ['Ctrl+Z', 'undo'],
-  ['Ctrl+Shift+Z', 'redo'], ['Ctrl+S', 'save'], ['O', 'open'], ['Esc', 'let go of the ghost'], ['?', 'this sheet'],
+  ['Ctrl+Shift+Z', 'redo'], ['Ctrl+S', 'save'], ['Ctrl+Shift+S', 'save under another name'], ['O', 'open'], ['Esc', 'let go of the ghost'], ['?', 'this sheet'],
 ];
 function help() { dialog('Keys and hands', h('div', { class: 'keys' }, ...KEYS.flatMap(([key, words]) => [h('kbd', {}, key), h('span', {}, words)]))); }
 let nudging = null;
@@ -356,7 +391,7 @@ addEventListener('keydown', (event) => {
   const typing = event.target.matches('input:not([type=range]):not([type=checkbox]), select, textarea');
   if (event.ctrlKey || event.metaKey) {
     const key = event.key.toLowerCase();
-    if (key === 's') { event.preventDefault(); document.activeElement.blur(); save(); }
+    if (key === 's') { event.preventDefault(); document.activeElement.blur(); if (event.shiftKey) saveAs(); else save(); }
     if (typing) return;
     if (key === 'z') { event.preventDefault(); app.ask(event.shiftKey ? '/api/redo' : '/api/undo'); }
     if (key === 'y') { event.preventDefault(); app.ask('/api/redo'); }

@@ -26,10 +26,17 @@ export function lensPanel(app) {
   let drawn = '';
   const search = latest(async (words) => { glasses.replaceChildren(...(await get(`/api/glasses?q=${encodeURIComponent(words)}`)).glasses.map((name) => h('option', { value: name }))); });
 
-  async function write(box, row, column, text) {
+  async function write(box, row, column, text, table) {
     refused = null;
     drawn = '';
-    try { await app.deed_quiet('set_cell', { row, column, text }); wrong.textContent = ''; } catch (error) {
+    try { await app.deed_quiet('set_cell', { row, column, text }, table); wrong.textContent = ''; } catch (error) {
+      app.take(await get('/api/state'));
+      if (app.table() !== table) {
+        // there is no such cell any more
+        draw(app.state);
+        wrong.textContent = sentence(error.message);
+        return;
+      }
       refused = { row, column, text, why: sentence(error.message) };
       mark(box);
     }
@@ -41,13 +48,14 @@ export function lensPanel(app) {
   }
   function cell(line, column) {
     const value = line[column] ?? '';
+    const table = app.table();
     const note = line.notes[column];
     const guess = column === 'semi_diameter' && line.estimated;
     const box = h('input', { type: 'text', value, tip: note, class: `${note ? 'note' : ''} ${guess ? 'guess' : ''}`, 'aria-label': `row ${line.row} ${column}`, 'data-row': line.row, 'data-column': column, spellcheck: 'false', list: column === 'glass' ? 'glasses' : null });
     if (refused && refused.row === line.row && refused.column === column) { box.value = refused.text; mark(box); }
     box.addEventListener('focus', () => { app.row = line.row; choose(); if (column === 'glass') search(box.value); box.select(); });
     box.addEventListener('input', () => { if (column === 'glass') search(box.value); });
-    box.addEventListener('change', () => { const text = box.value; box.defaultValue = text; write(box, line.row, column, text); });
+    box.addEventListener('change', () => { const text = box.value; box.defaultValue = text; write(box, line.row, column, text, table); });
     box.addEventListener('keydown', (event) => {
       if (event.key === 'Escape') { refused = null; wrong.textContent = ''; box.value = value; box.defaultValue = value; box.classList.remove('bad'); drawn = ''; box.blur(); draw(app.state); event.stopPropagation(); }
       const step = { ArrowDown: 1, ArrowUp: -1, Enter: 1 }[event.key];
@@ -60,7 +68,7 @@ export function lensPanel(app) {
     return h('td', { class: column === 'glass' || column === 'coating' ? 'name' : '' }, box);
   }
   function draw(state) {
-    const key = JSON.stringify([state.lens.rows, state.lens.facts.stop]);
+    const key = JSON.stringify([state.lens.table, state.lens.rows, state.lens.facts.stop]);
     if (key === drawn && !refused) return;
     const active = document.activeElement;
     const here = active && body.contains(active) && active.dataset.column ? { row: active.dataset.row, column: active.dataset.column } : null;
@@ -88,7 +96,7 @@ export function lensPanel(app) {
     for (const each of [add, copy, remove, stop]) each.disabled = !line;
     if (line) { copy.disabled = remove.disabled = stop.disabled = line.stop; }
   }
-  const rowDeed = (name) => () => app.deed(name, { row: app.row }).catch(() => {});
+  const rowDeed = (name) => () => app.deed(name, { row: app.row }, '', app.table).catch(() => {});
   const add = button('Add row', rowDeed('add_row'), { tip: 'A plane surface behind the chosen row, in the middle of its gap.', id: 'add-row' });
   const copy = button('Duplicate', rowDeed('duplicate_row'), { tip: 'The same surface once more behind the chosen row.' });
   const remove = button('Remove', rowDeed('remove_row'), { id: 'remove-row', tip: 'Take the chosen row out; the gap in front of it takes its room.' });
@@ -97,8 +105,8 @@ export function lensPanel(app) {
     entry({ label: 'Name', tip: 'Of the lens.', words: true, name: 'lens_name', get: (s) => s.lens.name, set: (name) => name && app.deed('set_lens_facts', { values: { name } }).catch(() => {}) }),
     entry({ label: 'Wide open', tip: 'The smallest f-number: sets how far the stop opens.', name: 'open', get: (s) => s.lens.open, set: (f_number) => f_number && app.deed('set_lens_facts', { values: { f_number } }).catch(() => {}) }),
   ]);
-  app.deed_quiet = async (name, values) => {
-    app.take(await post('/api/do', { name, values }));
+  app.deed_quiet = async (name, values, table) => {
+    app.take(await post('/api/do', { name, values, table }));
   };
   const picker = h('input', { type: 'file', accept: '.lens,.toml,.zmx', hidden: true });
   picker.addEventListener('change', async () => { if (picker.files[0]) await app.importFile(picker.files[0]); picker.value = ''; });

@@ -90,6 +90,7 @@ export function viewport(canvas, app) {
     pen.fillRect(0, 0, w, h);
     if (!app.state) return;
     const f = frame();
+    if (self.spot && self.spotFrame !== JSON.stringify(f)) self.forget();
     pen.imageSmoothingEnabled = self.zoom < 3;
     pen.imageSmoothingQuality = self.mover.live ? 'low' : 'high';
     picture(f, now);
@@ -238,6 +239,7 @@ export function viewport(canvas, app) {
     self.show(bitmap, fade);
     self.shownGrade = grade;
     self.shownNumber = number;
+    app.status();
     if (['soon', 'final', 'working'].includes(grade)) { self.afterwards?.(); self.afterwards = null; }
     if (grade === 'soon' && self.released) self.stats.soon = performance.now() - self.released;
     if (grade === 'final' && self.released) { self.stats.final = performance.now() - self.released; self.released = 0; }
@@ -268,6 +270,8 @@ export function viewport(canvas, app) {
     self.show(bitmap, false);
     self.shownGrade = 'moving';
     self.shownNumber = -1;
+    self.forget();
+    app.status();
     app.lightsMoved(lights);
   });
   self.stats = self.mover.stats;
@@ -362,10 +366,17 @@ export function viewport(canvas, app) {
       self.stack = ghosts;
       self.at = 0;
       self.spot = [px, py];
+      self.spotFrame = JSON.stringify(f);
       app.choose(ghosts[0] ?? null);
       app.hint();
     } catch (error) { complain(error); }
   }
+  // the ghosts that were under the pointer are elsewhere: the wheel zooms again
+  self.forget = () => {
+    if (!self.spot) return;
+    Object.assign(self, { stack: [], at: 0, spot: null });
+    app.hint();
+  };
   self.walk = (step) => {
     if (!self.stack.length) return;
     self.at = (self.at + step + self.stack.length) % self.stack.length;
@@ -383,6 +394,8 @@ export function viewport(canvas, app) {
   const local = (event) => { const rect = canvas.getBoundingClientRect(); return [event.clientX - rect.left, event.clientY - rect.top]; };
   canvas.addEventListener('pointerdown', (event) => {
     if (!app.state) return;
+    // neither selecting nor the browser's own dragging begins here
+    event.preventDefault();
     canvas.focus();
     canvas.setPointerCapture(event.pointerId);
     const [px, py] = local(event);
@@ -408,14 +421,17 @@ export function viewport(canvas, app) {
     if (drag.kind === 'maybe' && Math.hypot(px - drag.px, py - drag.py) >= CLICK_PX) { drag.kind = 'light'; self.hover = null; self.mover.lights = null; }
     if (drag.kind === 'light') moveLight(px, py, performance.now());
   });
-  canvas.addEventListener('pointerup', async (event) => {
+  async function letGo(event) {
     const drag = self.drag;
     if (!drag) return;
     if (drag.kind === 'light') await dropLight();
     else if (drag.kind === 'ghost' || drag.kind === 'rim') await dropGhost();
-    else { self.drag = null; if (drag.kind === 'maybe' && !drag.near) pick(...local(event)); }
+    else { self.drag = null; if (event.type === 'pointerup' && drag.kind === 'maybe' && !drag.near) pick(...local(event)); }
     redraw();
-  });
+  }
+  // a drag that the browser ends keeps what was done so far
+  for (const end of ['pointerup', 'pointercancel', 'lostpointercapture']) canvas.addEventListener(end, letGo);
+  canvas.addEventListener('dragstart', (event) => event.preventDefault());
   canvas.addEventListener('wheel', (event) => {
     event.preventDefault();
     const [px, py] = local(event);
