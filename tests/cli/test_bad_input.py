@@ -262,6 +262,8 @@ COMMAND_LINES = {
     "intensity is text": ([*H, *GOOD, "--intensity", "bright"], "'--intensity'"),
     "negative intensity": ([*H, *GOOD, "--intensity", "-1"], "--intensity"),
     "infinite intensity": ([*H, *GOOD, "--intensity", "inf"], "--intensity"),
+    "intensity beyond every light": (
+        [*H, *GOOD, "--intensity", "1e36"], "--intensity should be less than or equal to 1e+20, not 1e+36"),
     "three intensities": ([*H, *GOOD, *["--intensity", "1"] * 3], "3 times for 1 light"),
     "unknown spectrum": ([*H, *GOOD, "--spectrum", "neon"], "neon"),
     "cold black body": ([*H, *GOOD, "--spectrum", "black-body:5"], "between 500"),

@@ -308,6 +308,10 @@ def explain(error: ValidationError, data: Any, sections: Sections | None = None)
                 sentence = f"{place}: {reason}" if place else reason
             case _:
                 reason = finding["msg"].replace("Input should be", "should be")
+                for bound in finding.get("ctx", {}).values():
+                    if isinstance(bound, float) and bound >= 1e15:
+                        # nobody counts so many noughts
+                        reason = reason.replace(f"{bound:.0f}", f"{bound:g}")
                 reason = reason[0].lower() + reason[1:]
                 sentence = f"{place} {reason}{_given(finding['input'])}".strip()
         if sentence not in sentences:

@@ -73,6 +73,8 @@ class Rgb(Frozen):
 
 Spectrum = Annotated[EqualEnergy | D65 | BlackBody | Lines | Tabulated | Rgb, Field(discriminator="kind")]
 
+LARGEST_INTENSITY = 1e20
+"""Far beyond every light, and far enough below what 32 bits hold for all that multiplies it."""
 SUN_DEG = 0.53
 """Angle across the sun's disc, degrees."""
 
@@ -150,7 +152,7 @@ class Light(Frozen):
     name: str = "light"
     field_deg: FieldAngles
     distance: float | None = Field(None, gt=0.0, le=1e9)
-    intensity: float = Field(1.0, ge=0.0)
+    intensity: float = Field(1.0, ge=0.0, le=LARGEST_INTENSITY)
     spectrum: Spectrum = D65()
     diameter_deg: float = Field(0.0, ge=0.0, le=60.0)
     shape: Shape | None = None
