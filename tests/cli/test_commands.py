@@ -12,10 +12,12 @@ import jsonschema
 import numpy as np
 import pytest
 from PIL import Image
+from rich.markup import render as from_markup
+from typer.main import get_command
 
 import flarewright as fw
 from flarewright import __version__
-from flarewright.cli.app import run
+from flarewright.cli.app import app, run
 from flarewright.io.exr import read_exr
 from flarewright.io.library import shipped
 from flarewright.io.project_file import project_from_data, read_project
@@ -475,6 +477,18 @@ def test_project_init_teaches_and_is_usable(capsys, folder):
 
 # ---------------------------------------------------------------------------------------------------------------------
 # the program itself
+
+
+def test_help_keeps_its_square_brackets(capsys):
+    def texts(command):
+        yield from (command.help, command.short_help, command.epilog)
+        yield from (getattr(parameter, "help", None) for parameter in command.params)
+        for each in getattr(command, "commands", {}).values():
+            yield from texts(each)
+
+    for text in filter(None, texts(get_command(app))):
+        assert from_markup(text).plain == text.replace("\\[", "[")
+    assert "flarewright[ui]" in call(capsys, "edit", "--help").out
 
 
 @pytest.mark.parametrize("words", [(), ("lens",), ("coating",), ("project",), ("render", "--help"), ("ghosts", "-h")])

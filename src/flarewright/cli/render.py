@@ -244,7 +244,7 @@ def render(
         list[str] | None,
         typer.Option(
             metavar="RULE",
-            help="A rule of [[art.rules]]: 'select = \"row:7\", tint = [1, 0.6, 0.3], scale = 2'; may be repeated.",
+            help="A rule of [\\[art.rules]]: 'select = \"row:7\", tint = [1, 0.6, 0.3], scale = 2'; may be repeated.",
             rich_help_panel=_ART,
         ),
     ] = None,
@@ -468,7 +468,7 @@ def _render(project: Project, threads: int | None, run: ReferenceRun | None, led
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-    columns = (TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn())
+    columns = (TextColumn("{task.description}", markup=False), BarColumn(), TimeRemainingColumn())
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("rendering", total=1.0)
         return render_project(
