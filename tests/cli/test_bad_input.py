@@ -1,5 +1,7 @@
 """Whatever a person gives wrong: exit code 2 and one clear sentence, never a traceback, nothing half-written."""
 
+import json
+
 import pytest
 
 from flarewright.cli.app import run
@@ -472,6 +474,38 @@ def test_one_bad_file_among_good_ones_is_told_and_the_others_are_checked(capsys,
     assert [line.split(":")[1].split(",")[0] for line in out.splitlines() if line[0] != " "] == [
         " usable", " refused", " usable"]  # fmt: skip
     assert "1 of 3 lens files were refused" in err
+
+
+def test_every_mistake_of_a_project_is_told_at_once(capsys, folder):
+    text = PROJECT + "intensity = -1\ndiameter_deg = 2\nshape = { kind = 'rectangle', size_deg = [2, 1] }\n"
+    text += "[camera]\nsize_px = [0, 10]\n[iris]\nblades = 2\n[quality]\nwavelengths = 0\n"
+    (folder / "bad.toml").write_text(text)
+    assert run(["project", "check", "bad.toml"]) == 2
+    err = capsys.readouterr().err
+    places = ("lights[0].intensity", "lights[0].shape", "camera.size_px", "iris.blades", "quality.wavelengths")
+    assert [err.count(f"  - {place}") for place in places] == [1] * 5
+    assert err.count("  - ") == 5
+
+
+def test_what_a_render_would_refuse_is_told_together(capsys, folder):
+    text = 'coating = "preset:gold"\n' + PROJECT + '[iris]\nmask = "no.png"\n[dirt]\nimage = "nor.png"\n'
+    (folder / "bad.toml").write_text(text + '[[art.rules]]\nselect = "5-1"\n')
+    refuse(capsys, folder, ["project", "check", "bad.toml"], "bad.toml has 4 problems, the first: ", "  - ")
+
+
+@pytest.mark.parametrize("kind", ["project", "scene"])
+def test_why_a_file_is_refused_is_one_json_object_too(capsys, folder, kind):
+    (folder / "bad.toml").write_text("lens = 5\ncolour = 1\n")
+    out = json.loads(refuse(capsys, folder, [kind, "check", "bad.toml", "--json"], "colour"))
+    assert (out["file"], out["usable"]) == ("bad.toml", False)
+    assert any("colour" in problem for problem in out["problems"])
+    out = json.loads(refuse(capsys, folder, [kind, "check", "no.toml", "--json"], "no.toml does not exist"))
+    assert out["problems"] == [out["reason"]]
+
+
+def test_an_iris_image_that_a_lens_file_names_is_looked_for(capsys, folder):
+    (folder / "bad.toml").write_text(LENS + '[iris]\nmask = "nowhere.png"\n')
+    refuse(capsys, folder, ["lens", "check", "bad.toml"], "nowhere.png: there is no such iris image")
 
 
 def test_a_binary_project_and_a_folder_as_project(capsys, folder):

@@ -79,6 +79,22 @@ def print_json(data: dict[str, Any]) -> None:
     print(json.dumps(_finite(data), indent=2, allow_nan=False))
 
 
+def refusal(file: str | Path, error: FlarewrightError) -> dict[str, Any]:
+    """Return what `--json` prints of a file that cannot be used."""
+    return {"file": str(file), "usable": False, "reason": str(error), "problems": list(error.problems) or [str(error)]}
+
+
+@contextmanager
+def refused_as_json(file: Path, wanted: bool) -> Iterator[None]:
+    """Print as one JSON object too why a file is refused, where that is wanted; the error goes on."""
+    try:
+        yield
+    except FlarewrightError as error:
+        if wanted:
+            print_json(refusal(file, error))
+        raise
+
+
 def _finite(value: Any) -> Any:
     if isinstance(value, dict):
         return {key: _finite(item) for key, item in value.items()}

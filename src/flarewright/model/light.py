@@ -5,7 +5,7 @@ from __future__ import annotations
 from itertools import pairwise
 from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from .base import Frozen
 from .holdout import Holdout
@@ -159,14 +159,20 @@ class Light(Frozen):
     holdout: Holdout | None = None
     keyframes: tuple[LightKey, ...] = Field((), max_length=1000)
 
-    @model_validator(mode="after")
-    def _one_shape(self) -> Light:
-        for before, after in pairwise(key.at_s for key in self.keyframes):
+    @field_validator("shape")
+    @classmethod
+    def _one_shape(cls, shape: Shape | None, info: ValidationInfo) -> Shape | None:
+        if shape is not None and info.data.get("diameter_deg", 0.0) > 0.0:
+            raise ValueError("a light is a disc (diameter_deg) or has a shape, not both; keep one")
+        return shape
+
+    @field_validator("keyframes")
+    @classmethod
+    def _keyframes_rise(cls, keyframes: tuple[LightKey, ...]) -> tuple[LightKey, ...]:
+        for before, after in pairwise(key.at_s for key in keyframes):
             if after <= before:
                 raise ValueError(f"keyframes must rise in time: {after:g} s follows {before:g} s")
-        if self.shape is not None and self.diameter_deg > 0.0:
-            raise ValueError("a light is a disc (diameter_deg) or has a shape, not both; keep one")
-        return self
+        return keyframes
 
     @property
     def extended(self) -> bool:
