@@ -85,6 +85,11 @@ PROJECT_FILES = {
     "empty": ("", "empty"),
     "not TOML": ("lens", "not valid TOML"),
     "no lens": ("[[lights]]\nfield_deg = [1, 2]\n", "lens is missing"),
+    "lights that are a number": (
+        'lights = 3\nlens = "heliar-tronnier"\n',
+        "lights should be tables, each under [[lights]], not 3",
+    ),
+    "a number without end": (PROJECT + f"intensity = 1{'0' * 5000}\n", "a number of thousands of digits in line 4"),
     "no light": ('lens = "heliar-tronnier"\n', "lights is missing"),
     "newer version": ("schema_version = 2\n" + PROJECT, "newer"),
     "unknown lens": (PROJECT.replace("heliar-tronnier", "heliar-tronier"), "did you mean heliar-tronnier"),
@@ -321,6 +326,11 @@ COMMAND_LINES = {
     "size zero": ([*H, *GOOD, "--size", "0x480"], "--size: 0x480"),
     "size huge": ([*H, *GOOD, "--size", "99999x99999"], "32768"),
     "sensor negative": ([*H, *GOOD, "--sensor", "-36x24"], "above 0 mm"),
+    "sensor of an airfield": (
+        [*H, *GOOD, "--sensor", "1e9x1e9"], "--sensor: 1e+09x1e+09 mm is no sensor; give at most"),
+    "pixels like fields": (
+        [*H, *GOOD, "--sensor", "1e6x1e6", "--size", "64x36", "--quality", "draft"],
+        "pixels of 2.78e+04 mm are too coarse for the starburst, whose core has 0.084 mm; give a smaller --sensor"),
     "unknown layers": ([*H, *GOOD, "--layers", "all"], "--layers"),
     "brightest zero": ([*H, *GOOD, "--brightest", "0"], "--brightest"),
     "unknown colorspace": ([*H, *GOOD, "--colorspace", "aces"], "--colorspace"),
@@ -388,6 +398,17 @@ COMMAND_LINES = {
     "ghosts of three orders": (["ghosts", "heliar-tronnier", "--light", "1,1", "--orders", "3"], "choose 2 or 4"),
     "ghosts below no limit": (["ghosts", "heliar-tronnier", "--light", "1,1", "--orders", "4", "--order4-limit", "nan"],
                               "--order4-limit nan is no part"),
+    "focus and sensor distance": (
+        [*H, *GOOD, "--focus", "900", "--sensor-distance", "80"], "--focus and --sensor-distance both say where"),
+    "blades beside an iris image": (
+        [*H, *GOOD, "--iris-image", "picture.png", "--blades", "5"], "--blades shapes blades and"),
+    "exposure of no PNG": ([*H, *GOOD, "--no-png", "--exposure", "1"], "--exposure is for the PNG alone"),
+    "view of no PNG": ([*H, *GOOD, "--no-png", "--view", "srgb"], "--view is for the PNG alone"),
+    "ghosts of two lights": ([*G, "--light", "2,2"], "--light is given 2 times; ghosts are listed for one light"),
+    "ghosts focused twice": ([*G, "--focus", "900", "--sensor-distance", "80"], "keep one"),
+    "iris image is a folder": ([*H, *GOOD, "--iris-image", "folder.exr"], "--iris-image folder.exr is a folder; give"),
+    "output below a file": ([*H, "--light", "1,1", "-o", "lens.toml/a.exr"], "lens.toml is a file and no folder"),
+    "output is an ending": ([*H, "--light", "1,1", "-o", ".exr"], "an ending without a name; write flare.exr"),
     "ghosts without a light": (["ghosts", "heliar-tronnier"], "missing option '--light'"),
     "ghosts in X-rays": (["ghosts", "heliar-tronnier", "--light", "1,1", "--wavelength-nm", "1"], "not visible"),
     "ghosts too fast": (["ghosts", "heliar-tronnier", "--light", "1,1", "--fstop", "1"], "f/1 is faster"),

@@ -479,6 +479,13 @@ def test_project_init_teaches_and_is_usable(capsys, folder):
 # the program itself
 
 
+def test_flags_without_effect_are_told(capsys):
+    words = ["render", "heliar-tronnier", "--light", "8,5", "--size", "32x18", "--quality", "draft", "-o", "a.exr"]
+    err = call(capsys, *words, "--orders", "4", "--brightest", "3").err
+    assert "draft quality draws ghosts of two reflections alone: --orders 4 is for final quality" in err
+    assert "--brightest counts layers of single ghosts, and there are none: add --layers ghosts" in err
+
+
 def test_help_keeps_its_square_brackets(capsys):
     def texts(command):
         yield from (command.help, command.short_help, command.epilog)

@@ -120,8 +120,14 @@ def check_place(path: Path, suffix: str | tuple[str, ...]) -> None:
         When the name ends otherwise than in `suffix`, its folder does not exist, or it is a folder itself.
     """
     allowed = (suffix,) if isinstance(suffix, str) else suffix
+    if path.suffix == "" and path.name.lower() in allowed:
+        raise OutputError(
+            f"the output {str(path)!r} is an ending without a name; write {path.with_name('flare' + path.name)}"
+        )
     if path.suffix.lower() not in allowed:
         raise OutputError(f"the output {str(path)!r} must be named *{' or *'.join(allowed)}")
+    if path.parent.exists() and not path.parent.is_dir():
+        raise OutputError(f"cannot write {path}: {path.parent} is a file and no folder; choose another place")
     if not path.parent.is_dir():
         raise OutputError(f"cannot write {path}: the folder {path.parent} does not exist; create it first")
     if path.is_dir():

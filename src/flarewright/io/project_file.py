@@ -306,6 +306,8 @@ def explain(error: ValidationError, data: Any, sections: Sections | None = None)
             case "value_error":
                 reason = finding["msg"].removeprefix("Value error, ")
                 sentence = f"{place}: {reason}" if place else reason
+            case "tuple_type" if place == "lights":
+                sentence = f"lights should be tables, each under [[lights]]{_given(finding['input'])}"
             case _:
                 reason = finding["msg"].replace("Input should be", "should be")
                 for bound in finding.get("ctx", {}).values():
