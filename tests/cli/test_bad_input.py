@@ -1,5 +1,7 @@
 """Whatever a person gives wrong: exit code 2 and one clear sentence, never a traceback, nothing half-written."""
 
+import json
+
 import pytest
 
 from flarewright.cli.app import run
@@ -83,6 +85,11 @@ PROJECT_FILES = {
     "empty": ("", "empty"),
     "not TOML": ("lens", "not valid TOML"),
     "no lens": ("[[lights]]\nfield_deg = [1, 2]\n", "lens is missing"),
+    "lights that are a number": (
+        'lights = 3\nlens = "heliar-tronnier"\n',
+        "lights should be tables, each under [[lights]], not 3",
+    ),
+    "a number without end": (PROJECT + f"intensity = 1{'0' * 5000}\n", "a number of thousands of digits in line 4"),
     "no light": ('lens = "heliar-tronnier"\n', "lights is missing"),
     "newer version": ("schema_version = 2\n" + PROJECT, "newer"),
     "unknown lens": (PROJECT.replace("heliar-tronnier", "heliar-tronier"), "did you mean heliar-tronnier"),
@@ -262,6 +269,8 @@ COMMAND_LINES = {
     "intensity is text": ([*H, *GOOD, "--intensity", "bright"], "'--intensity'"),
     "negative intensity": ([*H, *GOOD, "--intensity", "-1"], "--intensity"),
     "infinite intensity": ([*H, *GOOD, "--intensity", "inf"], "--intensity"),
+    "intensity beyond every light": (
+        [*H, *GOOD, "--intensity", "1e36"], "--intensity should be less than or equal to 1e+20, not 1e+36"),
     "three intensities": ([*H, *GOOD, *["--intensity", "1"] * 3], "3 times for 1 light"),
     "unknown spectrum": ([*H, *GOOD, "--spectrum", "neon"], "neon"),
     "cold black body": ([*H, *GOOD, "--spectrum", "black-body:5"], "between 500"),
@@ -317,6 +326,11 @@ COMMAND_LINES = {
     "size zero": ([*H, *GOOD, "--size", "0x480"], "--size: 0x480"),
     "size huge": ([*H, *GOOD, "--size", "99999x99999"], "32768"),
     "sensor negative": ([*H, *GOOD, "--sensor", "-36x24"], "above 0 mm"),
+    "sensor of an airfield": (
+        [*H, *GOOD, "--sensor", "1e9x1e9"], "--sensor: 1e+09x1e+09 mm is no sensor; give at most"),
+    "pixels like fields": (
+        [*H, *GOOD, "--sensor", "1e6x1e6", "--size", "64x36", "--quality", "draft"],
+        "pixels of 2.78e+04 mm are too coarse for the starburst, whose core has 0.084 mm; give a smaller --sensor"),
     "unknown layers": ([*H, *GOOD, "--layers", "all"], "--layers"),
     "brightest zero": ([*H, *GOOD, "--brightest", "0"], "--brightest"),
     "unknown colorspace": ([*H, *GOOD, "--colorspace", "aces"], "--colorspace"),
@@ -384,6 +398,17 @@ COMMAND_LINES = {
     "ghosts of three orders": (["ghosts", "heliar-tronnier", "--light", "1,1", "--orders", "3"], "choose 2 or 4"),
     "ghosts below no limit": (["ghosts", "heliar-tronnier", "--light", "1,1", "--orders", "4", "--order4-limit", "nan"],
                               "--order4-limit nan is no part"),
+    "focus and sensor distance": (
+        [*H, *GOOD, "--focus", "900", "--sensor-distance", "80"], "--focus and --sensor-distance both say where"),
+    "blades beside an iris image": (
+        [*H, *GOOD, "--iris-image", "picture.png", "--blades", "5"], "--blades shapes blades and"),
+    "exposure of no PNG": ([*H, *GOOD, "--no-png", "--exposure", "1"], "--exposure is for the PNG alone"),
+    "view of no PNG": ([*H, *GOOD, "--no-png", "--view", "srgb"], "--view is for the PNG alone"),
+    "ghosts of two lights": ([*G, "--light", "2,2"], "--light is given 2 times; ghosts are listed for one light"),
+    "ghosts focused twice": ([*G, "--focus", "900", "--sensor-distance", "80"], "keep one"),
+    "iris image is a folder": ([*H, *GOOD, "--iris-image", "folder.exr"], "--iris-image folder.exr is a folder; give"),
+    "output below a file": ([*H, "--light", "1,1", "-o", "lens.toml/a.exr"], "lens.toml is a file and no folder"),
+    "output is an ending": ([*H, "--light", "1,1", "-o", ".exr"], "an ending without a name; write flare.exr"),
     "ghosts without a light": (["ghosts", "heliar-tronnier"], "missing option '--light'"),
     "ghosts in X-rays": (["ghosts", "heliar-tronnier", "--light", "1,1", "--wavelength-nm", "1"], "not visible"),
     "ghosts too fast": (["ghosts", "heliar-tronnier", "--light", "1,1", "--fstop", "1"], "f/1 is faster"),
@@ -470,6 +495,38 @@ def test_one_bad_file_among_good_ones_is_told_and_the_others_are_checked(capsys,
     assert [line.split(":")[1].split(",")[0] for line in out.splitlines() if line[0] != " "] == [
         " usable", " refused", " usable"]  # fmt: skip
     assert "1 of 3 lens files were refused" in err
+
+
+def test_every_mistake_of_a_project_is_told_at_once(capsys, folder):
+    text = PROJECT + "intensity = -1\ndiameter_deg = 2\nshape = { kind = 'rectangle', size_deg = [2, 1] }\n"
+    text += "[camera]\nsize_px = [0, 10]\n[iris]\nblades = 2\n[quality]\nwavelengths = 0\n"
+    (folder / "bad.toml").write_text(text)
+    assert run(["project", "check", "bad.toml"]) == 2
+    err = capsys.readouterr().err
+    places = ("lights[0].intensity", "lights[0].shape", "camera.size_px", "iris.blades", "quality.wavelengths")
+    assert [err.count(f"  - {place}") for place in places] == [1] * 5
+    assert err.count("  - ") == 5
+
+
+def test_what_a_render_would_refuse_is_told_together(capsys, folder):
+    text = 'coating = "preset:gold"\n' + PROJECT + '[iris]\nmask = "no.png"\n[dirt]\nimage = "nor.png"\n'
+    (folder / "bad.toml").write_text(text + '[[art.rules]]\nselect = "5-1"\n')
+    refuse(capsys, folder, ["project", "check", "bad.toml"], "bad.toml has 4 problems, the first: ", "  - ")
+
+
+@pytest.mark.parametrize("kind", ["project", "scene"])
+def test_why_a_file_is_refused_is_one_json_object_too(capsys, folder, kind):
+    (folder / "bad.toml").write_text("lens = 5\ncolour = 1\n")
+    out = json.loads(refuse(capsys, folder, [kind, "check", "bad.toml", "--json"], "colour"))
+    assert (out["file"], out["usable"]) == ("bad.toml", False)
+    assert any("colour" in problem for problem in out["problems"])
+    out = json.loads(refuse(capsys, folder, [kind, "check", "no.toml", "--json"], "no.toml does not exist"))
+    assert out["problems"] == [out["reason"]]
+
+
+def test_an_iris_image_that_a_lens_file_names_is_looked_for(capsys, folder):
+    (folder / "bad.toml").write_text(LENS + '[iris]\nmask = "nowhere.png"\n')
+    refuse(capsys, folder, ["lens", "check", "bad.toml"], "nowhere.png: there is no such iris image")
 
 
 def test_a_binary_project_and_a_folder_as_project(capsys, folder):

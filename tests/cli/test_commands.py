@@ -12,10 +12,12 @@ import jsonschema
 import numpy as np
 import pytest
 from PIL import Image
+from rich.markup import render as from_markup
+from typer.main import get_command
 
 import flarewright as fw
 from flarewright import __version__
-from flarewright.cli.app import run
+from flarewright.cli.app import app, run
 from flarewright.io.exr import read_exr
 from flarewright.io.library import shipped
 from flarewright.io.project_file import project_from_data, read_project
@@ -115,19 +117,25 @@ def test_every_flag_reaches_the_project(capsys, projects, folder):
     call(
         capsys, "render", "heliar-tronnier", "--light", "-10,5", "--light", "2,-6", "--intensity", "1", "--intensity",
         "0.5", "--spectrum", "lamp.csv", "--fstop", "8", "--blades", "7", "--rotation", "-5", "--rounding", "0.5",
-        "--iris-image", "iris.png", "--coating", "quarter-wave:550", "--quality", "reference", "--wavelengths", "3",
+        "--coating", "quarter-wave:550", "--quality", "reference", "--wavelengths", "3",
         "--size", "10x8", "--sensor", "24x18", "--layers", "ghosts", "--brightest", "4", "--colorspace", "acescg",
-        "--half", "--paths", "same-side", "--focus", "2000", "--sensor-distance", "82.5", "--no-starburst",
+        "--half", "--paths", "same-side", "--focus", "2000", "--no-starburst",
         "--full-windows", "--exposure", "-2", "--view", "filmic", "--threads", "1", "--seed", "5", "--error", "0.1",
         "--error-of", "total", "--samples", "1000", "--orders", "4", "--order4-limit", "1e-5", "-o", "a.exr",
     )  # fmt: skip
-    (project,) = projects
+    # what would leave others of these without effect
+    call(
+        capsys, "render", "heliar-tronnier", "--light", "1,1", "--size", "10x8", "--iris-image", "iris.png",
+        "--sensor-distance", "82.5", "-o", "b.exr",
+    )  # fmt: skip
+    project, other = projects
+    assert (other.iris.mask, other.camera.sensor_distance) == ("iris.png", 82.5)
     flat = Tabulated(wavelength_nm=(400, 700), power=(1, 1))
     assert [(x.field_deg, x.intensity, x.spectrum) for x in project.lights] == [
         ((-10, 5), 1.0, flat), ((2, -6), 0.5, flat)]  # fmt: skip
     assert (project.f_number, project.coating) == (8.0, Everywhere(coating=QuarterWave(center_wavelength_nm=550)))
     assert project.iris is not None
-    iris = {"blades": 7, "rotation_deg": -5.0, "rounding": 0.5, "mask": "iris.png"}
+    iris = {"blades": 7, "rotation_deg": -5.0, "rounding": 0.5}
     assert project.iris.model_dump(include=set(iris)) == iris
     assert (project.quality.mode, project.quality.wavelengths, project.quality.paths) == ("reference", 3, "same-side")
     quality = project.quality
@@ -135,7 +143,7 @@ def test_every_flag_reaches_the_project(capsys, projects, folder):
     assert (quality.orders, quality.order4_limit) == (4, 1e-5)
     assert (quality.reference_error, quality.reference_error_of) == (0.1, "total")
     assert (project.camera.size_px, project.camera.sensor_mm) == ((10, 8), (24, 18))
-    assert (project.camera.focus_distance, project.camera.sensor_distance) == (2000, 82.5)
+    assert project.camera.focus_distance == 2000
     output = project.output
     assert (output.layers, output.brightest, output.colorspace) == ("ghosts", 4, "acescg")
     assert (output.pixel_type, output.starburst) == ("half", False)
@@ -475,6 +483,25 @@ def test_project_init_teaches_and_is_usable(capsys, folder):
 
 # ---------------------------------------------------------------------------------------------------------------------
 # the program itself
+
+
+def test_flags_without_effect_are_told(capsys):
+    words = ["render", "heliar-tronnier", "--light", "8,5", "--size", "32x18", "--quality", "draft", "-o", "a.exr"]
+    err = call(capsys, *words, "--orders", "4", "--brightest", "3").err
+    assert "draft quality draws ghosts of two reflections alone: --orders 4 is for final quality" in err
+    assert "--brightest counts layers of single ghosts, and there are none: add --layers ghosts" in err
+
+
+def test_help_keeps_its_square_brackets(capsys):
+    def texts(command):
+        yield from (command.help, command.short_help, command.epilog)
+        yield from (getattr(parameter, "help", None) for parameter in command.params)
+        for each in getattr(command, "commands", {}).values():
+            yield from texts(each)
+
+    for text in filter(None, texts(get_command(app))):
+        assert from_markup(text).plain == text.replace("\\[", "[")
+    assert "flarewright[ui]" in call(capsys, "edit", "--help").out
 
 
 @pytest.mark.parametrize("words", [(), ("lens",), ("coating",), ("project",), ("render", "--help"), ("ghosts", "-h")])

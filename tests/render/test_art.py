@@ -125,6 +125,15 @@ def test_tints_and_gains_multiply_channel_by_channel(mode):
 
 
 @pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("shown", ["passes", "ghosts"])
+def test_with_every_ghost_muted_the_layer_of_ghosts_is_black(mode, shown):
+    muted = project(mode, Rule(select="all", enable=False), light=Light(field_deg=(8.0, 5.0)))
+    sun = Light(field_deg=(-3.0, 2.0), diameter_deg=0.53)
+    done = render(muted.replace(lights=(*muted.lights, sun), output=muted.output.replace(layers=shown)))
+    assert not by_name(done)["ghosts"].pixels.any()
+
+
+@pytest.mark.parametrize("mode", MODES)
 def test_mute_and_solo(mode):
     plain, muted = (by_name(render(project(mode, *rules))) for rules in ((), (Rule(select=SOME, enable=False),)))
     rest = picture(plain["ghosts"], SIZE) - picture(plain[f"ghost.{SOME}"], SIZE)

@@ -79,6 +79,22 @@ def print_json(data: dict[str, Any]) -> None:
     print(json.dumps(_finite(data), indent=2, allow_nan=False))
 
 
+def refusal(file: str | Path, error: FlarewrightError) -> dict[str, Any]:
+    """Return what `--json` prints of a file that cannot be used."""
+    return {"file": str(file), "usable": False, "reason": str(error), "problems": list(error.problems) or [str(error)]}
+
+
+@contextmanager
+def refused_as_json(file: Path, wanted: bool) -> Iterator[None]:
+    """Print as one JSON object too why a file is refused, where that is wanted; the error goes on."""
+    try:
+        yield
+    except FlarewrightError as error:
+        if wanted:
+            print_json(refusal(file, error))
+        raise
+
+
 def _finite(value: Any) -> Any:
     if isinstance(value, dict):
         return {key: _finite(item) for key, item in value.items()}
@@ -104,8 +120,14 @@ def check_place(path: Path, suffix: str | tuple[str, ...]) -> None:
         When the name ends otherwise than in `suffix`, its folder does not exist, or it is a folder itself.
     """
     allowed = (suffix,) if isinstance(suffix, str) else suffix
+    if path.suffix == "" and path.name.lower() in allowed:
+        raise OutputError(
+            f"the output {str(path)!r} is an ending without a name; write {path.with_name('flare' + path.name)}"
+        )
     if path.suffix.lower() not in allowed:
         raise OutputError(f"the output {str(path)!r} must be named *{' or *'.join(allowed)}")
+    if path.parent.exists() and not path.parent.is_dir():
+        raise OutputError(f"cannot write {path}: {path.parent} is a file and no folder; choose another place")
     if not path.parent.is_dir():
         raise OutputError(f"cannot write {path}: the folder {path.parent} does not exist; create it first")
     if path.is_dir():
@@ -214,7 +236,7 @@ def progress_bar() -> Iterator[Callable[[str], Callable[[float, str], None]]]:
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-    columns = (TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn())
+    columns = (TextColumn("{task.description}", markup=False), BarColumn(), TimeRemainingColumn())
     with Progress(*columns, console=Console(stderr=True), transient=True) as bars:
 
         def begin(name: str) -> Callable[[float, str], None]:

@@ -12,7 +12,7 @@ from .common import tell
 
 EPILOG = (
     "Examples:\n\nflarewright edit\n\nflarewright edit canon-28-80\n\nflarewright edit shot.toml --port 8100 "
-    "--no-browser\n\nIt needs the extra ui: pip install 'flarewright[ui]'"
+    "--no-browser\n\nIt needs the extra ui: pip install 'flarewright\\[ui]'"
 )
 
 # of the extra ui

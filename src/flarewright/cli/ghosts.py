@@ -23,7 +23,9 @@ EPILOG = (
 
 def ghosts(
     lens: Annotated[str, typer.Argument(metavar="LENS", help="A shipped lens (flarewright lenses) or a lens file.")],
-    light: Annotated[str, typer.Option(metavar="X,Y", help="Field angles in degrees, right and up in the picture.")],
+    light: Annotated[
+        list[str], typer.Option(metavar="X,Y", help="Field angles in degrees, right and up in the picture.")
+    ],
     distance: Annotated[
         float | None, typer.Option(help="Light in front of the lens, mm; inf, or left out: distant.")
     ] = None,
@@ -77,9 +79,11 @@ def ghosts(
     """
     from ..io.plate_text import parse_imperfection, parse_plate
     from ..io.project_file import parse_coating_choice
-    from .render_flags import scatter_flags
+    from .render_flags import check_focus, scatter_flags
 
-    angles = field_angles(light)
+    if len(light) > 1:
+        raise ProjectError(f"--light is given {len(light)} times; ghosts are listed for one light, so keep one")
+    angles = field_angles(light[0])
     if not (math.isfinite(wavelength_nm) and 380.0 <= wavelength_nm <= 780.0):
         raise ProjectError(f"--wavelength-nm {wavelength_nm:g} is not visible light; choose one between 380 and 780 nm")
     if paths not in ("all", "same-side"):
@@ -111,6 +115,7 @@ def ghosts(
 
     remarks: list[str] = []
     prescription = load_lens(lens, remarks=remarks)
+    check_focus(prescription, focus, sensor_distance)
     distance = None if distance == math.inf else distance
     for name, value in (("--focus", focus), ("--sensor-distance", sensor_distance), ("--distance", distance)):
         if value is not None and not (math.isfinite(value) and value > 0.0):

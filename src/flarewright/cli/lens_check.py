@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from ..errors import FlarewrightError
-from .common import print_json
+from .common import print_json, refusal
 
 EPILOG = "Example:\n\nflarewright lens check my-lenses/*.lens"
 
@@ -18,6 +18,7 @@ def check(
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
     """Tell which lens files are usable and what had to be repaired; exit code 2 when any is refused."""
+    from ..io.mask_image import read_mask
     from ..render.prepare import first_order, load_lens
 
     results: list[dict[str, Any]] = []
@@ -26,9 +27,10 @@ def check(
         try:
             lens = load_lens(file, remarks=remarks)
             order = first_order(lens)
+            if lens.iris.mask is not None:
+                read_mask(lens.iris.mask)
         except FlarewrightError as error:
-            problems = list(getattr(error, "problems", ())) or [str(error)]
-            results.append({"file": file, "usable": False, "reason": str(error), "problems": problems})
+            results.append(refusal(file, error))
             continue
         results.append(
             {

@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .common import print_json, tell
+from ..errors import FlarewrightError
+from .common import print_json, refused_as_json, tell
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from ..render.prepare import Settled
 
 
 def check(
@@ -15,19 +22,8 @@ def check(
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
     """Check a project and its lens, and tell every mistake at once; exit code 2 when it cannot be rendered."""
-    from ..io.project_file import read_project
-    from ..optics.pack import resolve_coatings
-    from ..render.art import resolve_art
-    from ..render.holdout import read_plates
-    from ..render.prepare import settle
-    from ..render.scatter import check_scatter
-
-    settled = settle(read_project(file))
-    resolve_coatings(settled.lens, settled.coating)
-    resolve_art(settled)
-    check_scatter(settled)
-    for light in settled.project.lights:
-        read_plates(settled.project, light)
+    with refused_as_json(file, as_json):
+        settled = _settled(file)
     if as_json:
         print_json(
             {
@@ -47,3 +43,38 @@ def check(
     print(
         f"{file}: usable, {settled.lens.name} at f/{order.f_number:g}, {lights}, {size} pixels, {project.quality.mode}"
     )
+
+
+def _settled(file: Path) -> Settled:
+    """Read a project and everything that its render reads; all that is wrong with it is one error."""
+    from ..io.mask_image import read_mask
+    from ..io.project_file import ProjectFileError, read_project
+    from ..io.sentences import summary
+    from ..optics.pack import resolve_coatings
+    from ..render.art import resolve_art
+    from ..render.holdout import read_plates
+    from ..render.prepare import settle
+    from ..render.scatter import check_scatter
+    from ..render.starburst_pass import read_soil
+
+    settled = settle(read_project(file))
+    project, mask = settled.project, settled.iris.mask
+    stages: list[Callable[[], object]] = [
+        lambda: resolve_coatings(settled.lens, settled.coating),
+        lambda: resolve_art(settled),
+        lambda: check_scatter(settled),
+        lambda: None if mask is None else read_mask(mask),
+        lambda: read_soil(project.dirt),
+        *(partial(read_plates, project, light) for light in project.lights),
+    ]
+    errors: dict[str, FlarewrightError] = {}
+    for stage in stages:
+        try:
+            stage()
+        except FlarewrightError as error:
+            errors.setdefault(str(error), error)
+    if len(errors) == 1:
+        raise next(iter(errors.values()))
+    if errors:
+        raise ProjectFileError(summary(str(file), list(errors)), tuple(errors))
+    return settled

@@ -244,7 +244,7 @@ def render(
         list[str] | None,
         typer.Option(
             metavar="RULE",
-            help="A rule of [[art.rules]]: 'select = \"row:7\", tint = [1, 0.6, 0.3], scale = 2'; may be repeated.",
+            help="A rule of [\\[art.rules]]: 'select = \"row:7\", tint = [1, 0.6, 0.3], scale = 2'; may be repeated.",
             rich_help_panel=_ART,
         ),
     ] = None,
@@ -328,7 +328,9 @@ def render(
     exposure: Annotated[
         float | None, typer.Option(help="Stops, for the PNG only; automatic when left out.", rich_help_panel=_OUT)
     ] = None,
-    view: Annotated[str, typer.Option(help="srgb or filmic, for the PNG only.", rich_help_panel=_OUT)] = "srgb",
+    view: Annotated[
+        str | None, typer.Option(help="srgb (when left out) or filmic, for the PNG only.", rich_help_panel=_OUT)
+    ] = None,
     no_png: Annotated[
         bool, typer.Option("--no-png", help="Write no PNG beside the EXR.", rich_help_panel=_OUT)
     ] = False,
@@ -344,10 +346,13 @@ def render(
     Every value is an irradiance on the sensor relative to a light of irradiance 1, so layers add up to the beauty.
     """
     check_place(output, ".exr")
-    if view not in ("srgb", "filmic"):
+    if view not in (None, "srgb", "filmic"):
         raise ProjectError(f"--view {view!r} is unknown; choose srgb or filmic")
     if exposure is not None and not -100.0 <= exposure <= 100.0:
         raise ProjectError(f"--exposure {exposure:g} is out of range; choose between -100 and 100 stops")
+    if no_png and (exposure is not None or view is not None):
+        flag = "--view" if exposure is None else "--exposure"
+        raise ProjectError(f"{flag} is for the PNG alone and --no-png leaves it out; keep one")
     from .render_flags import Flags, build_project
 
     state = _read_state(resume)
@@ -385,10 +390,14 @@ def render(
         if run is not None and run.state_file is not None and run.state_file.exists():
             tell([f"to go on: flarewright render --resume {run.state_file} -o {output}"])
         raise
-    files, remarks = _write(rendering, output, full_windows, None if no_png else (exposure, view))
+    files, remarks = _write(rendering, output, full_windows, None if no_png else (exposure, view or "srgb"))
     remarks = [*rendering.remarks, *remarks]
     if ringing == "collins" and settings.quality.mode != "final":
         remarks.insert(0, f"{settings.quality.mode} quality traces rays alone: --ringing is for final quality")
+    if orders == 4 and settings.quality.mode == "draft":
+        remarks.insert(0, "draft quality draws ghosts of two reflections alone: --orders 4 is for final quality")
+    if brightest is not None and settings.output.layers != "ghosts":
+        remarks.insert(0, "--brightest counts layers of single ghosts, and there are none: add --layers ghosts")
     if run is not None:
         remarks.append(f"to go on to a smaller --error: --resume {run.state_file}")
     tell(remarks)
@@ -468,7 +477,7 @@ def _render(project: Project, threads: int | None, run: ReferenceRun | None, led
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-    columns = (TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn())
+    columns = (TextColumn("{task.description}", markup=False), BarColumn(), TimeRemainingColumn())
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("rendering", total=1.0)
         return render_project(

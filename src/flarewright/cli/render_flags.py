@@ -14,7 +14,7 @@ from ..errors import ProjectError
 from ..io.plate_text import parse_grating, parse_imperfection, parse_plate
 from ..io.project_file import ProjectFileError, explain, parse_coating_choice, read_project
 from ..io.spectrum_text import parse_spectrum
-from ..model import Art, Holdout, Iris, Light, Project, Rule, Scatter
+from ..model import Art, Holdout, Iris, Lens, Light, Project, Rule, Scatter
 from ..model.art import PASSES
 from ..model.light import SUN_DEG
 from .common import field_angles, pair
@@ -151,6 +151,7 @@ def build_project(flags: Flags) -> Project:
     ProjectError
         When a flag cannot be used or something is missing; several findings are all listed.
     """
+    _check_together(flags)
     base = read_project(flags.project) if flags.project is not None else flags.resumed
     if base is None and flags.lens is None:
         raise ProjectError("no lens is given; name one (flarewright lenses lists them) or give a --project file")
@@ -159,6 +160,7 @@ def build_project(flags: Flags) -> Project:
     fields: dict[str, Any] = {name: getattr(base, name) for name in Project.model_fields} if base else {}
     if flags.lens is not None:
         fields["lens"] = flags.lens
+    check_focus(fields["lens"], flags.focus, flags.sensor_distance)
     fields["lights"] = _lights(flags, base.lights if base else ())
     if flags.fstop is not None:
         fields["f_number"] = flags.fstop
@@ -201,6 +203,24 @@ def build_project(flags: Flags) -> Project:
         raise ProjectFileError(message, tuple(findings)) from None
 
 
+def _check_together(flags: Flags) -> None:
+    """Refuse flags of which one leaves another without effect."""
+    shapes = {"--blades": flags.blades, "--rounding": flags.rounding, "--roughness": flags.roughness}
+    for flag, value in shapes.items():
+        if flags.iris_image is not None and value is not None:
+            raise ProjectError(f"{flag} shapes blades and --iris-image replaces them; keep one")
+
+
+def check_focus(lens: str | Lens, focus: float | None, sensor_distance: float | None) -> None:
+    """Refuse a focus that the sensor's distance leaves without effect: of a lens that moves no glass to focus."""
+    if focus is None or sensor_distance is None:
+        return
+    from ..render.prepare import as_lens
+
+    if not any(position.focus_distance is not None for position in as_lens(lens).positions):
+        raise ProjectError("--focus and --sensor-distance both say where the sensor stands; keep one")
+
+
 def _sections(flags: Flags) -> dict[str, dict[str, Any]]:
     """Return what the flags say of camera, quality and output, by section and key."""
     size = None
@@ -211,7 +231,7 @@ def _sections(flags: Flags) -> dict[str, dict[str, Any]]:
         size = (int(width), int(height))
     dirt_image = None if flags.dirt_image is None else str(flags.dirt_image)
     if dirt_image is not None and not Path(dirt_image).is_file():
-        raise ProjectError(f"--dirt-image {dirt_image} does not exist; give a grey PNG or EXR image")
+        raise ProjectError(f"--dirt-image {dirt_image} {_no_file(dirt_image)}; give a grey PNG or EXR image")
     sensor = None if flags.sensor is None else pair(flags.sensor, "--sensor", "36x24 (mm)", "x")
     return {
         "camera": {
@@ -338,7 +358,7 @@ def _iris(flags: Flags, lens: Any, base: Project | None) -> dict[str, Any] | Non
     """Return the iris with the flags' changes, or None when no flag changes it."""
     mask = None if flags.iris_image is None else str(flags.iris_image)
     if mask is not None and not Path(mask).is_file():
-        raise ProjectError(f"--iris-image {mask} does not exist; give a grey PNG or EXR image")
+        raise ProjectError(f"--iris-image {mask} {_no_file(mask)}; give a grey PNG or EXR image")
     changes = {
         "blades": flags.blades,
         "rotation_deg": flags.rotation,
@@ -362,6 +382,11 @@ def _iris(flags: Flags, lens: Any, base: Project | None) -> dict[str, Any] | Non
     return {**dict(iris), **given}
 
 
+def _no_file(path: str | Path) -> str:
+    """Say what a path is that is no file."""
+    return "is a folder" if Path(path).is_dir() else "does not exist"
+
+
 def _holdout(flags: Flags, base: Holdout | None) -> dict[str, Any] | None:
     """Return what hides lights with the flags' file, or None when no flag names one."""
     given = {"image": flags.holdout, "depth": flags.depth}
@@ -370,7 +395,7 @@ def _holdout(flags: Flags, base: Holdout | None) -> dict[str, Any] | None:
     for flag, path in (("--holdout", flags.holdout), ("--depth", flags.depth)):
         if path is not None and not path.is_file():
             what = "a grey PNG or EXR image" if flag == "--holdout" else "an EXR depth plate"
-            raise ProjectError(f"{flag} {path} does not exist; give {what} in the picture's frame")
+            raise ProjectError(f"{flag} {path} {_no_file(path)}; give {what} in the picture's frame")
     if flags.holdout is None and flags.depth is None:
         return None
     kept = dict(base) if base is not None and (base.image is None) == (flags.holdout is None) else {}

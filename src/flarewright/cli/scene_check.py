@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from .common import print_json
+from .common import print_json, refused_as_json
 
 
 def check(
@@ -18,10 +18,11 @@ def check(
     from ..io.scene_file import read_scene
     from ..predict.tracks import camera_track, moments, sightings
 
-    scene = read_scene(file)
-    times, dates = moments(scene)
-    tracks = [camera_track(one, times, f"cameras[{c}] ({one.name})") for c, one in enumerate(scene.cameras)]
-    sightings(scene, tracks, times, dates)
+    with refused_as_json(file, as_json):
+        scene = read_scene(file)
+        times, dates = moments(scene)
+        tracks = [camera_track(one, times, f"cameras[{c}] ({one.name})") for c, one in enumerate(scene.cameras)]
+        sightings(scene, tracks, times, dates)
     if as_json:
         facts = {"cameras": len(scene.cameras), "lights": len(scene.lights), "times": len(times)}
         print_json({"file": str(file), "usable": True, "scene": scene.name, **facts})

@@ -306,8 +306,14 @@ def explain(error: ValidationError, data: Any, sections: Sections | None = None)
             case "value_error":
                 reason = finding["msg"].removeprefix("Value error, ")
                 sentence = f"{place}: {reason}" if place else reason
+            case "tuple_type" if place == "lights":
+                sentence = f"lights should be tables, each under [[lights]]{_given(finding['input'])}"
             case _:
                 reason = finding["msg"].replace("Input should be", "should be")
+                for bound in finding.get("ctx", {}).values():
+                    if isinstance(bound, float) and bound >= 1e15:
+                        # nobody counts so many noughts
+                        reason = reason.replace(f"{bound:.0f}", f"{bound:g}")
                 reason = reason[0].lower() + reason[1:]
                 sentence = f"{place} {reason}{_given(finding['input'])}".strip()
         if sentence not in sentences:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -102,6 +103,10 @@ def read_toml(path: str | Path, what: str) -> dict[str, Any]:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise ValueError(f"{path} is not valid TOML: {lower_first(str(error))}") from None
+    except ValueError:
+        # a whole number of thousands of digits, which Python does not turn into one
+        line = next((k for k, line in enumerate(text.split("\n"), 1) if re.search(r"[\d_]{4301}", line)), 1)
+        raise ValueError(f"{path} has a number of thousands of digits in line {line}: shorten it") from None
     except RecursionError:
         raise ValueError(f"{path} is not {what}: its tables are nested too deeply") from None
 

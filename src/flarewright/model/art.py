@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import re
 from itertools import pairwise
-from typing import Annotated
+from typing import Annotated, Any
 
-from pydantic import AfterValidator, Field, StrictBool, model_validator
+from pydantic import AfterValidator, Field, StrictBool, ValidationInfo, field_validator
 
 from .base import Frozen
 
@@ -79,14 +79,20 @@ class Rule(Frozen):
     blur_px: float | None = Field(None, ge=0.0, le=4096.0)
     blur_mm: float | None = Field(None, ge=0.0, le=1000.0)
 
-    @model_validator(mode="after")
-    def _is_of_one_mind(self) -> Rule:
-        for name in ("offset", "blur"):
-            if getattr(self, f"{name}_px") is not None and getattr(self, f"{name}_mm") is not None:
-                raise ValueError(f"{name}_px and {name}_mm say the same thing twice; keep one")
-        if any(later[0] <= sooner[0] for sooner, later in pairwise(self.ramp)):
-            raise ValueError("ramp: positions must rise from each [position, red, green, blue] to the next")
-        return self
+    @field_validator("offset_mm", "blur_mm")
+    @classmethod
+    def _is_of_one_mind(cls, length: Any, info: ValidationInfo) -> Any:
+        name = str(info.field_name).removesuffix("_mm")
+        if length is not None and info.data.get(f"{name}_px") is not None:
+            raise ValueError(f"{name}_px and {name}_mm say the same thing twice; keep one")
+        return length
+
+    @field_validator("ramp")
+    @classmethod
+    def _positions_rise(cls, ramp: tuple[tuple[float, ...], ...]) -> tuple[tuple[float, ...], ...]:
+        if any(later[0] <= sooner[0] for sooner, later in pairwise(ramp)):
+            raise ValueError("positions must rise from each [position, red, green, blue] to the next")
+        return ramp
 
 
 class Art(Frozen):
@@ -107,9 +113,10 @@ class Art(Frozen):
     gain: dict[str, Factor] = Field(default_factory=dict)
     rules: tuple[Rule, ...] = ()
 
-    @model_validator(mode="after")
-    def _passes_exist(self) -> Art:
-        for name in self.gain:
+    @field_validator("gain")
+    @classmethod
+    def _passes_exist(cls, gain: dict[str, float]) -> dict[str, float]:
+        for name in gain:
             if name not in PASSES:
-                raise ValueError(f"gain: there is no pass {name!r}; known are {', '.join(PASSES)}")
-        return self
+                raise ValueError(f"there is no pass {name!r}; known are {', '.join(PASSES)}")
+        return gain

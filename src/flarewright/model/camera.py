@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from typing import Literal
 
-from pydantic import Field, StrictBool
+from pydantic import Field, StrictBool, field_validator
 
 from .base import Frozen
 from .grating import SensorGrating
 from .plate import Plate
+
+# a kilometre: far beyond every sensor, and every ghost still has a size in the picture
+LARGEST_SENSOR_MM = 1e6
 
 
 class Camera(Frozen):
@@ -47,6 +50,25 @@ class Camera(Frozen):
     sensor_grating: SensorGrating | None = None
     squeeze: float | None = Field(None, ge=0.25, le=4.0)
     desqueeze: StrictBool = False
+
+    # of single keys, not of the whole: so they are told together with all other mistakes of a file
+    @field_validator("size_px")
+    @classmethod
+    def _picture_is_sane(cls, size_px: tuple[int, int]) -> tuple[int, int]:
+        width, height = size_px
+        if not (1 <= width <= 32768 and 1 <= height <= 32768):
+            raise ValueError(f"{width}x{height} is not between 1 and 32768 pixels a side")
+        return size_px
+
+    @field_validator("sensor_mm")
+    @classmethod
+    def _sensor_is_sane(cls, sensor_mm: tuple[float, float] | None) -> tuple[float, float] | None:
+        if sensor_mm is not None and min(sensor_mm) <= 0.0:
+            raise ValueError("a sensor has a width and a height above 0 mm")
+        if sensor_mm is not None and max(sensor_mm) > LARGEST_SENSOR_MM:
+            width, height = sensor_mm
+            raise ValueError(f"{width:g}x{height:g} mm is no sensor; give at most {LARGEST_SENSOR_MM:g} mm a side")
+        return sensor_mm
 
     @property
     def sensor(self) -> tuple[float, float]:

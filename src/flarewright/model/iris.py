@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator
 
 from .base import Frozen
 
@@ -39,8 +39,9 @@ class Iris(Frozen):
     roughness_length_um: float = Field(200.0, gt=0.0, le=100000.0)
     roughness_seed: int = Field(0, ge=0, lt=2**63)
 
-    @model_validator(mode="after")
-    def _blades_make_an_opening(self) -> Iris:
-        if self.blades in (1, 2):
+    @field_validator("blades")
+    @classmethod
+    def _blades_make_an_opening(cls, blades: int) -> int:
+        if blades in (1, 2):
             raise ValueError("an iris has 0 blades (round) or at least 3")
-        return self
+        return blades

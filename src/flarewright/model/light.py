@@ -5,7 +5,7 @@ from __future__ import annotations
 from itertools import pairwise
 from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from .base import Frozen
 from .holdout import Holdout
@@ -73,6 +73,8 @@ class Rgb(Frozen):
 
 Spectrum = Annotated[EqualEnergy | D65 | BlackBody | Lines | Tabulated | Rgb, Field(discriminator="kind")]
 
+LARGEST_INTENSITY = 1e20
+"""Far beyond every light, and far enough below what 32 bits hold for all that multiplies it."""
 SUN_DEG = 0.53
 """Angle across the sun's disc, degrees."""
 
@@ -150,21 +152,27 @@ class Light(Frozen):
     name: str = "light"
     field_deg: FieldAngles
     distance: float | None = Field(None, gt=0.0, le=1e9)
-    intensity: float = Field(1.0, ge=0.0)
+    intensity: float = Field(1.0, ge=0.0, le=LARGEST_INTENSITY)
     spectrum: Spectrum = D65()
     diameter_deg: float = Field(0.0, ge=0.0, le=60.0)
     shape: Shape | None = None
     holdout: Holdout | None = None
     keyframes: tuple[LightKey, ...] = Field((), max_length=1000)
 
-    @model_validator(mode="after")
-    def _one_shape(self) -> Light:
-        for before, after in pairwise(key.at_s for key in self.keyframes):
+    @field_validator("shape")
+    @classmethod
+    def _one_shape(cls, shape: Shape | None, info: ValidationInfo) -> Shape | None:
+        if shape is not None and info.data.get("diameter_deg", 0.0) > 0.0:
+            raise ValueError("a light is a disc (diameter_deg) or has a shape, not both; keep one")
+        return shape
+
+    @field_validator("keyframes")
+    @classmethod
+    def _keyframes_rise(cls, keyframes: tuple[LightKey, ...]) -> tuple[LightKey, ...]:
+        for before, after in pairwise(key.at_s for key in keyframes):
             if after <= before:
                 raise ValueError(f"keyframes must rise in time: {after:g} s follows {before:g} s")
-        if self.shape is not None and self.diameter_deg > 0.0:
-            raise ValueError("a light is a disc (diameter_deg) or has a shape, not both; keep one")
-        return self
+        return keyframes
 
     @property
     def extended(self) -> bool:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import Field, StrictBool, field_validator, model_validator
+from pydantic import Field, StrictBool, field_validator
 
 from .art import Art
 from .base import Frozen
@@ -191,12 +191,3 @@ class Project(Frozen):
         if isinstance(zoom, float) and not zoom > 0.0:
             raise ValueError(f"{zoom:g} is no focal length; give one above 0, in mm, or the name of a position")
         return zoom
-
-    @model_validator(mode="after")
-    def _picture_is_sane(self) -> Project:
-        width, height = self.camera.size_px
-        if not (1 <= width <= 32768 and 1 <= height <= 32768):
-            raise ValueError(f"camera.size_px: {width}x{height} is not between 1 and 32768 pixels a side")
-        if min(self.camera.sensor) <= 0:
-            raise ValueError("camera.sensor_mm: a sensor has a width and a height above 0 mm")
-        return self

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator
 
 from .base import Frozen
 
@@ -77,13 +77,14 @@ class Scatter(Frozen):
     share: Share = 0.001
     rows: tuple[RowScatter, ...] = ()
 
-    @model_validator(mode="after")
-    def _rows_differ(self) -> Scatter:
-        rows = [exception.row for exception in self.rows]
+    @field_validator("rows")
+    @classmethod
+    def _rows_differ(cls, exceptions: tuple[RowScatter, ...]) -> tuple[RowScatter, ...]:
+        rows = [exception.row for exception in exceptions]
         for row in rows:
             if rows.count(row) > 1:
-                raise ValueError(f"rows: row {row} is told {rows.count(row)} times; keep one")
-        return self
+                raise ValueError(f"row {row} is told {rows.count(row)} times; keep one")
+        return exceptions
 
     def at(self, row: int) -> Scatter:
         """Return what holds at one row of the lens, without exceptions."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from pydantic import Field, StrictBool, model_validator
+from pydantic import Field, StrictBool, field_validator
 
 from .base import Frozen
 
@@ -47,13 +47,12 @@ class Dirt(Frozen):
     seed: int = Field(0, ge=0, lt=2**63)
     in_ghosts: StrictBool = False
 
-    @model_validator(mode="after")
-    def _diameters_rise(self) -> Dirt:
-        if self.dust_um[0] > self.dust_um[1]:
-            raise ValueError(
-                f"dust_um: the least diameter {self.dust_um[0]:g} is above the largest {self.dust_um[1]:g}"
-            )
-        return self
+    @field_validator("dust_um")
+    @classmethod
+    def _diameters_rise(cls, dust_um: tuple[float, float]) -> tuple[float, float]:
+        if dust_um[0] > dust_um[1]:
+            raise ValueError(f"the least diameter {dust_um[0]:g} is above the largest {dust_um[1]:g}")
+        return dust_um
 
     @property
     def clean(self) -> bool:

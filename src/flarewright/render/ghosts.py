@@ -263,7 +263,7 @@ def _draft(
     changes = [art.get(path.name, PLAIN) for path in paths]
     # what is only graded is drawn like what is not changed at all
     plain = [k for k, change in enumerate(changes) if not (change.alone or change.framed or any(change.offset))]
-    rgb = np.array([change.rgb for change in changes])
+    rgb = np.reshape([change.rgb for change in changes], (-1, 3))
     crowded = len(points) * len(plain) >= CROWD
     own = [paths[k] for k in plain]
     colors = [draft_colors(shot, own) * rgb[plain, None] for shot in points]

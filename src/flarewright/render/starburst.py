@@ -15,6 +15,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from flarewright.errors import ProjectError
 from flarewright.kernels.resample import blend_blade_wings, blend_fan_wings, deposit_core
 from flarewright.model.iris import Iris
 from flarewright.optics.diffraction import BladeWings, FanWings, Pattern, pupil_pattern, spike_profile
@@ -32,6 +33,9 @@ BAND = 64
 
 LEAST_CORE = 1.0
 """Radius of the core, before the blend begins, in parts of a pixel: with less the blend loses flux."""
+
+MOST_PARTS = 100_000_000
+"""Of the pixels around the centre: with more they would fill the memory."""
 
 __all__ = ["Painter", "painter_of", "starburst_layer"]
 
@@ -108,19 +112,23 @@ def starburst_layer(
         return picture
     pattern = pupil_pattern(iris, mask) if pattern is None else pattern
     painter = painter_of(pattern, f_number, pixel_mm, wave, weights)
-    painter.paint(x_edges, y_edges, pixel_mm, picture, threads)
-
     # Where the blend begins inside the near zone, pixels there are too coarse for it.
     k = max(split, math.ceil(LEAST_CORE * max(pixel_mm) / painter.inner))
-    if k > 1 and painter.inner < NEAR_PIXELS * max(pixel_mm):
-        left, right = _near(cx, width)
-        top, bottom = _near(cy, height)
-        if left < right and top < bottom:
-            fine = np.zeros(((bottom - top) * k, (right - left) * k, 3))
-            x_fine = (left + np.arange((right - left) * k + 1) / k - cx) * pixel_mm[0]
-            y_fine = (cy - top - np.arange((bottom - top) * k + 1) / k) * pixel_mm[1]
-            painter.paint(x_fine, y_fine, (pixel_mm[0] / k, pixel_mm[1] / k), fine)
-            picture[top:bottom, left:right] = fine.reshape(bottom - top, k, right - left, k, 3).mean(axis=(1, 3))
+    left, right = _near(cx, width)
+    top, bottom = _near(cy, height)
+    if max((bottom - top) * (right - left), 1) * k * k > MOST_PARTS:
+        raise ProjectError(
+            f"pixels of {max(pixel_mm):.3g} mm are too coarse for the starburst, whose core has {painter.inner:.2g} "
+            "mm; give a smaller --sensor or a larger --size, or leave the starburst out with --no-starburst"
+        )
+    painter.paint(x_edges, y_edges, pixel_mm, picture, threads)
+
+    if k > 1 and painter.inner < NEAR_PIXELS * max(pixel_mm) and left < right and top < bottom:
+        fine = np.zeros(((bottom - top) * k, (right - left) * k, 3))
+        x_fine = (left + np.arange((right - left) * k + 1) / k - cx) * pixel_mm[0]
+        y_fine = (cy - top - np.arange((bottom - top) * k + 1) / k) * pixel_mm[1]
+        painter.paint(x_fine, y_fine, (pixel_mm[0] / k, pixel_mm[1] / k), fine)
+        picture[top:bottom, left:right] = fine.reshape(bottom - top, k, right - left, k, 3).mean(axis=(1, 3))
     return picture
 
 
