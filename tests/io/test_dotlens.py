@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from flarewright.cli.app import run
 from flarewright.errors import LensError
 from flarewright.io.dotlens import read_dotlens
 from flarewright.io.lens_file import read_lens
@@ -15,6 +16,7 @@ from flarewright.model import Lens, QuarterWave, Stop
 from flarewright.model.raw_lens import LensReading, RawLens
 from flarewright.optics.paraxial import first_order
 from flarewright.optics.repair import repair
+from flarewright.render.prepare import load_lens
 
 CORPUS = Path(os.environ.get("FLAREWRIGHT_CORPUS", Path(__file__).parents[3] / "shared" / "lens_corpus"))
 FILES = sorted(CORPUS.glob("*.lens")) if CORPUS.is_dir() else []
@@ -187,6 +189,18 @@ def test_semi_diameters_are_recognised_and_can_be_overridden(tmp_path):
     lens, remarks = read_small(tmp_path, apertures="diameters")
     assert lens.rows[0].semi_diameter == 9.25
     assert any("read as diameters, as asked" in remark for remark in remarks)
+
+
+def test_whoever_knows_better_says_what_the_column_holds(tmp_path, capsys):
+    file, out = str(small(tmp_path, TRIPLET)), tmp_path / "triplet.toml"
+    assert run(["lens", "convert", file, str(out), "--apertures", "diameters"]) == 0
+    assert "read as diameters, as asked" in capsys.readouterr().err
+    assert load_lens(out).rows[0].semi_diameter == 9.25
+    assert run(["lens", "check", file, "--apertures", "radii"]) == 2
+    assert "choose diameters or semi-diameters" in capsys.readouterr().err
+    # shipped lenses have no such column
+    assert run(["lens", "check", "heliar-tronnier", "--apertures", "diameters"]) == 2
+    assert "leave --apertures out" in capsys.readouterr().err
 
 
 def test_a_name_cut_short_is_completed(tmp_path):

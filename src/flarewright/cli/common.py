@@ -16,6 +16,10 @@ from ..errors import FlarewrightError, OutputError, ProjectError
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from ..optics.repair import Apertures
+
+APERTURES_HELP = "Read the last column of .lens tables as diameters or semi-diameters; left out: as the f-number says."
+
 
 def pair(text: str, flag: str, example: str, separator: str = ",") -> tuple[float, float]:
     """Return the two numbers of a text like "10,5" or "36x24".
@@ -72,6 +76,16 @@ def tell(remarks: Iterable[str]) -> None:
     """Print remarks to stderr, one a line."""
     for remark in remarks:
         print(f"flarewright: {remark}", file=sys.stderr)
+
+
+def aperture_reading(text: str | None) -> Apertures:
+    """Return how `--apertures` has the last column of a `.lens` table read."""
+    match text:
+        case None:
+            return "auto"
+        case "diameters" | "semi-diameters":
+            return text
+    raise ProjectError(f"--apertures {text!r} is unknown; choose diameters or semi-diameters")
 
 
 def print_json(data: dict[str, Any]) -> None:

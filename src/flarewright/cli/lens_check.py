@@ -8,24 +8,26 @@ from typing import Annotated, Any
 import typer
 
 from ..errors import FlarewrightError
-from .common import print_json, refusal
+from .common import APERTURES_HELP, aperture_reading, print_json, refusal
 
 EPILOG = "Example:\n\nflarewright lens check my-lenses/*.lens"
 
 
 def check(
     files: Annotated[list[str], typer.Argument(metavar="FILE...", help="Lens files or shipped names.")],
+    apertures: Annotated[str | None, typer.Option(metavar="KIND", help=APERTURES_HELP)] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
     """Tell which lens files are usable and what had to be repaired; exit code 2 when any is refused."""
     from ..io.mask_image import read_mask
     from ..render.prepare import first_order, load_lens
 
+    reading = aperture_reading(apertures)
     results: list[dict[str, Any]] = []
     for file in files:
         remarks: list[str] = []
         try:
-            lens = load_lens(file, remarks=remarks)
+            lens = load_lens(file, remarks=remarks, apertures=reading)
             order = first_order(lens)
             if lens.iris.mask is not None:
                 read_mask(lens.iris.mask)

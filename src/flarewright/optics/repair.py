@@ -242,8 +242,8 @@ def _read_apertures(
         column = ratio * 2.0 * order.stop_semi_diameter
         remarks.append(f"no f-number is stated; the stop of {column:g} mm gives f/{number:.2f}")
         order = first_order(draft)
-        if apertures == "auto":
-            remarks.append("the aperture column is read as diameters, as in nearly all files of this kind")
+        read = "diameters, as in nearly all files of this kind" if apertures == "auto" else f"{apertures}, as asked"
+        remarks.append(f"the aperture column is read as {read}")
         return per_mm, order, draft
     if apertures != "auto":
         remarks.append(f"the aperture column is read as {apertures}, as asked")

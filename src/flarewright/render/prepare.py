@@ -21,13 +21,13 @@ from ..optics.pack import SensorMirror, resolve_coatings
 from ..optics.paraxial import FirstOrder
 from ..optics.paraxial import first_order as _first_order
 from ..optics.plates import with_cover_glass, with_filter
-from ..optics.repair import repair
+from ..optics.repair import Apertures, repair
 from ..optics.semi_diameters import complete
 from ..optics.sequence import lens_of_sequence
 from ..optics.zoom import at_position, positioned
 
 
-def load_lens(name_or_path: str | Path, *, remarks: list[str] | None = None) -> Lens:
+def load_lens(name_or_path: str | Path, *, remarks: list[str] | None = None, apertures: Apertures = "auto") -> Lens:
     """Load a shipped lens or a lens file, repaired and complete.
 
     Parameters
@@ -36,6 +36,8 @@ def load_lens(name_or_path: str | Path, *, remarks: list[str] | None = None) -> 
         A shipped lens' name (`flarewright lenses`), a TOML lens file, a `.lens` or a `.zmx` file.
     remarks : list of str, optional
         Every repair, estimate and assumption is appended to it, a sentence each.
+    apertures : {"auto", "diameters", "semi-diameters"}
+        What the last column of a `.lens` table holds; "auto" decides by the stop (`optics.repair.repair`).
 
     Returns
     -------
@@ -45,13 +47,14 @@ def load_lens(name_or_path: str | Path, *, remarks: list[str] | None = None) -> 
     Raises
     ------
     LensError
-        When there is no such lens, or it is no camera lens; the message says why.
+        When there is no such lens, or it is no camera lens; the message says why. When `apertures` is told of a file
+        of another kind.
     GlassError
         For a glass that no catalogue knows.
     """
     path = lens_path(str(name_or_path))
     # a person's file may change while a program runs, a shipped one does not
-    lens, told = _shipped_lens(path) if is_shipped(path) else _read_complete(path)
+    lens, told = _shipped_lens(path) if is_shipped(path) and apertures == "auto" else _read_complete(path, apertures)
     if remarks is not None:
         remarks.extend(told)
     return lens
@@ -62,12 +65,14 @@ def _shipped_lens(path: Path) -> tuple[Lens, tuple[str, ...]]:
     return _read_complete(path)
 
 
-def _read_complete(path: Path) -> tuple[Lens, tuple[str, ...]]:
+def _read_complete(path: Path, apertures: Apertures = "auto") -> tuple[Lens, tuple[str, ...]]:
     """Read a lens file and fill in what it leaves out; also returns what there is to tell."""
     reading = read_lens(path)
+    if apertures != "auto" and not isinstance(reading, RawLens):
+        raise LensError(f"{path}: only the columns of a .lens table may be read as {apertures}; leave --apertures out")
     # what other programs wrote needs optics to be judged, so it is repaired here
     if isinstance(reading, RawLens):
-        reading = repair(reading)
+        reading = repair(reading, apertures)
     elif isinstance(reading, RawSequence):
         reading = lens_of_sequence(reading)
     lens, found = reading
