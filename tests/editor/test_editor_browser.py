@@ -304,6 +304,19 @@ def test_a_cell_of_another_lens_is_not_written(tab):
     tab.until("flarewright.state.lens.rows[0].radius === '30'")
 
 
+def test_what_is_told_of_a_written_cell_stays_in_sight(tab):
+    tab.tab("lens")
+    box = tab.page.locator("input[data-row='0'][data-column='semi_diameter']")
+    box.fill("500")
+    box.press("Enter")
+    # the hand is in the next row by now
+    note = tab.page.get_by_text("row 0, Semi: The rim lies beyond the sphere's equator")
+    note.wait_for()
+    assert tab.js("document.activeElement.dataset.row") == "1"
+    low = note.bounding_box()
+    assert low["y"] + low["height"] <= tab.page.viewport_size["height"]
+
+
 def test_a_broken_lens_keeps_the_last_good_picture(tab):
     tab.tab("lens")
     good = tab.shown()

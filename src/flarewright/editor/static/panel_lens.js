@@ -11,24 +11,28 @@ const COLUMNS = [
   ['semi_diameter', 'Semi', 'Half the clear diameter, mm: rims cut ghosts. In italics: estimated.'],
   ['coating', 'Coating', 'none, quarter-wave:550, film:1.38:96, early-multicoat… What is coated well makes faint ghosts.'],
 ];
-const WIDTHS = ['22px', '57px', '52px', '58px', '50px', '36px', '50px', ''];
+const WIDTHS = ['22px', '57px', '52px', '58px', '50px', '43px', '50px', ''];
 
 export function lensPanel(app) {
   const body = h('tbody');
   const head = h('tr', {}, h('th', {}, '#'), ...COLUMNS.map(([, words, tip]) => h('th', { scope: 'col', tip }, words)));
   const table = h('table', { class: 'rows', style: 'table-layout:fixed' }, h('colgroup', {}, ...WIDTHS.map((width) => h('col', { style: width ? `width:${width}` : '' }))), h('thead', {}, head), body);
   const wrong = h('div', { class: 'wrong', role: 'alert' });
-  const notes = h('div', { class: 'group quietly', style: 'min-height:40px' });
+  // in sight however long the table is
+  const notes = h('div', { class: 'group quietly', style: 'min-height:40px;position:sticky;bottom:0;background:var(--panel)' });
   const glasses = h('datalist', { id: 'glasses' });
   const facts = h('div', { class: 'facts' });
   const source = h('p', { class: 'quietly' });
   let refused = null;
+  // the row that was written last: what there is to say about it stays in sight when the hand has gone on to the next
+  let written = null;
   let drawn = '';
   const search = latest(async (words) => { glasses.replaceChildren(...(await get(`/api/glasses?q=${encodeURIComponent(words)}`)).glasses.map((name) => h('option', { value: name }))); });
 
   async function write(box, row, column, text, table) {
     refused = null;
     drawn = '';
+    written = { row, table };
     try { await app.deed_quiet('set_cell', { row, column, text }, table); wrong.textContent = ''; } catch (error) {
       app.take(await get('/api/state'));
       if (app.table() !== table) {
@@ -47,10 +51,11 @@ export function lensPanel(app) {
     wrong.textContent = refused.why;
   }
   function cell(line, column) {
-    const value = line[column] ?? '';
     const table = app.table();
     const note = line.notes[column];
     const guess = column === 'semi_diameter' && line.estimated;
+    // an estimate has no more digits than fit
+    const value = guess ? Number(line[column]).toFixed(2) : line[column] ?? '';
     const box = h('input', { type: 'text', value, tip: note, class: `${note ? 'note' : ''} ${guess ? 'guess' : ''}`, 'aria-label': `row ${line.row} ${column}`, 'data-row': line.row, 'data-column': column, spellcheck: 'false', list: column === 'glass' ? 'glasses' : null });
     if (refused && refused.row === line.row && refused.column === column) { box.value = refused.text; mark(box); }
     box.addEventListener('focus', () => { app.row = line.row; choose(); if (column === 'glass') search(box.value); box.select(); });
@@ -92,7 +97,9 @@ export function lensPanel(app) {
   function choose() {
     for (const line of body.children) line.classList.toggle('chosen', Number(line.dataset.line) === app.row);
     const line = app.state?.lens.rows.find((each) => each.row === app.row);
-    notes.replaceChildren(...Object.entries(line?.notes ?? {}).map(([column, words]) => h('div', {}, `${COLUMNS.find(([key]) => key === column)?.[1] ?? column}: ${words}`)));
+    const other = written && written.table === app.state?.lens.table && written.row !== app.row ? app.state.lens.rows[written.row] : null;
+    const told = (one, where) => Object.entries(one?.notes ?? {}).map(([column, words]) => h('div', {}, `${where}${COLUMNS.find(([key]) => key === column)?.[1] ?? column}: ${words}`));
+    notes.replaceChildren(...told(other, `row ${written?.row}, `), ...told(line, ''));
     for (const each of [add, copy, remove, stop]) each.disabled = !line;
     if (line) { copy.disabled = remove.disabled = stop.disabled = line.stop; }
   }
