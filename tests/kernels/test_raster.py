@@ -146,8 +146,8 @@ def test_a_line_outside_the_picture_is_lost_to_the_sensor():
 def test_rows_are_summed_from_their_differences():
     differences = np.random.default_rng(3).normal(size=(5, 700, 3)) * 1e-3
     pixels = np.empty(differences.shape, np.float32)
-    raster.summed_rows(differences, pixels)
+    raster.sum_rows(differences, pixels)
     expected = np.cumsum(differences, axis=1)
     np.testing.assert_array_equal(pixels, expected.astype(np.float32))
-    raster.sum_rows(differences)
+    raster.sum_rows(differences, differences)
     np.testing.assert_allclose(differences, expected, rtol=0.0, atol=1e-15)

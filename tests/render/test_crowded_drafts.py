@@ -51,7 +51,7 @@ def test_ghosts_are_weighed_as_they_are_drawn():
     for k, path in enumerate(paths):
         picture = np.zeros((270, 480, 3))
         ghosts_draft.draw_draft(shot, [path], picture)
-        sum_rows(picture)
+        sum_rows(picture, picture)
         drawn[k] = luminance_weights(shot.colorspace) @ picture.sum(axis=(0, 1))
     seen = ghosts_draft.weigh_drafts(shot, paths, ghosts_draft.draft_colors(shot, paths))
     # the middle wavelength stands for all, so what rim or picture cut by colour differs

@@ -58,7 +58,7 @@ ROOTS = {
         1.7,
     ),
     "path matrices": ("matrix.path_matrices", "i8[::1], i8[::1], f8[::1], f8[::1], f8[::1], f8, f8[:,:,::1]", 0.1),
-    "row sums": ("raster.summed_rows", "f8[:,:,::1], f4[:,:,::1]", 0.1),
+    "row sums": ("raster.sum_rows", "f8[:,:,::1], f4[:,:,::1]", 0.1),
     "mirrors": (
         "matrix.mirror_squares",
         "i8[::1], i8[::1], i8[::1], i8[::1], f8[::1], none, f8[::1], f8[::1], f8, f8, f8, f8, f8, f8, f8[:,::1]",

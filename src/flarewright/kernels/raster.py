@@ -214,31 +214,15 @@ def _mark_woven(flat, width, row, depth, xl0, xl1, xr0, xr1, density, rgb, light
 
 
 @compiled
-def sum_rows(differences):
-    """Turn a picture of differences into the picture, in place.
+def sum_rows(differences, pixels):
+    """Turn a picture of differences into the picture.
 
     Parameters
     ----------
     differences : ndarray, shape (H, W, 3), float64
         As `fill_polygon` leaves it when it marks.
-    """
-    for row in range(differences.shape[0]):
-        red, green, blue = 0.0, 0.0, 0.0
-        for c in range(differences.shape[1]):
-            red += differences[row, c, 0]
-            green += differences[row, c, 1]
-            blue += differences[row, c, 2]
-            differences[row, c, 0], differences[row, c, 1], differences[row, c, 2] = red, green, blue
-
-
-@compiled
-def summed_rows(differences, pixels):
-    """Fill a picture from its differences: what `sum_rows` does for one that nothing else is marked on.
-
-    Parameters
-    ----------
-    differences : ndarray, shape (H, W, 3), float64
-    pixels : ndarray, shape (H, W, 3), float32
+    pixels : ndarray, shape (H, W, 3), float32 or float64
+        Filled; may be the differences themselves.
     """
     for row in range(differences.shape[0]):
         red, green, blue = 0.0, 0.0, 0.0

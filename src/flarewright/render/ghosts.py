@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernels.raster import sum_rows, summed_rows
+from ..kernels.raster import sum_rows
 from ..model import Layer, Quality
 from ..optics.color import luminance_weights
 from ..optics.paths import LightPath
@@ -273,7 +273,6 @@ def _draft(
     def draw(group: list[int]) -> list[Plane | None]:
         width, height = shots[0].size_px
         sheets: list[NDArray[np.float64] | None] = [None] * DETAILS
-        planes: list[Plane | None]
         sheets[0] = picture = np.zeros((height, width, 3))
         mine = sorted(k for k in group if k in place)
         ghosts, places = [paths[k] for k in mine], [place[k] for k in mine]
@@ -296,7 +295,7 @@ def _draft(
             for path, changed in by_hand:
                 if changed.framed and not changed.alone:
                     draw_draft_by_hand(shot, path, changed, picture)
-        planes = [None if sheet is None else _summed(sheet) for sheet in sheets]
+        planes: list[Plane | None] = [None if sheet is None else _summed(sheet) for sheet in sheets]
         # blurring is linear, so ghosts of one blur are blurred together
         alike: dict[object, list[tuple[Shot, LightPath, PathArt]]] = {}
         for number, (shot, (path, changed)) in enumerate(product(points, by_hand)):
@@ -344,7 +343,7 @@ def _add_spread_drafts(
 
 def _summed(sheet: NDArray[np.float64]) -> NDArray[np.float32]:
     pixels = np.empty(sheet.shape, dtype=np.float32)
-    summed_rows(sheet, pixels)
+    sum_rows(sheet, pixels)
     return pixels
 
 
@@ -362,7 +361,7 @@ def _rank_draft(shots: Sequence[Shot], paths: Sequence[LightPath], art: Mapping[
             picture = np.zeros((shot.size_px[1], shot.size_px[0], 3))
             # a ramp and a blur hardly change the order
             draw_draft_by_hand(shot, path, art.get(path.name, PLAIN), picture)
-            sum_rows(picture)
+            sum_rows(picture, picture)
             flux[k] += luminance_weights(shot.colorspace) @ picture.sum(axis=(0, 1))
     return [int(k) for k in np.argsort(-flux, kind="stable")]
 

@@ -245,7 +245,7 @@ def draft_alone(
     for (lit, path), each, placed in zip(ghosts, art, places, strict=True):
         moved = replace(lit, to_pixels=placed + np.array([mx, my, 0.0, 0.0]))
         draw_draft(moved, [path], sheet, draft_colors(lit, [path]) * each.rgb)
-    sum_rows(sheet)
+    sum_rows(sheet, sheet)
     if kernel is not None:
         sheet = spread_within(sheet, kernel)
     planes: list[Plane | None] = [None] * DETAILS
@@ -287,8 +287,8 @@ def mark_spread(
 
 def spread_light(sheet: Floats) -> Floats:
     """Turn a sheet that `mark_spread` marked into flux per pixel, in place."""
-    sum_rows(sheet)
-    sum_rows(sheet)
+    sum_rows(sheet, sheet)
+    sum_rows(sheet, sheet)
     # what the sums' rounding leaves is no light
     sheet[np.abs(sheet) < ROUNDING * np.abs(sheet).max()] = 0.0
     return sheet
