@@ -121,6 +121,8 @@ def test_drafts_do_not_jump_in_brightness(tab):
     # what is said of the light is the hand's, not the project's
     numbers = tab.js("flarewright.view.mover.lights[0]")
     assert numbers != tab.state()["lights"][0]["field_deg"]
+    # also where the panel is drawn anew meanwhile, as when the table of ghosts comes
+    tab.js("flarewright.refreshPanel()")
     assert tab.js("document.querySelector('#panel input').value") == f"{numbers[0]:.2f}"
     # and goes on with drafts
     mouse.move(first[0] - 60, first[1] + 26)

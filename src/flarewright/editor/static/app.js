@@ -52,16 +52,19 @@ export const reload = latest(async () => take(await get('/api/state')));
 function update() {
   const state = app.state;
   for (const part of parts) part.update?.(state);
-  panels[app.tab].update?.(state);
-  // a hand may hold its light elsewhere
-  const { live, lights } = app.view.mover;
-  if (live && lights) writeLights(lights);
+  app.refreshPanel();
   $('problem').hidden = !state.picture.problem;
   $('problem').textContent = state.picture.problem ? `${sentence(state.picture.problem)} The last good picture is shown.` : '';
   document.title = `${state.clean ? '' : '• '}${fileName(state)} – Flarewright`;
   status();
   app.view.redraw();
 }
+app.refreshPanel = () => {
+  panels[app.tab].update?.(app.state);
+  // a hand may hold its light elsewhere than the project does
+  const { live, lights } = app.view.mover;
+  if (live && lights) writeLights(lights);
+};
 const fileName = (state) => (state.file ? state.file.split(/[\\/]/).pop() : state.lens.name);
 
 // In the order in which they were asked for, so that the last word of a hand is the last.
@@ -104,7 +107,7 @@ app.choose = (name, walking = false) => {
   if (!walking && !name) { app.view.stack = []; app.view.spot = null; }
   app.view.refreshOutline();
   drawSection();
-  panels[app.tab].update?.(app.state);
+  app.refreshPanel();
   app.hint();
 };
 app.chooseWish = (number) => {
@@ -112,11 +115,11 @@ app.chooseWish = (number) => {
   app.view.outline = null;
   app.view.forget();
   drawSection();
-  panels[app.tab].update?.(app.state);
+  app.refreshPanel();
   app.hint();
   app.view.redraw();
 };
-app.chooseLight = (k) => { if (app.light !== k) { app.light = k; panels[app.tab].update?.(app.state); } };
+app.chooseLight = (k) => { if (app.light !== k) { app.light = k; app.refreshPanel(); } };
 function writeLights(lights) {
   if (app.tab === 'light') panels.light.moved?.(lights[app.light]);
 }
@@ -142,7 +145,7 @@ app.places = latest(async () => {
 const loadGhosts = latest(async () => {
   app.ghosts = await get('/api/ghosts');
   if (!app.state) return;
-  panels[app.tab].update?.(app.state);
+  app.refreshPanel();
   if (app.ghost) app.view.refreshOutline();
 });
 
@@ -348,7 +351,7 @@ app.open = (tab) => {
   app.view.annotate = tab === 'target';
   if (tab !== 'target') app.view.compare = 'physical';
   panels[tab].shown?.();
-  if (app.state) { panels[tab].update?.(app.state); app.places(); }
+  if (app.state) { app.refreshPanel(); app.places(); }
   $('page').scrollTop = scrolled[tab] ?? 0;
   app.view.redraw();
 };
