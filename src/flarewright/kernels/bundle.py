@@ -26,6 +26,8 @@ SLIVER = 1e-4
 # the bit of all the edges that have none of their own (`_place_nodes`)
 SHARED_BIT = 61
 SHARED = np.int64(1 << SHARED_BIT)
+# smaller cells and triangles, in square pixels, are even: a slope would be asked for at centres of pixels far outside
+EVEN_CELL, EVEN_TRIANGLE = 0.5, 1.0
 # a cell whose density departs from a plane by more than this part is drawn triangle by triangle
 ROUGH = 5e-3
 # a cell whose flux departs by more than this part from what its nodes' densities make is drawn with each triangle's own
@@ -289,7 +291,7 @@ def _plane_over_cell(spots, densities, triangles, start, end, mean, unit, drawn)
     -----
     Least squares over the border's nodes and the middle; as in `_plane_through`, scaled to the cell's mean.
     """
-    if drawn < 0.5:
+    if drawn < EVEN_CELL:
         return True, mean, 0.0, 0.0, mean, mean
     centre = triangles[start, 0]
     cx, cy, average = spots[centre, 0], spots[centre, 1], densities[centre]
@@ -370,7 +372,7 @@ def _plane_through(corner, mean, unit, drawn):
     average = (corner[0, 2] + corner[1, 2] + corner[2, 2]) / 3.0
     ratio = mean / average if average > 0.0 else 0.0
     # where neighbours differ wildly (a fold) or nothing can be seen of a slope, flat is the honest choice
-    if drawn < 0.5 or not 0.5 * unit < ratio < 2.0 * unit:
+    if drawn < EVEN_TRIANGLE or not 0.5 * unit < ratio < 2.0 * unit:
         return mean, 0.0, 0.0, mean, mean
     x1, y1 = corner[1, 0] - corner[0, 0], corner[1, 1] - corner[0, 1]
     x2, y2 = corner[2, 0] - corner[0, 0], corner[2, 1] - corner[0, 1]

@@ -10,6 +10,8 @@ from .trace import ALIVE, REL, STOP_X, WEIGHT, X, Y, trace_lanes
 UNKNOWN, LEAF, SPLIT, EMPTY, FLAT = 0, 1, 2, 3, 4
 # away from the rim positions may err by this part of the cell: twice that in area, which shows as triangles
 INNER_BEND = 0.005
+# light runs evenly from node to node: cells where coatings or slopes bend it by more than this part are halved
+BENT_WEIGHT = 0.002
 # cells in fringes are no larger than this many pixels: of a small one most often one edge tells the pattern
 FRINGE_CELL = 128.0
 # cells whose rays all end, but not at one surface, are halved so often
@@ -76,8 +78,8 @@ def _judge(
         if extent > 5.0:
             ratio = max(abs(area_low), abs(area_high)) / max(min(abs(area_low), abs(area_high)), 1e-300)
             error = max(error, 4.0 * (ratio - 1.0))
-    if extent > 5.0 or level <= rim_level:
-        error = max(error, _bend(data, nodes, np.int64(WEIGHT)) / (0.005 * abs(data[nodes[4], WEIGHT]) + 1e-300))
+    # flux, again, whatever the size
+    error = max(error, _bend(data, nodes, np.int64(WEIGHT)) / (BENT_WEIGHT * abs(data[nodes[4], WEIGHT]) + 1e-300))
     if error > 4.0:
         return SPLIT
     return LEAF if error > 1.0 else FLAT

@@ -30,7 +30,7 @@ Mirror = int | Literal["sensor"]
 RESOLUTION = 100.0
 PEAK_GRID = 256
 # largest part of a ghost's flux, first and second moment that interpolation may get wrong
-MOMENT_ERROR = 5e-3
+MOMENT_ERROR = 2e-3
 # triangles integrated ray by ray: rays at most, how often they are halved, and the change that asks for more
 MOST_RAYS = 300_000
 LEAST_HALVINGS, MOST_HALVINGS = 2, 10

@@ -26,6 +26,7 @@ from ..optics.bundle import Bundle, trace_bundle, trace_grid
 from ..optics.grating import GratingOrder, grating_orders
 from ..optics.paths import LightPath
 from ..optics.region import Region, find_region, grown, measure_region
+from ..optics.tears import mended
 from .art import PLAIN, Frame, PathArt
 from .canvas import DETAIL_CONTRAST, DETAILS, Canvas, Plane, blank, merge
 from .few_colors import gathered_weights
@@ -288,15 +289,16 @@ def draw_final(
         if not rgb.any():
             continue
         data = traced[w] if part == 0.0 else _between(traced[w], traced[w + 1], part)
-        densities = node_densities(data, bundle.pupil, bundle.triangles)
+        whole, data = mended(bundle, data)
+        densities = node_densities(data, whole.pupil, whole.triangles)
         plane = canvas.plane(detail)
         for place, share in _places(item, to_pixels, w, part):
             if patterns is not None:
-                patterns.draw(k, bundle, data, densities, shot.incidence.axes, place, shot.gain, rgb * share, plane)
+                patterns.draw(k, whole, data, densities, shot.incidence.axes, place, shot.gain, rgb * share, plane)
             else:
                 draw_bundle(
-                    data, bundle.pupil, bundle.triangles, densities, path.stop_crossings, opening.blades,
-                    opening.levels, shot.incidence.axes, place, shot.gain, rgb * share, plane, bundle.halves,
+                    data, whole.pupil, whole.triangles, densities, path.stop_crossings, opening.blades,
+                    opening.levels, shot.incidence.axes, place, shot.gain, rgb * share, plane, whole.halves,
                 )  # fmt: skip
 
 
@@ -325,11 +327,11 @@ def _drawn_in_few(
     if weights is None:
         return False
     for w, rgb in weights.items():
-        data = trace_bundle(shot.packed, w, bundle, shot.incidence.tilt)
+        whole, data = mended(bundle, trace_bundle(shot.packed, w, bundle, shot.incidence.tilt))
         draw_bundle(
-            data, bundle.pupil, bundle.triangles, node_densities(data, bundle.pupil, bundle.triangles),
+            data, whole.pupil, whole.triangles, node_densities(data, whole.pupil, whole.triangles),
             path.stop_crossings, opening.blades, opening.levels, shot.incidence.axes, to_pixels, shot.gain,
-            rgb, plane, bundle.halves,
+            rgb, plane, whole.halves,
         )  # fmt: skip
     return True
 

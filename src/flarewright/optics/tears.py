@@ -1,0 +1,92 @@
+"""What passes of a bundle's triangles in which some rays end: miss a surface, or are totally reflected."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..kernels.trace import ALIVE, WEIGHT
+from .bundle import Bundle
+
+Floats = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+# of a cell's squared size: what passes lies on a line where its rays span less
+_LINE = 1e-6
+
+
+def mended(bundle: Bundle, data: Floats) -> tuple[Bundle, Floats]:
+    """Cut torn triangles halfway between the rays that pass and those that end, instead of leaving them dark.
+
+    Parameters
+    ----------
+    bundle : Bundle
+    data : ndarray, shape (N, 5 + 2 C)
+        Its nodes as traced at one wavelength.
+
+    Returns
+    -------
+    bundle : Bundle
+        With the parts of torn triangles beside all others, at this wavelength alone; it holds no traced nodes.
+    data : ndarray, shape (M, 5 + 2 C)
+        Of all its nodes. What rays on the cuts carry goes on from their neighbours as it runs in the cell.
+
+    Notes
+    -----
+    Where rays end has no smooth measure, as the rims have, by which a cut could be placed. Along a border that runs
+    across cells anyhow, cuts at the middles of edges leave as much too much as too little.
+    """
+    alive = data[:, ALIVE] > 0.0
+    if alive.all():
+        return bundle, data
+    passing = alive[bundle.triangles]
+    count = passing.sum(axis=1)
+    torn = np.flatnonzero((count > 0) & (count < 3))
+    if not len(torn):
+        return bundle, data
+    slopes = _slopes(bundle, data, alive, torn)
+    # turned until the first ray passes and the last one ends
+    turn = np.argmax(passing[torn] & ~np.roll(passing[torn], 1, axis=1), axis=1)
+    a, b, c = (bundle.triangles[torn, (turn + k) % 3] for k in range(3))
+    two = count[torn] == 2
+    ends, begins = np.concatenate([np.where(two, c, b), c]), np.concatenate([np.where(two, b, a), a])
+    step = 0.5 * (bundle.pupil[ends] - bundle.pupil[begins])
+    more = data[begins] + np.einsum("nk,nkm->nm", step, np.concatenate([slopes, slopes]))
+    more[:, WEIGHT] = np.maximum(more[:, WEIGHT], 0.0)
+    more[:, ALIVE] = 1.0
+    first = len(data) + np.arange(len(torn))
+    parts = [np.stack([a, first, first + len(torn)], axis=1), np.stack([a, b, first], axis=1)[two]]
+    whole = replace(
+        bundle, pupil=np.concatenate([bundle.pupil, bundle.pupil[begins] + step]),
+        triangles=np.concatenate([bundle.triangles, *parts]), traced={},
+    )  # fmt: skip
+    return whole, np.concatenate([data, more])
+
+
+def _slopes(bundle: Bundle, data: Floats, alive: NDArray[np.bool_], torn: Indices) -> Floats:
+    """Fit planes to what rays carry that pass, in the cells of torn triangles: (len(torn), 2, 5 + 2 C).
+
+    The triangles of a cell follow each other and share its middle; flat where the rays that pass lie on a line.
+    """
+    middles = bundle.triangles[:, 0]
+    cell = np.cumsum(np.append(0, middles[1:] != middles[:-1]))
+    cells, own = np.unique(cell[torn], return_inverse=True)
+    begins = np.searchsorted(cell, cells)
+    sizes = np.searchsorted(cell, cells, side="right") - begins
+    # each middle, then its border
+    starts = np.append(0, np.cumsum(sizes + 1)[:-1])
+    of = np.repeat(np.arange(len(cells)), sizes + 1)
+    rank = np.arange(len(of)) - starts[of]
+    fan = begins[of] + np.maximum(rank - 1, 0)
+    nodes = np.where(rank == 0, middles[fan], bundle.triangles[fan, 1])
+    passes = alive[nodes][:, None]
+    at = np.where(passes, bundle.pupil[nodes] - bundle.pupil[middles[fan]], 0.0)
+    at = np.where(passes, at - (np.add.reduceat(at, starts) / np.add.reduceat(passes, starts, dtype=float))[of], 0.0)
+    spp, spq, sqq = np.add.reduceat(np.stack([at[:, 0] ** 2, at[:, 0] * at[:, 1], at[:, 1] ** 2], axis=1), starts).T
+    determinant = spp * sqq - spq**2
+    line = determinant <= _LINE * (spp + sqq) ** 2
+    inverse = np.array([[sqq, -spq], [-spq, spp]]) / np.where(line, np.inf, determinant)
+    sums = np.add.reduceat(at[:, :, None] * np.where(passes, data[nodes], 0.0)[:, None, :], starts)
+    return np.asarray(np.einsum("ijn,njm->nim", inverse, sums)[own])
