@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from ..errors import naming
 from .common import print_json, refused_as_json
 
 
@@ -18,7 +19,7 @@ def check(
     from ..io.scene_file import read_scene
     from ..predict.tracks import camera_track, moments, sightings
 
-    with refused_as_json(file, as_json):
+    with refused_as_json(file, as_json), naming(file):
         scene = read_scene(file)
         times, dates = moments(scene)
         tracks = [camera_track(one, times, f"cameras[{c}] ({one.name})") for c, one in enumerate(scene.cameras)]
