@@ -67,7 +67,7 @@ def test_light_beyond_the_numbers_of_a_picture_is_refused(capsys, folder):
         '[quality]\nmode = "draft"\n[starburst]\nintensity = 1e9\n[art.gain]\nstarburst = 1e9\n'
     )
     assert run(["render", "--project", "shot.toml", "-o", "a.exr"]) == 2
-    out, err = capsys.readouterr()
+    err = capsys.readouterr().err
     assert "the light of the layer beauty is beyond the numbers that a picture holds" in err
     assert "Warning" not in err
     assert [path.name for path in folder.iterdir()] == ["shot.toml"]

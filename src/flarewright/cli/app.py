@@ -45,6 +45,7 @@ from . import (
     scene_init,
     scene_schema,
 )
+from .option_words import name_values
 
 # of a file's mistakes so many are listed
 _TOLD = 20
@@ -107,6 +108,7 @@ measure_app.command("compress", epilog=measure_stages.COMPRESS_EPILOG)(measure_s
 measure_app.command("explain", epilog=measure_explain.EPILOG)(measure_explain.explain)
 measure_app.command("report", epilog=measure_report.EPILOG)(measure_report.report)
 measure_app.command("replay", epilog=measure_replay.EPILOG)(measure_replay.replay)
+name_values(app)
 
 
 def _version(wanted: bool) -> None:
@@ -118,7 +120,7 @@ def _version(wanted: bool) -> None:
 @app.callback()
 def _root(
     version: Annotated[
-        bool, typer.Option("--version", callback=_version, is_eager=True, help="Tell it and end.")
+        bool, typer.Option("--version", metavar="", callback=_version, is_eager=True, help="Tell it and end.")
     ] = False,
 ) -> None:
     del version  # The callback has told it.
