@@ -109,6 +109,14 @@ def test_a_file_of_another_kind_is_told_its_own_command(capsys, folder, command,
     assert f"flarewright {given} check file.toml" in told
 
 
+def test_a_scene_of_one_camera_has_one_camera(capsys, folder):
+    (folder / "scene.toml").write_text(
+        KINDS["scene"] + '[[lights]]\nname = "b"\nposition_m = [0, 9, 0]\nintensity_cd = 1.0\n'
+    )
+    assert run(["scene", "check", "scene.toml"]) == 0
+    assert capsys.readouterr().out == "scene.toml: usable, 1 camera, 1 light, 1 time\n"
+
+
 def test_a_foreign_lens_file_is_told_its_own_command(capsys, folder):
     (folder / "old.lens").write_text("# Tessar\n")
     assert "flarewright lens check old.lens" in refused(capsys, ["project", "check", "old.lens"])

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
+import pytest
 from typer.main import get_command
 
-from flarewright.cli.app import app
+from flarewright.cli.app import app, run
 
 
 def options(command: Any, name: str = "flarewright") -> dict[str, Any]:
@@ -28,3 +29,23 @@ def test_every_option_says_what_it_takes():
     assert found["flarewright render --light"].metavar == "X,Y"
     # a switch takes nothing
     assert {found[f"flarewright {name}"].metavar for name in ("render --half", "ghosts --json", "--version")} == {""}
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ("render heliar-tronnier --light 1,1 -o a.exr --fstop fast", "number"),
+        ("render heliar-tronnier --light 1,1 -o a.exr --blades 5.5", "whole number"),
+        ("render heliar-tronnier --light 1,1 -o a.exr --intensity 2024-06-21", "number"),
+        ("render heliar-tronnier --light 1,1 -o a.exr --threads 0", ""),
+        ("ghosts heliar-tronnier --light 1,1 --wavelength-nm red", "number"),
+    ],
+)
+def test_a_value_of_another_kind_is_told_in_words(capsys, words, said):
+    assert run(words.split()) == 2
+    err = capsys.readouterr().err
+    assert f"invalid value for '{words.split()[-2]}': " in err
+    assert words.split()[-1] in err
+    assert said in err
+    for python in ("Input should", "valid integer", "valid number", "float", "parse string"):
+        assert python not in err

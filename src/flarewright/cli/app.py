@@ -47,6 +47,8 @@ from . import (
 )
 from .option_words import name_values
 
+# what older releases of Typer say of a value
+_TYPES = {"is not a valid float": "is no number", "is not a valid integer": "is no whole number"}
 # of a file's mistakes so many are listed
 _TOLD = 20
 
@@ -209,6 +211,14 @@ def _call(words: list[str]) -> int:
 def _usage(error: Any) -> str:
     message = " ".join(str(error.format_message()).split()).rstrip(".")
     message = message[:1].lower() + message[1:]
+    cause = error.__cause__
+    if hasattr(cause, "errors"):
+        # newer releases of Typer check values as records of files are checked
+        from ..io.sentences import validation_sentences
+
+        message = f"{message.partition(': ')[0]}: {validation_sentences(cause)[0]}"
+    for theirs, ours in _TYPES.items():
+        message = message.replace(theirs, ours)
     context = getattr(error, "ctx", None)
     return f"{message}; see {context.command_path if context else 'flarewright'} --help"
 

@@ -25,7 +25,10 @@ def refuse_other_kind(path: str | Path, table: dict[str, Any], wanted: Kind) -> 
     """
     kind = kind_of(table)
     if kind is not None and kind != wanted:
-        raise ValueError(f"{path} is a {kind} file, not a {wanted} file: check it with flarewright {kind} check {path}")
+        use = f", render it with flarewright render --project {path}" if kind == "project" else ""
+        raise ValueError(
+            f"{path} is a {kind} file, not a {wanted} file: check it with flarewright {kind} check {path}{use}"
+        )
 
 
 def refuse_lens_suffix(path: str | Path, wanted: Kind) -> None:
