@@ -8,10 +8,11 @@ from datetime import date, time
 from typing import Any, cast
 
 from pydantic import BaseModel, ValidationError
-from pydantic_core import ErrorDetails
 
 Keys = list[int | str]
 """A place in a file as it is written there: ["lights", 0, "field_deg"]."""
+Finding = dict[str, Any]
+"""What refused a value: its type, loc, msg, input and ctx."""
 
 _NUMBER, _WHOLE, _TEXT, _LIST, _TABLE = "a number", "a whole number", "a text in quotes", "a list", "a table"
 _TIME = "a date with a time and its zone, like 2024-06-21T18:00:00+02:00"
@@ -64,7 +65,7 @@ def validation_sentences(
     """
     # by place what would do there: of a field of several kinds each kind refuses by itself
     found: dict[tuple[str, str], list[str]] = {}
-    for finding in error.errors(include_url=False):
+    for finding in cast(list[Finding], error.errors(include_url=False)):
         if finding["type"] == "too_short" and finding.get("ctx", {}).get("actual_length") != len(finding["input"]):
             continue  # Its items were refused one by one, which is told already.
         keys = list(finding["loc"]) if data is None else _written_keys(finding["loc"], data, finding["type"])
@@ -86,7 +87,7 @@ def validation_sentences(
     ]
 
 
-def _wanted(finding: ErrorDetails, keys: Keys) -> str:
+def _wanted(finding: Finding, keys: Keys) -> str:
     """Say what would do in place of what was given."""
     kind, about = finding["type"], finding.get("ctx", {})
     if kind in _BOUNDS:
@@ -114,7 +115,7 @@ def _tag(about: dict[str, Any]) -> str:
     return str(about["discriminator"]).strip("'")
 
 
-def _given(finding: ErrorDetails) -> str:
+def _given(finding: Finding) -> str:
     """Say what was given, where its kind or its value tells something."""
     value = finding["input"]
     match finding["type"]:
