@@ -6,7 +6,11 @@ The command line prints it and ends with exit code 2; a library user catches `Fl
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib import import_module
+from os import PathLike
+from pathlib import Path
 from typing import Any
 
 
@@ -40,6 +44,23 @@ class ProjectError(FlarewrightError):
 
 class OutputError(FlarewrightError):
     """A file that could not be written; nothing was left half-written."""
+
+
+@contextmanager
+def naming(file: str | PathLike[str]) -> Iterator[None]:
+    """Let whatever is refused within name the file that it comes from.
+
+    Parameters
+    ----------
+    file : path
+        Begins the message of an error that does not name it already.
+    """
+    try:
+        yield
+    except FlarewrightError as error:
+        if Path(file).name in str(error):
+            raise
+        raise type(error)(f"{file}: {error}", error.problems) from None
 
 
 def optional(

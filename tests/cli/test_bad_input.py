@@ -425,7 +425,7 @@ COMMAND_LINES = {
     "a light to draw nowhere": (["lens", "show", "heliar-tronnier", "--light", "4,1"], "add --plot OUT.svg"),
     "convert to another kind": (["lens", "convert", "lens.toml", "a.lens"], "*.toml"),
     "init over a file": (["project", "init", "heliar-tronnier", "-o", "lens.toml"], "exists already"),
-    "check a project that is a lens": (["project", "check", "lens.toml"], "is not a known key"),
+    "check a project that is a lens": (["project", "check", "lens.toml"], "is a lens file, not a project file"),
 }  # fmt: skip
 
 
@@ -516,7 +516,7 @@ def test_what_a_render_would_refuse_is_told_together(capsys, folder):
 
 @pytest.mark.parametrize("kind", ["project", "scene"])
 def test_why_a_file_is_refused_is_one_json_object_too(capsys, folder, kind):
-    (folder / "bad.toml").write_text("lens = 5\ncolour = 1\n")
+    (folder / "bad.toml").write_text("colour = 1\n")
     out = json.loads(refuse(capsys, folder, [kind, "check", "bad.toml", "--json"], "colour"))
     assert (out["file"], out["usable"]) == ("bad.toml", False)
     assert any("colour" in problem for problem in out["problems"])

@@ -379,6 +379,7 @@ def test_lens_show_json_has_every_row(capsys):
 def test_lens_show_names_the_ghost_it_draws(capsys, folder, ghost):
     said = call(capsys, "lens", "show", "heliar-tronnier", "--plot", "a.svg", "--light", "0,3", *ghost)
     assert "no ray" not in said.err
+    assert "wrote a.svg" in said.err
     assert all(f"ghost {name}, light" in (folder / "a.svg").read_text("utf-8") for name in ghost[1:])
 
 

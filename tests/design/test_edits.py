@@ -64,9 +64,15 @@ def test_the_stop_moves_and_keeps_its_size():
         (["resize", "heliar-tronnier", "-o", "a.toml", "--all", "x", "--height", "2"], "stop or entrance"),
         (["resize", "heliar-tronnier", "-o", "a.toml", "--all", "entrance", "--height", "9"], "wider than that"),
         (["resize", "heliar-tronnier", "-o", "a.toml", "--all", "stop", "--height", "0.001"], "f-numbers go from"),
-        (["move-stop", "heliar-tronnier", "-o", "a.toml", "--row", "5"], "cannot become the stop"),
+        (
+            ["move-stop", "heliar-tronnier", "-o", "a.toml", "--row", "5"],
+            "row 5 cannot become the stop, for it is the stop already",
+        ),
         (["move-stop", "heliar-tronnier", "-o", "a.toml", "--row", "1"], "glass is in front"),
-        (["move-stop", "heliar-tronnier", "-o", "a.toml", "--row", "99"], "cannot become the stop"),
+        (
+            ["move-stop", "heliar-tronnier", "-o", "a.toml", "--row", "99"],
+            "row 99 cannot become the stop: choose a surface between 0 and",
+        ),
         (["move-stop", "nikon-28-75", "-o", "a.toml", "--row", "24"], "f-numbers go from 0.3 to 256"),
         (
             ["resize", "heliar-tronnier", "-o", "a.toml", "--ghost", "8-6", "--height", "0.2", "--fstop", "200"],

@@ -210,6 +210,28 @@ def test_a_name_cut_short_is_completed(tmp_path):
     assert lens.source.startswith("patent US002453260")
 
 
+@pytest.mark.parametrize(
+    ("file", "said"),
+    [
+        ("Some_100mm_F1.9.lens", "f/1.9"),
+        ("some triplet f1.9.lens", "f/1.9"),
+        ("some-f-1,9_late.lens", "f/1.9"),
+        ("Some_(Maker's_f1.9).lens", "f/1.9"),
+        ("Some_100mm_F2.8D.lens", None),
+        ("Some_f100mm.lens", None),
+        ("Some_f35mm.lens", None),
+        ("Some_AF1.9.lens", None),
+        ("Some_F2.7_(Maker's_f1.9).lens", None),
+    ],
+)
+def test_another_f_number_in_the_files_name_is_told(tmp_path, file, said):
+    (tmp_path / file).write_text(TRIPLET)
+    lens, remarks = repair(read_dotlens(tmp_path / file))
+    assert lens.f_number == 2.7
+    told = [remark for remark in remarks if "the file name says" in remark]
+    assert told == ([] if said is None else [f"the file name says {said}, the header f/2.7; the header holds"])
+
+
 def test_honest_coating_marks_become_quarter_waves(tmp_path):
     text = TRIPLET.replace("   0\n", "   1\n")
     lens, remarks = repair(read_dotlens(small(tmp_path, text)))

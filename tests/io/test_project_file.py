@@ -211,7 +211,7 @@ def test_every_mistake_is_told_at_once_where_it_is(tmp_path):
         "flare is not a known key; known are schema_version, lens",
         "coating: coating 'quarter-wave:x' is not understood",
         "camera.size is not a known key; did you mean 'size_px'?",
-        "camera.size_px[0] should be a valid integer",
+        "camera.size_px[0] should be a whole number",
         "camera.blades is not a known key here; it belongs into [iris]",
         "quality.mode should be 'draft', 'final' or 'reference', not 'best'",
         "lights[0].spectrum.temperature_k is missing",

@@ -182,6 +182,16 @@ def test_idle_planes_are_left_out(tmp_path):
     assert any(remark.startswith("surfaces 1, 4, 6: the same medium on both sides") for remark in remarks)
 
 
+def test_an_idle_coordinate_break_in_glass_divides_no_glass(tmp_path):
+    broken = text_of(
+        surface(1, 0.02, 3.0, "N-BK7 0 0 1.5 40"), surface(2, 0.0, 2.0, kind="COORDBRK", more=["PARM 3 0", "PARM 6 1"]),
+        surface(3, 0.0, 3.0), surface(4, 0.0, 85.0, more=["STOP"]), surface(5),
+    )  # fmt: skip
+    lens, remarks = loaded(write(tmp_path, broken))
+    assert [row.thickness for row in lens.rows] == [5.0, 3.0, 85.0]
+    assert any(remark.startswith("surface 2: the same medium on both sides") for remark in remarks)
+
+
 REFUSED = [
     ("mirror", surface(1, 0.01, 5.0, "MIRROR 0 0 1.5 40"), "surface 1 is a mirror"),
     ("tilt", surface(1, 0.0, 0.0, kind="COORDBRK", more=["PARM 3 -3.5"]), r"surface 1 tilts or shifts what follows"),

@@ -45,7 +45,10 @@ from . import (
     scene_init,
     scene_schema,
 )
+from .option_words import name_values
 
+# what older releases of Typer say of a value
+_TYPES = {"is not a valid float": "is no number", "is not a valid integer": "is no whole number"}
 # of a file's mistakes so many are listed
 _TOLD = 20
 
@@ -107,6 +110,7 @@ measure_app.command("compress", epilog=measure_stages.COMPRESS_EPILOG)(measure_s
 measure_app.command("explain", epilog=measure_explain.EPILOG)(measure_explain.explain)
 measure_app.command("report", epilog=measure_report.EPILOG)(measure_report.report)
 measure_app.command("replay", epilog=measure_replay.EPILOG)(measure_replay.replay)
+name_values(app)
 
 
 def _version(wanted: bool) -> None:
@@ -118,7 +122,7 @@ def _version(wanted: bool) -> None:
 @app.callback()
 def _root(
     version: Annotated[
-        bool, typer.Option("--version", callback=_version, is_eager=True, help="Tell it and end.")
+        bool, typer.Option("--version", metavar="", callback=_version, is_eager=True, help="Tell it and end.")
     ] = False,
 ) -> None:
     del version  # The callback has told it.
@@ -207,6 +211,14 @@ def _call(words: list[str]) -> int:
 def _usage(error: Any) -> str:
     message = " ".join(str(error.format_message()).split()).rstrip(".")
     message = message[:1].lower() + message[1:]
+    cause = error.__cause__
+    if hasattr(cause, "errors"):
+        # newer releases of Typer check values as records of files are checked
+        from ..io.sentences import validation_sentences
+
+        message = f"{message.partition(': ')[0]}: {validation_sentences(cause)[0]}"
+    for theirs, ours in _TYPES.items():
+        message = message.replace(theirs, ours)
     context = getattr(error, "ctx", None)
     return f"{message}; see {context.command_path if context else 'flarewright'} --help"
 

@@ -182,6 +182,8 @@ def _found(
 def _print(
     folder: Path, problem: Problem, found: tuple[Outcome, ...], verdict: str, conflict: tuple[Breach, ...]
 ) -> None:
+    from ..io.sentences import count
+
     words = {"met": "the wanted ghosts are met", "nearly": "the wanted ghosts are nearly met",
              "impossible": "no lens can do that, as told above; the nearest are written",
              "contradictory": "the hard limits contradict each other: the nearest lens of any ghosts breaks "
@@ -192,7 +194,7 @@ def _print(
             f"no lens was found that keeps {', '.join(problem.bounds.hard)}, though there are some with other ghosts; "
             "search longer, or widen the bounds; the nearest are written"
         )
-    print(f"{words[verdict]}: {len(found)} lenses in {folder}, report in {folder / 'report.html'}")
+    print(f"{words[verdict]}: {count(len(found), 'lens', 'lenses')} in {folder}, report in {folder / 'report.html'}")
     for number, one in enumerate(found, 1):
         if one.breaks:
             print(f"lens-{number} breaks {', '.join(f'{each.name} by {each.amount:.2g}' for each in one.breaks)}")

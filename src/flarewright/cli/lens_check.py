@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from ..errors import FlarewrightError
+from ..errors import FlarewrightError, naming
 from .common import APERTURES_HELP, aperture_reading, print_json, refusal
 
 EPILOG = "Example:\n\nflarewright lens check my-lenses/*.lens"
@@ -30,7 +30,8 @@ def check(
             lens = load_lens(file, remarks=remarks, apertures=reading)
             order = first_order(lens)
             if lens.iris.mask is not None:
-                read_mask(lens.iris.mask)
+                with naming(file):
+                    read_mask(lens.iris.mask)
         except FlarewrightError as error:
             results.append(refusal(file, error))
             continue

@@ -66,6 +66,7 @@ def show(
         print_json({**data, "remarks": remarks})
     else:
         _print(data)
+        tell([] if plot is None else [f"wrote {plot}"])
 
 
 def _mirrors(text: str) -> tuple[int | None, int]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ..errors import FlarewrightError
+from ..errors import FlarewrightError, naming
 from .common import print_json, refused_as_json, tell
 
 if TYPE_CHECKING:
@@ -22,7 +22,7 @@ def check(
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
     """Check a project and its lens, and tell every mistake at once; exit code 2 when it cannot be rendered."""
-    with refused_as_json(file, as_json):
+    with refused_as_json(file, as_json), naming(file):
         settled = _settled(file)
     if as_json:
         print_json(

@@ -318,9 +318,10 @@ def render(
         bool, typer.Option("--no-starburst", help="Leave out the light's direct image.", rich_help_panel=_OUT)
     ] = False,
     colorspace: Annotated[str | None, typer.Option(help="rec709 or acescg, linear.", rich_help_panel=_OUT)] = None,
-    half: Annotated[
-        bool | None, typer.Option("--half/--float", help="16 or 32 bits a value.", rich_help_panel=_OUT)
-    ] = None,
+    half: Annotated[bool, typer.Option("--half", help="Write 16 bits a value.", rich_help_panel=_OUT)] = False,
+    float32: Annotated[
+        bool, typer.Option("--float", help="Write 32 bits a value, as when left out.", rich_help_panel=_OUT)
+    ] = False,
     full_windows: Annotated[
         bool,
         typer.Option("--full-windows", help="Single ghosts at full size, for Blender.", rich_help_panel=_OUT),
@@ -353,6 +354,8 @@ def render(
     if no_png and (exposure is not None or view is not None):
         flag = "--view" if exposure is None else "--exposure"
         raise ProjectError(f"{flag} is for the PNG alone and --no-png leaves it out; keep one")
+    if half and float32:
+        raise ProjectError("--half and --float both say how many bits a value has; keep one")
     from .render_flags import Flags, build_project
 
     state = _read_state(resume)
@@ -365,7 +368,8 @@ def render(
         cats_eye=cats_eye, starburst_size=starburst_size, starburst_spiral=starburst_spiral,
         focus=focus, size=size, sensor=sensor, sensor_distance=sensor_distance, quality=quality,
         wavelengths=wavelengths, paths=paths, layers=layers, brightest=brightest, no_starburst=no_starburst,
-        colorspace=colorspace, half=half, mute=mute or [], solo=solo or [], gain=gain or [], physical=physical,
+        colorspace=colorspace, half=half if half or float32 else None,
+        mute=mute or [], solo=solo or [], gain=gain or [], physical=physical,
         orders=orders, order4_limit=order4_limit,
         seed=seed, error=error, error_of=error_of, samples=samples, rays_from=rays_from,
         resumed=None if state is None else state.project,
@@ -398,6 +402,10 @@ def render(
         remarks.insert(0, "draft quality draws ghosts of two reflections alone: --orders 4 is for final quality")
     if brightest is not None and settings.output.layers != "ghosts":
         remarks.insert(0, "--brightest counts layers of single ghosts, and there are none: add --layers ghosts")
+    if full_windows and settings.output.layers != "ghosts":
+        remarks.insert(0, "--full-windows is for layers of single ghosts, and there are none: add --layers ghosts")
+    if order4_limit is not None and settings.quality.orders != 4:
+        remarks.insert(0, "--order4-limit is for ghosts of four reflections, and there are none: add --orders 4")
     if run is not None:
         remarks.append(f"to go on to a smaller --error: --resume {run.state_file}")
     tell(remarks)

@@ -65,6 +65,9 @@ _FLAG_OF = {
     "intensity": "--intensity",
 }
 
+# which flags a model of scatter goes by; the one that is not listed goes by all
+_SCATTER_USES: dict[str, tuple[str, ...]] = {"none": (), "chaumond": (), "abg": ("--cleanliness",)}
+
 
 @dataclass(frozen=True)
 class Flags:
@@ -209,6 +212,23 @@ def _check_together(flags: Flags) -> None:
     for flag, value in shapes.items():
         if flags.iris_image is not None and value is not None:
             raise ProjectError(f"{flag} shapes blades and --iris-image replaces them; keep one")
+        if flags.blades == 0 and value is not None and flag == "--rounding":
+            raise ProjectError(f"{flag} shapes blades and --blades 0 is round without any; keep one")
+    by_hand = {
+        "--rule": flags.rule, "--mute": flags.mute, "--solo": flags.solo, "--gain": flags.gain,
+        "--starburst-size": flags.starburst_size, "--starburst-spiral": flags.starburst_spiral,
+        "--ghost-offset": flags.ghost_offset,
+    }  # fmt: skip
+    for flag, change in by_hand.items():
+        if flags.physical and change not in (None, [], ()):
+            raise ProjectError(f"{flag} changes the picture by hand and --physical ignores all such changes; keep one")
+    of_starburst = {
+        "--cats-eye": flags.cats_eye or None, "--starburst-size": flags.starburst_size,
+        "--starburst-spiral": flags.starburst_spiral,
+    }  # fmt: skip
+    for flag, shape in of_starburst.items():
+        if flags.no_starburst and shape is not None:
+            raise ProjectError(f"{flag} shapes the starburst and --no-starburst leaves it out; keep one")
 
 
 def check_focus(lens: str | Lens, focus: float | None, sensor_distance: float | None) -> None:
@@ -420,6 +440,10 @@ def scatter_flags(
     given = {key: value for key, value in changes.items() if value is not None}
     if not given:
         return None
+    used = _SCATTER_USES.get(model or "", ("--surface-roughness", "--cleanliness"))
+    for flag, value in (("--surface-roughness", roughness), ("--cleanliness", cleanliness)):
+        if value is not None and flag not in used:
+            raise ProjectError(f"{flag} has no effect on what --scatter {model} scatters; keep one")
     known = dict(base) if base is not None else {}
     if known.get("model") == "none":
         del known["model"]

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from ..errors import naming
 from .common import print_json, refused_as_json
 
 
@@ -16,9 +17,10 @@ def check(
 ) -> None:
     """Check a scene, and tell every mistake at once; exit code 2 when it cannot be planned."""
     from ..io.scene_file import read_scene
+    from ..io.sentences import count
     from ..predict.tracks import camera_track, moments, sightings
 
-    with refused_as_json(file, as_json):
+    with refused_as_json(file, as_json), naming(file):
         scene = read_scene(file)
         times, dates = moments(scene)
         tracks = [camera_track(one, times, f"cameras[{c}] ({one.name})") for c, one in enumerate(scene.cameras)]
@@ -27,4 +29,5 @@ def check(
         facts = {"cameras": len(scene.cameras), "lights": len(scene.lights), "times": len(times)}
         print_json({"file": str(file), "usable": True, "scene": scene.name, **facts})
         return
-    print(f"{file}: usable, {len(scene.cameras)} cameras, {len(scene.lights)} lights, {len(times)} times")
+    told = ((scene.cameras, "camera"), (scene.lights, "light"), (times, "time"))
+    print(f"{file}: usable, {', '.join(count(len(each), noun) for each, noun in told)}")

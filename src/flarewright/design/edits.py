@@ -235,7 +235,9 @@ def move_stop(lens: Lens, row: int) -> Lens:
         When the lens makes no image any more, or would have an f-number that no lens file can hold.
     """
     old = lens.stop_row
-    if not 0 <= row < len(lens.rows) or row == old:
+    if row == old:
+        raise ProjectError(f"row {row} cannot become the stop, for it is the stop already: choose another row")
+    if not 0 <= row < len(lens.rows):
         raise ProjectError(f"row {row} cannot become the stop: choose a surface between 0 and {len(lens.rows) - 1}")
     front = lens.rows[row - 1] if row else None
     if isinstance(front, Surface) and front.medium is not None:

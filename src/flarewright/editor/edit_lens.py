@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
@@ -37,6 +38,8 @@ UNITS = ("mm", "um", "nm", "deg", "px", "s", "k", "stops")
 BOUNDS = {
     "greater than or equal to": "at least", "less than or equal to": "at most", "greater than": "more than",
 }  # fmt: skip
+_INDEX = re.compile(r"\[\d+\]")
+_TOLD = re.compile(r"([\w.\[\]]+)( should be |: )(.*)", re.DOTALL)
 DISTORTION_STEP_DEG, DISTORTION_TO_DEG = 2.0, 80.0
 
 
@@ -401,14 +404,14 @@ def sentence(error: Exception) -> str:
 
 
 def _said(told: str) -> str:
-    """Say what a field must be in words; `told` is "dust_per_mm2: input should be greater than or equal to 0"."""
-    where, colon, what = told.partition(": ")
-    if not colon or not where.replace(".", "").replace("_", "").isalnum():
+    """Say what a field must be in words; `told` is "dust_per_mm2 should be greater than or equal to 0"."""
+    found = _TOLD.fullmatch(told)
+    if found is None:
         return told
-    for code, words in BOUNDS.items():
-        what = what.replace(code, words)
-    bound = what.removeprefix("input should be ")
-    return f"{spoken(where)}: {what}" if bound == what else f"{spoken(where)} must be {bound}"
+    field, joint, what = spoken(_INDEX.sub("", found[1])), found[2].replace("should", "must"), found[3]
+    for code, bound in BOUNDS.items():
+        what = what.replace(code, bound)
+    return f"{field}{joint}{what}"
 
 
 def spoken(field: str) -> str:

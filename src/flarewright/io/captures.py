@@ -137,6 +137,8 @@ def read_camera(path: Path) -> CameraNoise:
         raise FlarewrightError(f"{path} is not JSON (line {error.lineno}): {error.msg.lower()}") from None
     except ValueError as error:
         raise FlarewrightError(str(error)) from None
+    if not isinstance(data, dict):
+        raise FlarewrightError(f"{path} is no camera.json: a JSON object was expected")
     try:
         return CameraNoise.model_validate(data)
     except ValidationError as error:

@@ -24,7 +24,7 @@ from flarewright.errors import ProjectError
 from flarewright.model import Bare, Coating, CoatingChoice, Everywhere, Film, PerRow, QuarterWave, Stack, Standard
 from flarewright.model.coating import StandardName
 
-from .sentences import did_you_mean, validation_sentences
+from .sentences import did_you_mean, shorten, validation_sentences
 from .text_file import read_toml
 
 STANDARD_NAMES: tuple[StandardName, ...] = get_args(StandardName)
@@ -108,9 +108,9 @@ def coating_from(value: object) -> Coating | None:
         try:
             coating: Coating = _COATING.validate_python(value)
         except ValidationError as error:
-            raise ProjectError(f"coating table: {'; '.join(validation_sentences(error))}") from None
+            raise ProjectError(f"coating table: {'; '.join(validation_sentences(error, value))}") from None
         return coating
-    raise ProjectError(f"coating {value!r} is neither a text nor a table: {HELP}")
+    raise ProjectError(f"coating {shorten(value)} is neither a text nor a table: {HELP}")
 
 
 def format_coating(coating: Coating) -> str:

@@ -43,7 +43,7 @@ def _read(path: str | Path, what: str, record: type[Record], largest: int = LARG
     try:
         return record.model_validate(data)
     except ValidationError as error:
-        problems = validation_sentences(error)
+        problems = validation_sentences(error, data)
         raise FlarewrightError(summary(str(path), problems), tuple(problems)) from None
 
 

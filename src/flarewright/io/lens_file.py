@@ -26,6 +26,7 @@ from flarewright.model.raw_lens import LensReading, RawLens, RawSequence
 
 from . import dotlens, media, zmx
 from .coating_text import coating_from
+from .file_kind import refuse_other_kind
 from .lens_fields import (
     CURVATURE,
     RADIUS,
@@ -100,6 +101,7 @@ def read_lens_toml(path: str | Path) -> LensReading:
     """
     try:
         table = read_toml(path, "a lens file")
+        refuse_other_kind(path, table, "lens")
     except ValueError as error:
         raise LensError(str(error), (str(error),)) from None
     return lens_from_table(table, str(path), folder=Path(path).parent)
@@ -125,7 +127,7 @@ def lens_from_table(table: dict[str, Any], where: str, *, folder: Path | None = 
         The table is no lens; the message sums up, `problems` holds every finding with its row.
     """
     problems: list[str] = []
-    fields = _top_level(table, problems)
+    fields = _top_level(table, folder, problems)
     findings: list[tuple[int, media.Finding]] = []
     rows = _rows(table.get("rows"), problems, findings, folder)
     elements = read_elements(table.get("elements", []), problems)
@@ -146,7 +148,7 @@ def lens_from_table(table: dict[str, Any], where: str, *, folder: Path | None = 
     return LensReading(lens, media.remarks(findings))
 
 
-def _top_level(table: dict[str, Any], problems: list[str]) -> dict[str, Any]:
+def _top_level(table: dict[str, Any], folder: Path | None, problems: list[str]) -> dict[str, Any]:
     """Check everything above the rows and return the fields for Lens."""
     version = table.get("schema_version")
     if version is None:
@@ -174,10 +176,18 @@ def _top_level(table: dict[str, Any], problems: list[str]) -> dict[str, Any]:
     else:
         _unknown_keys(iris, tuple(Iris.model_fields), "iris: ", problems)
         try:
-            fields["iris"] = Iris.model_validate({k: v for k, v in iris.items() if k in Iris.model_fields}, strict=True)
+            fields["iris"] = _iris(iris, folder)
         except ValidationError as error:
             problems += [f"iris: {sentence}" for sentence in validation_sentences(error)]
     return fields
+
+
+def _iris(table: dict[str, Any], folder: Path | None) -> Iris:
+    iris = Iris.model_validate({k: v for k, v in table.items() if k in Iris.model_fields}, strict=True)
+    if iris.mask is None:
+        return iris
+    found: Iris = iris.replace(mask=str(((folder or Path()) / iris.mask).absolute()))
+    return found
 
 
 def _rows(
@@ -279,7 +289,7 @@ def _surface(
         except GlassError as error:
             problems.append(f"row {k}: {error}")
     if (numbers.get("thickness") or 0.0) < 0.0 and ("n_d" in entry or glass is not None):
-        problems.append(f"row {k}: thickness is {entry['thickness']!r}: glass cannot be thinner than 0 mm")
+        problems.append(f"row {k}: thickness is {shorten(entry['thickness'])}: glass cannot be thinner than 0 mm")
     if len(problems) > before:
         return None
     surface = Surface(**values)
@@ -318,7 +328,7 @@ def _curvature_of(radius: object, key: str, k: int, problems: list[str]) -> floa
     if isinstance(radius, str):
         problems.append(f'row {k}: {key} is {shorten(radius)}, a number in mm or "flat" was expected')
     elif radius in (0, float("inf"), float("-inf")) and not isinstance(radius, bool):
-        problems.append(f'row {k}: {key} is {radius!r}: for a plane surface write {key} = "flat"')
+        problems.append(f'row {k}: {key} is {shorten(radius)}: for a plane surface write {key} = "flat"')
     elif (value := _number(radius, f"row {k}: {key}", RADIUS, problems)) is not None:
         if abs(1.0 / value) <= CURVATURE.high:
             return 1.0 / value

@@ -121,13 +121,14 @@ def read_run(folder: Path) -> MergedRun:
     """
     path = folder / INDEX
     try:
-        return MergedRun.model_validate(json.loads(path.read_text("utf-8")))
+        data = json.loads(path.read_text("utf-8"))
+        return MergedRun.model_validate(data)
     except OSError as error:
         raise FlarewrightError(
             f"{path} cannot be read ({(error.strerror or str(error)).lower()}): "
             "give a folder that flarewright measure merge has written"
         ) from None
     except ValidationError as error:
-        raise FlarewrightError(summary(str(path), validation_sentences(error))) from None
+        raise FlarewrightError(summary(str(path), validation_sentences(error, data))) from None
     except ValueError:
         raise FlarewrightError(f"{path} is damaged: merge again with flarewright measure merge") from None

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
@@ -37,10 +37,11 @@ from ..model.lens import Lens, Surface
 from ..model.plate import Plate
 from ..model.project import CoatingChoice, Output, Project, Quality
 from .coating_text import coating_from, parse_coating, read_coating_file
+from .file_kind import refuse_lens_suffix, refuse_other_kind
 from .lens_file import lens_from_table
 from .plate_text import parse_plate
 from .project_text import ABOUT, FILES, HOLDOUT_FILES, lens_location, project_text
-from .sentences import count, did_you_mean, shorten
+from .sentences import Keys, did_you_mean, shorten, summary, validation_sentences
 from .spectrum_text import parse_spectrum
 from .text_file import check_version, read_toml
 
@@ -100,7 +101,9 @@ def read_project(path: str | os.PathLike[str]) -> Project:
     """
     path = Path(path)
     try:
+        refuse_lens_suffix(path, "project")
         data = read_toml(path, "a project file")
+        refuse_other_kind(path, data, "project")
         check_version(data, _NEWEST, f"the project file {path}")
     except ValueError as error:
         raise ProjectError(str(error)) from None
@@ -136,9 +139,7 @@ def project_from_data(data: dict[str, Any], *, folder: Path, where: str) -> Proj
         problems += explain(error, expanded)
     if not problems:
         return project
-    if len(problems) == 1:
-        raise ProjectFileError(f"{where}: {problems[0]}")
-    raise ProjectFileError(f"{where} has {count(len(problems), 'problem')}, the first: {problems[0]}", tuple(problems))
+    raise ProjectFileError(summary(where, problems), tuple(problems))
 
 
 def _expanded(data: dict[str, Any], folder: Path, problems: list[str]) -> dict[str, Any]:
@@ -292,60 +293,7 @@ def explain(error: ValidationError, data: Any, sections: Sections | None = None)
     -------
     list of str
     """
-    sentences: list[str] = []
-    for finding in error.errors(include_url=False):
-        if finding["type"] == "too_short" and finding.get("ctx", {}).get("actual_length") != len(finding["input"]):
-            continue  # Its items were refused one by one, which is told already.
-        keys = _written_keys(finding["loc"], data, finding["type"])
-        place = _place(keys)
-        match finding["type"]:
-            case "missing":
-                sentence = f"{place} is missing"
-            case "extra_forbidden":
-                sentence = f"{place} is not a known key{_suggestion(keys, sections)}"
-            case "value_error":
-                reason = finding["msg"].removeprefix("Value error, ")
-                sentence = f"{place}: {reason}" if place else reason
-            case "tuple_type" if place == "lights":
-                sentence = f"lights should be tables, each under [[lights]]{_given(finding['input'])}"
-            case _:
-                reason = finding["msg"].replace("Input should be", "should be")
-                for bound in finding.get("ctx", {}).values():
-                    if isinstance(bound, float) and bound >= 1e15:
-                        # nobody counts so many noughts
-                        reason = reason.replace(f"{bound:.0f}", f"{bound:g}")
-                reason = reason[0].lower() + reason[1:]
-                sentence = f"{place} {reason}{_given(finding['input'])}".strip()
-        if sentence not in sentences:
-            sentences.append(sentence)
-    return sentences
-
-
-def _written_keys(loc: tuple[int | str, ...], data: Any, kind: str) -> list[int | str]:
-    """Drop from a place what pydantic put in and no one wrote: the tags of unions."""
-    keys: list[int | str] = []
-    for position, key in enumerate(loc):
-        if isinstance(data, BaseModel):
-            data = dict(data)
-        if (isinstance(data, dict) and key in data) or (
-            isinstance(data, list | tuple) and isinstance(key, int) and key < len(data)
-        ):
-            keys.append(key)
-            data = data[cast(Any, key)]
-        elif kind == "missing" and position == len(loc) - 1:
-            keys.append(key)
-    return keys
-
-
-def _place(keys: list[int | str]) -> str:
-    text = ""
-    for key in keys:
-        text += f"[{key}]" if isinstance(key, int) else f".{key}" if text else key
-    return text
-
-
-def _given(value: Any) -> str:
-    return f", not {shorten(value)}" if isinstance(value, str | int | float | bool) else ""
+    return validation_sentences(error, data, lambda keys: _suggestion(keys, sections))
 
 
 _SECTIONS: Sections = {
@@ -381,7 +329,7 @@ _DESIGN: Sections = {
 }  # fmt: skip
 
 
-def _suggestion(keys: list[int | str], sections: Sections | None) -> str:
+def _suggestion(keys: Keys, sections: Sections | None) -> str:
     wrong = str(keys[-1]) if keys else ""
     section = next((key for key in reversed(keys[:-1]) if isinstance(key, str)), "")
     known = [name for model in (sections or _SECTIONS | _DESIGN).get(section, ()) for name in model.model_fields]

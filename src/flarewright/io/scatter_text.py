@@ -45,7 +45,7 @@ def read_scatter(table: object, problems: list[str]) -> Scatter | None:
     try:
         return Scatter.model_validate(table)
     except ValidationError as error:
-        problems += [f"scatter: {sentence}" for sentence in validation_sentences(error)]
+        problems += [f"scatter: {sentence}" for sentence in validation_sentences(error, table)]
         return None
 
 

@@ -17,6 +17,7 @@ from ..model import light as spectra
 from ..model import project as choices
 from ..model import scene as records
 from ..model.scene import Scene
+from .file_kind import refuse_lens_suffix, refuse_other_kind
 from .project_file import (
     ProjectFileError,
     Sections,
@@ -116,7 +117,9 @@ def read_scene(path: str | os.PathLike[str]) -> Scene:
     """
     path = Path(path)
     try:
+        refuse_lens_suffix(path, "scene")
         data = read_toml(path, "a scene file")
+        refuse_other_kind(path, data, "scene")
     except ValueError as error:
         raise ProjectError(str(error)) from None
     return scene_from_data(data, folder=path.parent, where=str(path))

@@ -3,39 +3,177 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from datetime import date, time
+from typing import Any, cast
 
-from pydantic import ValidationError
+from pydantic import BaseModel, ValidationError
+
+Keys = list[int | str]
+"""A place in a file as it is written there: ["lights", 0, "field_deg"]."""
+Finding = dict[str, Any]
+"""What refused a value: its type, loc, msg, input and ctx."""
+
+_NUMBER, _WHOLE, _TEXT, _LIST, _TABLE = "a number", "a whole number", "a text in quotes", "a list", "a table"
+_TIME = "a date with a time and its zone, like 2024-06-21T18:00:00+02:00"
+
+# what each kind of finding asks for; the others tell their bound themselves
+_WANTED = {
+    "bool_type": "true or false", "bool_parsing": "true or false",
+    "int_type": _WHOLE, "int_parsing": _WHOLE, "int_from_float": _WHOLE,
+    "int_parsing_size": "a whole number of fewer digits",
+    "float_type": _NUMBER, "float_parsing": _NUMBER, "finite_number": "a finite number",
+    "string_type": _TEXT, "string_unicode": _TEXT, "string_too_short": "a text that is not empty",
+    "string_pattern_mismatch": "two rows like 7-3",
+    "tuple_type": _LIST, "list_type": _LIST, "set_type": _LIST, "frozen_set_type": _LIST,
+    "dict_type": _TABLE, "model_type": _TABLE, "model_attributes_type": _TABLE, "mapping_type": _TABLE,
+    "none_required": "left out",
+    "datetime_type": _TIME, "datetime_parsing": _TIME, "datetime_from_date_parsing": _TIME,
+    "datetime_object_invalid": _TIME, "timezone_naive": _TIME,
+}  # fmt: skip
+
+_BOUNDS = {
+    "greater_than": ("greater than", "gt"), "greater_than_equal": ("greater than or equal to", "ge"),
+    "less_than": ("less than", "lt"), "less_than_equal": ("less than or equal to", "le"),
+}  # fmt: skip
+
+# lists whose entries stand under a heading of their own
+_HEADINGS = {
+    "lights": "[[lights]]", "cameras": "[[cameras]]", "rules": "[[art.rules]]", "wishes": "[[design.wishes]]",
+}  # fmt: skip
 
 
-def validation_sentences(error: ValidationError) -> list[str]:
-    """Turn pydantic's findings into short sentences, "field: what is wrong".
+def validation_sentences(
+    error: ValidationError,
+    data: Any = None,
+    unknown: Callable[[Keys], str] = lambda _: "",
+) -> list[str]:
+    """Turn what refused a record into sentences, the only place where its own words are read.
 
     Parameters
     ----------
     error : ValidationError
+    data : object, optional
+        What was validated; names the places as a person wrote them. None: as the record names them.
+    unknown : callable, optional
+        Says after a key that is not known what may have been meant.
 
     Returns
     -------
     list of str
-        One entry a finding.
+        One entry a place and mistake: "iris.blades should be a whole number, not 'six'".
     """
-    sentences = []
-    for finding in error.errors(include_url=False, include_context=False):
-        # Tags of unions ("film") are pydantic's, not the person's: keep field names and positions only.
-        where = ".".join(str(part) for part in finding["loc"])
-        what = finding["msg"].removeprefix("Value error, ")
-        what = what[:1].lower() + what[1:]
-        given = finding.get("input")
-        if isinstance(given, bool | int | float | str) and not where.endswith(repr(given)):
-            what += f", not {shorten(given)}"
-        sentences.append(f"{where}: {what}" if where else what)
-    return sentences
+    # by place what would do there: of a field of several kinds each kind refuses by itself
+    found: dict[tuple[str, str], list[str]] = {}
+    for finding in cast(list[Finding], error.errors(include_url=False)):
+        if finding["type"] == "too_short" and finding.get("ctx", {}).get("actual_length") != len(finding["input"]):
+            continue  # Its items were refused one by one, which is told already.
+        keys = list(finding["loc"]) if data is None else _written_keys(finding["loc"], data, finding["type"])
+        where = _place(keys)
+        match finding["type"]:
+            case "missing":
+                found.setdefault((f"{where} is missing", ""), [])
+            case "extra_forbidden":
+                found.setdefault((f"{where} is not a known key{unknown(keys)}", ""), [])
+            case "value_error":
+                reason = finding["msg"].removeprefix("Value error, ")
+                found.setdefault((f"{where}: {reason}" if where else reason, ""), [])
+            case _:
+                choices = found.setdefault((where, _given(finding)), [])
+                choices += [wanted for wanted in (_wanted(finding, keys),) if wanted not in choices]
+    return [
+        f"{start} should be {' or '.join(choices)}{given}".strip() if choices else start
+        for (start, given), choices in found.items()
+    ]
+
+
+def _wanted(finding: Finding, keys: Keys) -> str:
+    """Say what would do in place of what was given."""
+    kind, about = finding["type"], finding.get("ctx", {})
+    if kind in _BOUNDS:
+        words, name = _BOUNDS[kind]
+        bound = about[name]
+        # nobody counts so many noughts
+        return f"{words} {f'{bound:g}' if isinstance(bound, float) else bound}"
+    match kind:
+        case "tuple_type" if keys and keys[-1] in _HEADINGS:
+            return f"tables, each under {_HEADINGS[str(keys[-1])]}"
+        case "too_short":
+            return f"a list of at least {about['min_length']}"
+        case "too_long":
+            return f"a list of at most {about['max_length']}"
+        case "literal_error":
+            return str(about["expected"])
+        case "union_tag_invalid":
+            return f"a table whose {_tag(about)} is {' or '.join(str(about['expected_tags']).rsplit(', ', 1))}"
+        case "union_tag_not_found":
+            return f"a table that begins with its {_tag(about)}"
+    return _WANTED.get(kind, "something else")
+
+
+def _tag(about: dict[str, Any]) -> str:
+    return str(about["discriminator"]).strip("'")
+
+
+def _given(finding: Finding) -> str:
+    """Say what was given, where its kind or its value tells something."""
+    value = finding["input"]
+    match finding["type"]:
+        case "too_short" | "too_long":
+            return f", not {len(value)}"
+        case "union_tag_invalid":
+            return f", not {shorten(value[_tag(finding['ctx'])])}"
+        case "union_tag_not_found" if isinstance(value, dict):
+            return ""
+    if isinstance(value, BaseModel):
+        return ""
+    if isinstance(value, dict):
+        return ", not a table"
+    return ", not a list" if isinstance(value, list | tuple) else f", not {shorten(value)}"
+
+
+def _written_keys(loc: tuple[int | str, ...], data: Any, kind: str) -> Keys:
+    """Drop from a place what the record put in and no one wrote: the tags of its choices."""
+    keys: Keys = []
+    for position, key in enumerate(loc):
+        if isinstance(data, BaseModel):
+            data = dict(data)
+        if (isinstance(data, dict) and key in data) or (
+            isinstance(data, list | tuple) and isinstance(key, int) and key < len(data)
+        ):
+            keys.append(key)
+            data = data[cast(Any, key)]
+        elif kind == "missing" and position == len(loc) - 1:
+            keys.append(key)
+    return keys
+
+
+def _place(keys: Keys) -> str:
+    text = ""
+    for key in keys:
+        text += f"[{key}]" if isinstance(key, int) else f".{key}" if text else key
+    return text
+
+
+def written(value: object) -> str:
+    """Return a value in the words of the file that it comes from: `true`, `2024-06-21`, `{ a = 1 }`, `null`."""
+    match value:
+        case None:
+            return "null"
+        case bool():
+            return "true" if value else "false"
+        case date() | time():
+            return value.isoformat()
+        case list() | tuple():
+            return f"[{', '.join(map(written, value))}]"
+        case dict():
+            return f"{{ {', '.join(f'{key} = {written(item)}' for key, item in value.items())} }}" if value else "{}"
+    return repr(value)
 
 
 def shorten(value: object, limit: int = 60) -> str:
-    """Return `repr(value)`, cut in the middle when it is long."""
-    text = repr(value)
+    """Return a value as `written`, cut in the middle when it is long."""
+    text = written(value)
     return text if len(text) <= limit else f"{text[: limit - 12]} ... {text[-6:]}"
 
 

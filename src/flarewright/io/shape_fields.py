@@ -78,7 +78,7 @@ def read_elements(table: object, problems: list[str]) -> tuple[Element, ...]:
         _unknown(entry, ELEMENT_KEYS, where, problems)
         rows = entry.get("rows")
         if not (isinstance(rows, list) and len(rows) == 2 and all(type(row) is int for row in rows)):
-            problems.append(f"{where}: rows is {shorten(rows)}: give its first and last row, rows = [0, 2] for example")
+            problems.append(f"{where}: rows is {_stated(rows)}: give its first and last row, rows = [0, 2] for example")
         moved = _moved(entry, where, problems)
         if len(problems) == before:
             found.append(Element(rows=rows, **moved))
@@ -93,9 +93,9 @@ def read_positions(table: object, problems: list[str]) -> tuple[Position, ...]:
         _unknown(entry, ("name", "gaps", *POSITION_NUMBERS), where, problems)
         name, gaps = entry.get("name"), entry.get("gaps")
         if not isinstance(name, str) or not name.strip():
-            problems.append(f'{where}: name is {shorten(name)}: give it one, name = "wide" for example')
+            problems.append(f'{where}: name is {_stated(name)}: give it one, name = "wide" for example')
         if not isinstance(gaps, dict) or not gaps or not all(key.isdecimal() for key in gaps):
-            problems.append(f"{where}: gaps is {shorten(gaps)}: give the thickness behind rows, gaps = {{ 5 = 8.78 }}")
+            problems.append(f"{where}: gaps is {_stated(gaps)}: give the thickness behind rows, gaps = {{ 5 = 8.78 }}")
             gaps = {}
         fields: dict[str, Any] = {
             key: _number(entry[key], f"{where}: {key}", field, problems)
@@ -301,6 +301,10 @@ def elements_schema() -> dict[str, Any]:
             },
         },
     }
+
+
+def _stated(value: object) -> str:
+    return "missing" if value is None else shorten(value)
 
 
 def _pair(value: object, where: str, field: NumberField, problems: list[str]) -> tuple[float, ...] | None:

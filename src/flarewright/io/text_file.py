@@ -7,6 +7,8 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
+from .toml_mistake import toml_sentence
+
 LARGEST = 4_000_000
 """Bytes; a text file beyond it is something else under a wrong name."""
 
@@ -102,7 +104,7 @@ def read_toml(path: str | Path, what: str) -> dict[str, Any]:
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise ValueError(f"{path} is not valid TOML: {lower_first(str(error))}") from None
+        raise ValueError(f"{path} {toml_sentence(text, error)}") from None
     except ValueError:
         # a whole number of thousands of digits, which Python does not turn into one
         line = next((k for k, line in enumerate(text.split("\n"), 1) if re.search(r"[\d_]{4301}", line)), 1)

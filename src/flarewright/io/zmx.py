@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import Path
 
 from pydantic import ValidationError
@@ -150,6 +151,10 @@ def _sequence(path: Path, found: _Text) -> RawSequence | None:
     if mm != 1.0:
         found.remarks.append(f"lengths are in {unit}; converted to mm")
     findings: list[tuple[int, media.Finding]] = []
+    for before, block in pairwise(found.blocks):
+        # what has no glass of its own lies in that of the surface before
+        if block.kind == "COORDBRK" and "GLAS" in before.words:
+            block.words["GLAS"] = before.words["GLAS"]
     rows = [_row(block, mm, found, findings) for block in found.blocks[1:-1]]
     if found.problems:
         return None
@@ -202,8 +207,12 @@ def _shape(block: _Block, mm: float, problems: list[str]) -> dict[str, object]:
     if block.kind == "STANDARD":
         return {"curvature": curvature, "conic": conic}
     if block.kind == "COORDBRK":
-        if any(block.parameters.values()):
-            problems.append(f"{where} tilts or shifts what follows (COORDBRK): write such groups as [[elements]]")
+        # the sixth only says which of turn and shift comes first
+        if any(value for n, value in block.parameters.items() if n != 6):
+            problems.append(
+                f"{where} tilts or shifts what follows (COORDBRK), which is not read: set its numbers to 0, convert "
+                "the file, and write them as [[elements]] of the new one"
+            )
         return {}
     if block.kind == "BICONICX":
         radius, conic_x = block.parameters.get(1, 0.0) * mm, block.parameters.get(2, 0.0)

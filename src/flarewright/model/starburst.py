@@ -78,6 +78,6 @@ class Starburst(Frozen):
     """
 
     size: float = Field(1.0, gt=0.0, le=1000.0)
-    intensity: float = Field(1.0, ge=0.0)
+    intensity: float = Field(1.0, ge=0.0, le=1e9)
     spiral_deg: float = Field(0.0, ge=0.0, le=90.0)
     cats_eye: StrictBool = False

@@ -12,7 +12,6 @@ from math import isfinite, sqrt
 from typing import Literal
 
 import numpy as np
-from pydantic import ValidationError
 
 from ..errors import LensError
 from ..model import Coating, Lens, QuarterWave, Row, Stop, Surface
@@ -40,6 +39,10 @@ RESIN_INDEX = (1.48, 1.57)
 RIM_CUT = 0.02
 # a focal length this many times the length of the glass is none
 AFOCAL = 200.0
+# how far the f-number of a file's name may be off before it is told (names round)
+NAME_OFF = 0.06
+# an f-number in a file's name: F2.8, f-2.8, f_2.8, f2,8; of a zoom the first
+_IN_NAME = re.compile(r"(?<![A-Za-z0-9])[Ff][-_]?(\d{1,2}(?:[.,]\d+)?)(?!\d|[.,]\d|mm)")
 
 
 def repair(raw: RawLens, apertures: Apertures = "auto") -> LensReading:
@@ -61,16 +64,6 @@ def repair(raw: RawLens, apertures: Apertures = "auto") -> LensReading:
     LensError
         The table is no camera lens by itself, or is damaged beyond repair.
     """
-    try:
-        return _repair(raw, apertures)
-    except ValidationError as error:
-        # A combination of values that no check foresaw; the model's own words are better than a traceback.
-        first = error.errors()[0]
-        where = ".".join(str(part) for part in first["loc"])
-        raise LensError(f"{raw.file}: {where}: {first['msg'].removeprefix('Value error, ')}") from None
-
-
-def _repair(raw: RawLens, apertures: Apertures) -> LensReading:
     _refuse(raw)
     remarks: list[str] = []
     rows = _without_idle_rows(raw, remarks)
@@ -190,9 +183,12 @@ def _full_name(raw: RawLens, remarks: list[str]) -> str:
         if len(_letters(candidate)) > len(_letters(name)) and _letters(candidate).startswith(_letters(name)):
             remarks.append(f"the name {name!r} is cut short; taken as {candidate!r}")
             name = candidate
-    stated = re.search(r"_[Ff](\d+(?:\.\d+)?)", re.sub(r"\(.*", "", raw.file))
-    if stated and raw.f_number and abs(float(stated[1]) / raw.f_number - 1.0) > 0.06:
-        remarks.append(f"the file name says f/{stated[1]}, the header f/{raw.f_number:g}; the header holds")
+    # what stands before a parenthesis is measured, what stands in it is the maker's name
+    stated = _IN_NAME.search(raw.file.partition("(")[0]) or _IN_NAME.search(raw.file)
+    if stated and raw.f_number:
+        number = float(stated[1].replace(",", "."))
+        if abs(number / raw.f_number - 1.0) > NAME_OFF:
+            remarks.append(f"the file name says f/{number:g}, the header f/{raw.f_number:g}; the header holds")
     return name
 
 

@@ -8,8 +8,6 @@ from __future__ import annotations
 
 from math import atan, degrees
 
-from pydantic import ValidationError
-
 from ..errors import LensError
 from ..model import Lens, Row, Stop, Surface
 from ..model.raw_lens import LensReading, RawSequence, SequenceRow
@@ -39,29 +37,23 @@ def lens_of_sequence(raw: RawSequence) -> LensReading:
         It is no camera lens by itself.
     """
     remarks: list[str] = []
-    try:
-        kept, front = _without_idle(raw, remarks)
-        rows = _with_stop(raw, kept, remarks)
-        draft = Lens(name=raw.name, source=f"from {raw.file}", f_number=TRIAL, rows=tuple(rows))
-        order = _order(raw, draft)
-        f_number = _f_number(raw, order, remarks)
-        if not 0.3 < f_number <= 256.0:
-            raise LensError(f"{raw.file}: its opening would be f/{f_number:.3g}, which no lens has: set FNUM")
-        _tell_image(kept[-1], order, remarks)
-        rows = _within_spheres(rows, remarks)
-        _tell_rims(kept, remarks)
-        distance = None if raw.focus_distance is None else raw.focus_distance + front
-        if distance is not None:
-            remarks.append(f"the object stands {distance:g} mm in front of the lens; it is focused there")
-        lens = draft.replace(
-            rows=tuple(rows), f_number=f_number, field_deg=_field_deg(raw, order), focus_distance=distance
-        )
-        remarks += raw.remarks
-        notes = [f"Imported from {raw.file}.", raw.notes, *remarks]
-        return LensReading(lens.replace(notes="\n".join(note for note in notes if note)), tuple(remarks))
-    except ValidationError as error:
-        first = error.errors()[0]
-        raise LensError(f"{raw.file}: {first['msg'].removeprefix('Value error, ')}") from None
+    kept, front = _without_idle(raw, remarks)
+    rows = _with_stop(raw, kept, remarks)
+    draft = Lens(name=raw.name, source=f"from {raw.file}", f_number=TRIAL, rows=tuple(rows))
+    order = _order(raw, draft)
+    f_number = _f_number(raw, order, remarks)
+    if not 0.3 < f_number <= 256.0:
+        raise LensError(f"{raw.file}: its opening would be f/{f_number:.3g}, which no lens has: set FNUM")
+    _tell_image(kept[-1], order, remarks)
+    rows = _within_spheres(rows, remarks)
+    _tell_rims(kept, remarks)
+    distance = None if raw.focus_distance is None else raw.focus_distance + front
+    if distance is not None:
+        remarks.append(f"the object stands {distance:g} mm in front of the lens; it is focused there")
+    lens = draft.replace(rows=tuple(rows), f_number=f_number, field_deg=_field_deg(raw, order), focus_distance=distance)
+    remarks += raw.remarks
+    notes = [f"Imported from {raw.file}.", raw.notes, *remarks]
+    return LensReading(lens.replace(notes="\n".join(note for note in notes if note)), tuple(remarks))
 
 
 def _without_idle(raw: RawSequence, remarks: list[str]) -> tuple[list[SequenceRow], float]:

@@ -25,6 +25,8 @@ Ramp = tuple[tuple[float, float, float, float], ...]
 
 # a Gaussian is followed this many standard deviations
 REACH = 4.0
+# a light's intensity times this is still a number of 32 bits
+MOST_GAIN = 1e18
 # beyond this part of the picture's width a blur would need planes many times its size
 WIDEST_BLUR = 0.125
 
@@ -175,7 +177,7 @@ def resolve_art(settled: Settled, fours: tuple[LightPath, ...] | None = None) ->
     Raises
     ------
     ProjectError
-        When a rule names a path or row that the lens does not have, or a blur is too wide.
+        When a rule names a path or row that the lens does not have, a blur is too wide, or gains are too much together.
     """
     art, project = settled.project.art, settled.project
     if not directed(project):
@@ -197,6 +199,11 @@ def resolve_art(settled: Settled, fours: tuple[LightPath, ...] | None = None) ->
             raise ProjectError(
                 f"art.rules: ghost {name} is blurred by {changed.blur:g} mm, more than an eighth of the sensor's "
                 f"width; keep the blur below {widest:g} mm ({widest * across:.0f} pixels)"
+            )
+        if (gain := changed.visible_gain * art.gain.get("ghosts", 1.0)) > MOST_GAIN:
+            raise ProjectError(
+                f"the gains, tints and ramps of ghost {name} and the pass gain multiply its light by {gain:.3g}; keep "
+                f"their product below {MOST_GAIN:g}"
             )
     changes = {name: changed for name, changed in found.items() if changed != PLAIN}
     return ResolvedArt(changes, {name: gain for name, gain in art.gain.items() if gain != 1.0})

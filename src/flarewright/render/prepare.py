@@ -7,15 +7,18 @@ from functools import lru_cache
 from math import hypot
 from pathlib import Path
 
-from ..errors import GlassError, LensError, ProjectError
+from pydantic import ValidationError
+
+from ..errors import GlassError, LensError, ProjectError, naming
 from ..io.height_image import read_heights
 from ..io.lens_file import read_lens
 from ..io.library import is_shipped, lens_path
 from ..io.media import attach
 from ..io.media import complete as complete_media
 from ..io.media import remarks as media_remarks
+from ..io.sentences import summary, validation_sentences
 from ..model import AsLens, CoatingChoice, Imperfection, Iris, Lens, Medium, Plate, Project, Surface
-from ..model.raw_lens import RawLens, RawSequence
+from ..model.raw_lens import LensReading, RawLens, RawSequence
 from ..optics.imperfection import imperfect
 from ..optics.pack import SensorMirror, resolve_coatings
 from ..optics.paraxial import FirstOrder
@@ -68,8 +71,19 @@ def _shipped_lens(path: Path) -> tuple[Lens, tuple[str, ...]]:
 def _read_complete(path: Path, apertures: Apertures = "auto") -> tuple[Lens, tuple[str, ...]]:
     """Read a lens file and fill in what it leaves out; also returns what there is to tell."""
     reading = read_lens(path)
+    try:
+        with naming(path):
+            return _completed(reading, apertures)
+    except ValidationError as error:
+        # a combination of values that no check foresaw
+        problems = validation_sentences(error)
+        raise LensError(summary(str(path), problems), tuple(problems)) from None
+
+
+def _completed(reading: LensReading | RawLens | RawSequence, apertures: Apertures) -> tuple[Lens, tuple[str, ...]]:
+    """Judge what was read, and fill in what it leaves out."""
     if apertures != "auto" and not isinstance(reading, RawLens):
-        raise LensError(f"{path}: only the columns of a .lens table may be read as {apertures}; leave --apertures out")
+        raise LensError(f"only the columns of a .lens table may be read as {apertures}; leave --apertures out")
     # what other programs wrote needs optics to be judged, so it is repaired here
     if isinstance(reading, RawLens):
         reading = repair(reading, apertures)

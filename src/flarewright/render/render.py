@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import ProjectError
 from ..io.mask_image import read_mask
 from ..kernels.trace import REFRACT
 from ..model import Layer, Project, Stop
@@ -134,10 +135,13 @@ def render(
         scattered = {"scatter": facts}
     if project.output.starburst:
         passes.insert(0, starburst())
-    passes = [graded(layer, art.gain.get(layer.name.removesuffix(".order4"), 1.0)) for layer in passes]
-    others = [graded(layer, art.gain.get("ghosts", 1.0)) for layer in drawn.others]
-    whole = beauty(passes, project.camera.size_px)
+    # what grows beyond all numbers is refused below
+    with np.errstate(over="ignore", invalid="ignore"):
+        passes = [graded(layer, art.gain.get(layer.name.removesuffix(".order4"), 1.0)) for layer in passes]
+        others = [graded(layer, art.gain.get("ghosts", 1.0)) for layer in drawn.others]
+        whole = beauty(passes, project.camera.size_px)
     layers = (whole,) if project.output.layers == "beauty" else (whole, *passes, *others)
+    _refuse_endless(layers)
     if not any(layer.pixels.any() for layer in passes):
         told = (*told, BLACK)
     account = drawn.ledger
@@ -153,6 +157,17 @@ def render(
         (*settled.remarks, *drawn.remarks, *told, *_remarks(settled, seen)),
         account if ledger else None,
     )
+
+
+def _refuse_endless(layers: Sequence[Layer]) -> None:
+    """Refuse a picture whose values no file can hold."""
+    for layer in layers:
+        # a sum is endless where one of its parts is
+        if not isfinite(layer.pixels.sum(dtype=np.float64)):
+            raise ProjectError(
+                f"the light of the layer {layer.name} is beyond the numbers that a picture holds (3.4e38): lower the "
+                "intensity of the lights or the gains"
+            )
 
 
 def _begun(work: Callable[[], Layer], threads: int | None) -> Callable[[], Layer]:

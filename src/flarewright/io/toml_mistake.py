@@ -1,0 +1,85 @@
+"""What is wrong with a text that is no TOML, in a sentence: above all a key that stands twice."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from tomllib import TOMLDecodeError
+
+Path = tuple[str | int, ...]
+
+_TWICE = re.compile(r"Cannot (?:overwrite|declare|mutate)")
+_IN_BRACES = re.compile(r"Duplicate inline table key (.+) \(at line (\d+)")
+_NAME = r"""[\w-]+|"[^"\n]*"|'[^'\n]*'"""
+_DOTTED = rf"(?:{_NAME})(?:\s*\.\s*(?:{_NAME}))*"
+_HEADING = re.compile(rf"\s*(\[\[?)\s*({_DOTTED})\s*\]\]?\s*(?:#.*)?")
+_KEY = re.compile(rf"\s*({_DOTTED})\s*=")
+# tables of which a file may have several
+_SEVERAL = ("lights", "cameras", "rows", "elements", "positions", "rules", "wishes", "keyframes")
+
+
+def toml_sentence(text: str, error: TOMLDecodeError) -> str:
+    """Say why a text is no TOML.
+
+    Parameters
+    ----------
+    text : str
+    error : TOMLDecodeError
+        What its reader said.
+
+    Returns
+    -------
+    str
+        To follow the file's name: " says f_number twice, ...".
+    """
+    said = str(error)
+    if found := _IN_BRACES.match(said):
+        return f"says {found[1]} twice within the braces of line {found[2]}: keep one"
+    if _TWICE.match(said):
+        if (repeated := next(_repeated(text), None)) is None:
+            return f"says the same key twice ({said.rpartition('(')[2].rstrip(')')}): keep one"
+        name, first, second = repeated
+        remedy = "keep one"
+        plain = name.strip("[]")
+        if name.startswith("[") and plain.rpartition(".")[2] in _SEVERAL:
+            remedy = f"write [[{plain}]] each time where there are several"
+        elif name.startswith("["):
+            remedy = "put all its keys below one of them"
+        return f"says {name} twice, in lines {first} and {second}: {remedy}"
+    return f"is not valid TOML: {said[:1].lower()}{said[1:]}"
+
+
+def _repeated(text: str) -> Iterator[tuple[str, int, int]]:
+    """Yield keys and headings that were given before, with the line of the first and of the second time."""
+    seen: dict[Path, int] = {}
+    valued: set[Path] = set()
+    entries: dict[Path, int] = {}
+    table: Path = ()
+    for number, line in enumerate(text.split("\n"), 1):
+        if found := _HEADING.fullmatch(line):
+            table, several = _placed(found[2], (), entries), found[1] == "[["
+            if table in seen and not (several and table in entries):
+                yield f"{found[1]}{found[2]}{']' * len(found[1])}", seen[table], number
+            seen.setdefault(table, number)
+            if several:
+                entries[table] = entries.get(table, -1) + 1
+                table = (*table, entries[table])
+        elif found := _KEY.match(line):
+            key = _placed(found[1], table, entries)
+            # what has a value has no keys below it
+            before = next((key[:end] for end in range(1, len(key) + 1) if key[:end] in valued), key)
+            if before in seen:
+                yield found[1], seen[before], number
+            seen.setdefault(key, number)
+            valued.add(key)
+
+
+def _placed(dotted: str, table: Path, entries: dict[Path, int]) -> Path:
+    """Return the place of a dotted name: of tables that there are several of, the last."""
+    path = table
+    names = [name.strip("\"'") for name in re.findall(_NAME, dotted)]
+    for name in names[:-1]:
+        path = (*path, name)
+        if path in entries:
+            path = (*path, entries[path])
+    return (*path, names[-1])

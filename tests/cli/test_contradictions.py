@@ -1,0 +1,80 @@
+"""Flags that leave each other without effect are refused or told; light beyond all numbers is refused."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from flarewright.cli.app import run
+from flarewright.io.exr import read_exr
+
+SMALL = ["render", "heliar-tronnier", "--light", "10,5", "--size", "32x18", "--quality", "draft", "--wavelengths", "1"]
+SMALL += ["--no-png", "-o", "a.exr"]
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    ("flags", "words"),
+    [
+        ("--half --float", "--half and --float both say"),
+        ("--physical --gain ghosts=2", "--gain changes the picture by hand and --physical ignores"),
+        ("--physical --mute 7-3", "--mute changes the picture by hand"),
+        ("--physical --starburst-size 2", "--starburst-size changes the picture by hand"),
+        ("--physical --ghost-offset 1", "--ghost-offset changes the picture by hand"),
+        ("--no-starburst --cats-eye", "--cats-eye shapes the starburst and --no-starburst leaves it out"),
+        ("--no-starburst --starburst-spiral 3", "--starburst-spiral shapes the starburst"),
+        ("--blades 0 --rounding 0.5", "--rounding shapes blades and --blades 0 is round without any"),
+        ("--scatter none --surface-roughness 2", "--surface-roughness has no effect on what --scatter none scatters"),
+        ("--scatter abg --surface-roughness 2", "--surface-roughness has no effect on what --scatter abg scatters"),
+        ("--scatter chaumond --cleanliness 300", "--cleanliness has no effect on what --scatter chaumond scatters"),
+    ],
+)
+def test_flags_that_contradict_each_other_are_refused(capsys, folder, flags, words):
+    assert run([*SMALL, *flags.split()]) == 2
+    err = capsys.readouterr().err
+    assert err.startswith(f"flarewright: error: {words}")
+    assert err.rstrip().endswith("keep one")
+    assert list(folder.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("flags", "words"),
+    [
+        ("--full-windows", "--full-windows is for layers of single ghosts, and there are none: add --layers ghosts"),
+        ("--order4-limit 1e-3", "--order4-limit is for ghosts of four reflections, and there are none: add --orders 4"),
+    ],
+)
+def test_flags_without_effect_are_told(capsys, folder, flags, words):
+    assert run([*SMALL, *flags.split()]) == 0
+    assert words in capsys.readouterr().err
+
+
+def test_gains_that_multiply_beyond_all_measure_are_refused_before_the_work(capsys, folder):
+    assert run([*SMALL, "--rule", 'select = "7-3", gain = 1e9, tint = [1e9, 1, 1]', "--gain", "ghosts=2"]) == 2
+    assert "ghost 7-3 and the pass gain multiply its light by 2e+18; keep their product" in capsys.readouterr().err
+    assert run([*SMALL, "--gain", "7-3=1e9", "--gain", "ghosts=1e9", "--intensity", "1e20"]) == 0
+    assert all(np.isfinite(layer.pixels).all() for layer in read_exr("a.exr").layers)
+
+
+def test_light_beyond_the_numbers_of_a_picture_is_refused(capsys, folder):
+    (folder / "shot.toml").write_text(
+        'lens = "heliar-tronnier"\n[[lights]]\nfield_deg = [10, 5]\nintensity = 1e20\n[camera]\nsize_px = [32, 18]\n'
+        '[quality]\nmode = "draft"\n[starburst]\nintensity = 1e9\n[art.gain]\nstarburst = 1e9\n'
+    )
+    assert run(["render", "--project", "shot.toml", "-o", "a.exr"]) == 2
+    err = capsys.readouterr().err
+    assert "the light of the layer beauty is beyond the numbers that a picture holds" in err
+    assert "Warning" not in err
+    assert [path.name for path in folder.iterdir()] == ["shot.toml"]
+
+
+def test_half_floats_hold_what_is_above_them_at_their_largest(capsys, folder):
+    assert run([*SMALL, "--intensity", "1e12", "--half"]) == 0
+    assert "were clipped to it because half floats end there" in capsys.readouterr().err
+    brightest = max(float(layer.pixels.max()) for layer in read_exr("a.exr").layers)
+    assert brightest == 65504.0

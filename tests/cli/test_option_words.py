@@ -1,0 +1,51 @@
+"""Help names what an option takes in words, never by a type of Python."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from typer.main import get_command
+
+from flarewright.cli.app import app, run
+
+
+def options(command: Any, name: str = "flarewright") -> dict[str, Any]:
+    """Return every option below a command by its full name, but for the one of help itself."""
+    found = {f"{name} {one.opts[0]}": one for one in command.params if one.param_type_name == "option"}
+    for below in getattr(command, "commands", {}).values():
+        found |= options(below, f"{name} {below.name}")
+    return found
+
+
+def test_every_option_says_what_it_takes():
+    found = options(get_command(app))
+    assert len(found) > 200
+    assert [name for name, option in found.items() if option.metavar is None] == []
+    assert found["flarewright render --fstop"].metavar == "NUMBER"
+    assert found["flarewright render --intensity"].metavar == "NUMBER"
+    assert found["flarewright render --blades"].metavar == "N"
+    assert found["flarewright render --iris-image"].metavar == "FILE"
+    assert found["flarewright render --light"].metavar == "X,Y"
+    # a switch takes nothing
+    assert {found[f"flarewright {name}"].metavar for name in ("render --half", "ghosts --json", "--version")} == {""}
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ("render heliar-tronnier --light 1,1 -o a.exr --fstop fast", "number"),
+        ("render heliar-tronnier --light 1,1 -o a.exr --blades 5.5", "whole number"),
+        ("render heliar-tronnier --light 1,1 -o a.exr --intensity 2024-06-21", "number"),
+        ("render heliar-tronnier --light 1,1 -o a.exr --threads 0", ""),
+        ("ghosts heliar-tronnier --light 1,1 --wavelength-nm red", "number"),
+    ],
+)
+def test_a_value_of_another_kind_is_told_in_words(capsys, words, said):
+    assert run(words.split()) == 2
+    err = capsys.readouterr().err
+    assert f"invalid value for '{words.split()[-2]}': " in err
+    assert words.split()[-1] in err
+    assert said in err
+    for python in ("Input should", "valid integer", "valid number", "float", "parse string"):
+        assert python not in err
