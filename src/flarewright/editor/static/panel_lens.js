@@ -19,7 +19,7 @@ export function lensPanel(app) {
   const table = h('table', { class: 'rows', style: 'table-layout:fixed' }, h('colgroup', {}, ...WIDTHS.map((width) => h('col', { style: width ? `width:${width}` : '' }))), h('thead', {}, head), body);
   const wrong = h('div', { class: 'wrong', role: 'alert' });
   // in sight however long the table is
-  const notes = h('div', { class: 'group quietly', style: 'min-height:40px;position:sticky;bottom:0;background:var(--panel)' });
+  const notes = h('div', { class: 'group quietly notes' });
   const glasses = h('datalist', { id: 'glasses' });
   const facts = h('div', { class: 'facts' });
   const source = h('p', { class: 'quietly' });

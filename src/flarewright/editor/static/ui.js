@@ -19,14 +19,32 @@ export function refill(parent, children) {
   if (before >= 0) parent.children[Math.min(before, parent.children.length - 1)]?.focus({ preventScroll: true });
 }
 
+// Places as near as can be to the wanted ones for things in a row that have widths: what would meet stands in a cluster
+// around its own middle (isotonic regression of what is left of a place once those before it have theirs).
+export function spread(wanted, widths) {
+  const before = widths.map((width, k) => widths.slice(0, k).reduce((sum, each) => sum + each, 0) + width / 2);
+  const clusters = [];
+  wanted.forEach((place, k) => {
+    clusters.push({ mean: place - before[k], count: 1 });
+    while (clusters.length > 1 && clusters.at(-2).mean > clusters.at(-1).mean) {
+      const [one, other] = clusters.splice(-2);
+      const count = one.count + other.count;
+      clusters.push({ mean: (one.count * one.mean + other.count * other.mean) / count, count });
+    }
+  });
+  return clusters.flatMap(({ mean, count }) => Array(count).fill(mean)).map((place, k) => place + before[k]);
+}
+
 let strokes = 0;
 export const stroke = () => `s${Date.now().toString(36)}${strokes++}`;
 
 export function toast(text, kind = 'info', lasting = kind === 'error' ? 9000 : 4500) {
   const box = h('div', { class: `toast ${kind}`, onclick: () => box.remove() }, text);
   const shelf = document.getElementById('toasts');
+  // what is said again stands there once, and no more than can be read
+  for (const each of [...shelf.children]) if (each.textContent === box.textContent) each.remove();
   shelf.append(box);
-  while (shelf.children.length > 4) shelf.firstChild.remove();
+  while (shelf.children.length > 3) shelf.firstChild.remove();
   setTimeout(() => box.remove(), lasting);
 }
 
@@ -125,15 +143,21 @@ export function choice({ label, tip, get, set, options, name }) {
   return element;
 }
 
-export function tick({ label, tip, get, set, name }) {
+// `off` says why it cannot be ticked; empty: it can.
+export function tick({ label, tip, get, set, name, off = () => '' }) {
   const box = h('input', { type: 'checkbox', name });
+  const why = h('span', { class: 'unit' });
   // until the server has answered, it stays as the hand left it
   let asked = 0;
   box.addEventListener('change', async () => {
     asked += 1;
     try { await set(box.checked); } finally { asked -= 1; }
   });
-  return row(label, tip, [box], (state) => { if (!asked) box.checked = Boolean(get(state)); });
+  return row(label, tip, [box, why], (state) => {
+    if (!asked) box.checked = Boolean(get(state));
+    why.textContent = off(state);
+    box.disabled = Boolean(why.textContent);
+  });
 }
 
 export const button = (words, work, { tip, kind = '', ...rest } = {}) =>
