@@ -1,6 +1,7 @@
 // The page: one state from the server, drawn by panels; every change is a deed that the server does or refuses.
-import { complain, get, latest, post, sentence, under } from './api.js';
-import { button, dialog, h, menu, spread, stroke, tips, toast, slider } from './ui.js';
+import { complain, get, inWords, latest, post, sentence, under } from './api.js';
+import { fitted } from './section.js';
+import { button, dialog, h, menu, stroke, tips, toast, slider } from './ui.js';
 import { viewport } from './viewport.js';
 import { coatingPanel } from './panel_coating.js';
 import { ghostPanel } from './panel_ghosts.js';
@@ -166,55 +167,10 @@ const drawSection = latest(async () => {
   if (!answer.ok) { told.replaceChildren(...facts(app.state)); return; }
   const found = await answer.json();
   drawing.innerHTML = found.svg;
-  trim(drawing.firstElementChild);
+  if (found.svg) fitted(drawing.firstElementChild, drawing.clientWidth - 20, drawing.clientHeight - 4);
   told.replaceChildren(...facts(app.state), ...(ghost ? [h('span', {}, found.told ? 'ghost ' : 'rays of ghost ', h('b', {}, ghost), found.told ? `: ${found.told}` : '')] : []));
 });
-// The drawing's own headline and foot stand in the head of this strip already.
-function trim(svg) {
-  if (!svg) return;
-  const [, , width, height] = svg.getAttribute('viewBox').split(' ').map(Number);
-  svg.querySelectorAll('text').forEach((text) => { if (Number(text.getAttribute('y')) < 30) text.remove(); });
-  svg.querySelector('title')?.remove();
-  svg.querySelector('rect[width="100%"]')?.remove();
-  svg.removeAttribute('width');
-  svg.removeAttribute('height');
-  svg.querySelectorAll('text').forEach((text) => { if (Number(text.getAttribute('y')) > height - 30) text.remove(); });
-  svg.querySelectorAll('line').forEach((each) => { if (Number(each.getAttribute('y1')) > height - 30) each.remove(); });
-  // as large as the strip allows
-  const names = [...svg.querySelectorAll('text')];
-  names.forEach((text) => text.remove());
-  const box = svg.getBBox();
-  const clip = svg.querySelector('clipPath rect');
-  const top = Math.max(box.y, clip ? Number(clip.getAttribute('y')) : 0);
-  const low = Math.min(box.y + box.height, clip ? Number(clip.getAttribute('y')) + Number(clip.getAttribute('height')) : height);
-  const [left, wide] = [Math.max(0, box.x) - 4, Math.min(box.width, width) + 8];
-  // row numbers are as large as all other words, whatever the scale; those of close rows spread, each with a line to
-  // its row
-  const [across, down] = [drawing.clientWidth - 20, drawing.clientHeight - 4];
-  const widths = names.map((text) => 7 * text.textContent.length + 4);
-  // where the strip is narrower than they are together, some are left out
-  const every = Math.ceil(widths.reduce((sum, each) => sum + each, 0) / across);
-  const some = (_, k) => k % every === 0;
-  const fits = names.filter(some);
-  const rows = fits.map((text) => Number(text.getAttribute('x')));
-  const placed = (scale) => spread(rows.map((x) => x * scale), widths.filter(some));
-  const scaled = (numbers) => Math.min(across / wide, (down - numbers) / (low - top + 6));
-  // the farther they are from their rows, the longer are the lines
-  const away = Math.max(0, ...placed(scaled(20)).map((place, k) => Math.abs(place - rows[k] * scaled(20))));
-  const leads = Math.min(26, 4 + 0.3 * away);
-  const scale = scaled(11 + leads);
-  const [foot, over] = [top - 2 - leads / scale, (11 + leads) / scale];
-  placed(scale).forEach((place, k) => {
-    const lead = document.createElementNS(svg.namespaceURI, 'line');
-    Object.entries({ class: 'lead', x1: place / scale, y1: foot + 2 / scale, x2: rows[k], y2: top - 1, 'stroke-width': 0.7 / scale }).forEach(([key, value]) => lead.setAttribute(key, value));
-    fits[k].setAttribute('x', place / scale);
-    fits[k].setAttribute('y', foot);
-    fits[k].style.fontSize = `${10.5 / scale}px`;
-    svg.append(lead, fits[k]);
-  });
-  svg.setAttribute('viewBox', `${left} ${top - 2 - over} ${wide} ${low - top + 4 + over}`);
-}
-export function facts(state) {
+function facts(state) {
   const { facts: f, name } = state.lens;
   const say = (label, value, digits, unit = '') => (value === undefined ? [] : [h('span', {}, `${label} `, h('b', {}, `${Number(value.toPrecision(digits))}${unit}`))]);
   return [h('b', { title: name }, name), ...say('focal length', f.efl, 5, ' mm'), ...say('f/', f.f_number, 3), ...say('back focus', f.bfl, 5, ' mm')];
@@ -294,15 +250,18 @@ function asking(title, words, value, path, done = () => {}) {
   const form = h('form', {}, h('p', { class: 'quietly' }, words), box, wrong, h('div', { class: 'buttons', style: 'justify-content:end;margin-top:10px' },
     button('Cancel', () => window_.close()), h('button', { class: 'main', type: 'submit' }, title)));
   const window_ = dialog(title, form);
+  let busy = false;
   form.addEventListener('submit', async (event) => {
     event.preventDefault();
-    if (!box.value.trim()) return;
+    if (busy || !box.value.trim()) return;
+    busy = true;
     try {
       const state = await post(path, { text: box.value.trim() });
       take(state);
       window_.close();
       done(state);
-    } catch (error) { wrong.textContent = sentence(error.message); }
+    } catch (error) { wrong.textContent = inWords(error); }
+    busy = false;
   });
   box.focus(); box.select();
 }

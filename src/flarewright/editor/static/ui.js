@@ -19,22 +19,6 @@ export function refill(parent, children) {
   if (before >= 0) parent.children[Math.min(before, parent.children.length - 1)]?.focus({ preventScroll: true });
 }
 
-// Places as near as can be to the wanted ones for things in a row that have widths: what would meet stands in a cluster
-// around its own middle (isotonic regression of what is left of a place once those before it have theirs).
-export function spread(wanted, widths) {
-  const before = widths.map((width, k) => widths.slice(0, k).reduce((sum, each) => sum + each, 0) + width / 2);
-  const clusters = [];
-  wanted.forEach((place, k) => {
-    clusters.push({ mean: place - before[k], count: 1 });
-    while (clusters.length > 1 && clusters.at(-2).mean > clusters.at(-1).mean) {
-      const [one, other] = clusters.splice(-2);
-      const count = one.count + other.count;
-      clusters.push({ mean: (one.count * one.mean + other.count * other.mean) / count, count });
-    }
-  });
-  return clusters.flatMap(({ mean, count }) => Array(count).fill(mean)).map((place, k) => place + before[k]);
-}
-
 let strokes = 0;
 export const stroke = () => `s${Date.now().toString(36)}${strokes++}`;
 
