@@ -83,6 +83,8 @@ def panels(tab: Tab, folder: Path) -> None:
     tab.until("flarewright.state.solve.running")
     tab.until("!flarewright.state.solve.running")
     tab.until("[...document.querySelectorAll('.candidates img')].every(i => i.naturalWidth > 0)")
+    # the lenses that were found stand below what was asked for
+    tab.page.evaluate("() => { document.getElementById('page').scrollTop = 300; }")
     shoot(tab, folder / "editor-target.jpg")
     tab.tab("library")
     # every flare is drawn once

@@ -243,6 +243,32 @@ def test_a_taken_port_is_told(capsys):
     assert "another --port" in " ".join(capsys.readouterr().err.split())
 
 
+def test_nothing_is_searched_where_nothing_is_wished(desk):
+    for path, said in (("/api/solve", "nothing is wished for yet"), ("/api/colors", "no colour is wished for yet")):
+        code, answer = told(desk, path, {})
+        assert (code, answer["error"].startswith(said)) == (400, True)
+        assert "choose a ghost" in answer["error"]
+    assert not desk.solver.progress.running
+
+
+def test_an_address_that_can_be_opened_is_told(monkeypatch, capsys):
+    """0.0.0.0 is where a server listens, and nowhere that a browser can go."""
+    from flarewright.cli import edit
+    from flarewright.editor import server
+
+    monkeypatch.setattr(server, "serve", lambda desk, host, port, token, ready: ready(8123))
+    for known, elsewhere in (("198.51.100.7", "198.51.100.7"), (None, "box")):
+        monkeypatch.setattr(edit, "_own_address", lambda beyond, known=known: known)
+        monkeypatch.setattr("socket.gethostname", lambda: "box")
+        assert run(["edit", "--no-browser", "--host", "0.0.0.0", "--token", "eight & more"]) == 0
+        here, there = capsys.readouterr().err.splitlines()
+        assert here.split()[5] == "http://127.0.0.1:8123/?token=eight%20%26%20more"
+        assert there.split()[-1] == f"http://{elsewhere}:8123/?token=eight%20%26%20more"
+    assert run(["edit", "--no-browser", "--port", "0"]) == 0
+    assert "http://127.0.0.1:8123/  (" in capsys.readouterr().err
+    assert edit.hosts("::")[0] == "::1"
+
+
 def test_posts_are_spoken_for():
     assert {"/api/do", "/api/undo", "/api/redo", "/api/import", "/api/solve", "/api/accept"} <= set(_POST)
 

@@ -1,5 +1,7 @@
 """The path of a light, what hides lights, chosen pictures, and two editors beside each other; without a browser."""
 
+import os
+
 import numpy as np
 import pytest
 
@@ -105,8 +107,12 @@ def test_two_editors_of_one_project_do_not_fight(tmp_path):
     first.do("set_iris", {"values": {"blades": 8}})
     second.do("set_iris", {"values": {"blades": 5}})
     path = first.save(str(tmp_path / "shot.toml"))
-    # the second one saved over it under the same name, which the first is told once
+    # the second one is told that there is a file of that name, and may save over it all the same
+    with pytest.raises(ProjectError, match=r"shot.toml is there already; save again to overwrite it, or .* another"):
+        second.save(str(path))
+    assert read_project(path).iris.blades == 8
     second.save(str(path))
+    # which the first is told once
     first.do("set_iris", {"values": {"blades": 9}})
     with pytest.raises(ProjectError, match=r"shot.toml was changed by another program .* save again to overwrite it"):
         first.save(str(path))
@@ -124,6 +130,40 @@ def test_two_editors_of_one_project_do_not_fight(tmp_path):
     assert [one.history.present.iris.blades for one in (again, beside)] == [11, 7]
     again.keeper.close()
     beside.keeper.close()
+
+
+def test_what_others_saved_meanwhile_is_never_overwritten_unasked(tmp_path):
+    """Neither by a session that was cut off, nor after undo of Open, nor where the clock tells no change."""
+    one, two = begin("tessar-brendel")[0], begin("heliar-tronnier")[0]
+    path, other = one.save(str(tmp_path / "shot.toml")), two.save(str(tmp_path / "other.toml"))
+    two.keeper.close()
+    one.do("set_iris", {"values": {"blades": 9}})
+    one.open(str(other))
+    one.do("set_iris", {"values": {"blades": 7}})
+    one.keeper.close()
+    times = path.stat()
+    path.write_text(
+        path.read_text().replace("blades = ", "rotation_deg = 5.0\nblades = ", 1).replace("\nrotation_deg = 0.0", "")
+    )
+    changed = path.read_text()
+    os.utime(path, ns=(times.st_atime_ns, times.st_mtime_ns))
+    again = begin("tessar-brendel")[0]
+    assert (again.file, again.clean) == (str(other), False)
+    # what is there was saved by this session: nothing to ask
+    again.save(str(other))
+    for _ in range(2):
+        again.undo()
+    assert (again.file, again.project.iris.blades) == (str(path), 9)
+    with pytest.raises(ProjectError, match=r"shot.toml was changed by another program since it was opened or saved"):
+        again.save(str(path))
+    # it changes once more before the next try
+    path.write_text(changed.replace("rotation_deg = 5.0", "rotation_deg = 6.0"))
+    with pytest.raises(ProjectError, match="save again to overwrite"):
+        again.save(str(path))
+    assert read_project(path).iris.rotation_deg == 6.0
+    again.save(str(path))
+    assert read_project(path).iris.blades == 9
+    again.keeper.close()
 
 
 def test_without_a_place_for_its_state_the_editor_works_all_the_same(tmp_path, monkeypatch):

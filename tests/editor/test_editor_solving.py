@@ -4,11 +4,14 @@ import threading
 import time
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from flarewright.editor import solving
 from flarewright.editor.solving import Solver
+from flarewright.errors import ProjectError
 from flarewright.model import Design, GhostWish, Light
+from flarewright.render.prepare import as_lens
 
 
 class _Session:
@@ -30,7 +33,7 @@ def test_what_no_lens_can_do_is_told(project, monkeypatch, possible):
     solver.start(0.1)
     solver._thread.join(60.0)
     assert not solver.progress.running
-    assert solver.progress.words.startswith("No lens was found" if possible else "No lens can do that: wish 0")
+    assert solver.progress.words.startswith("No lens was found" if possible else "No lens can do that: added ghost 1")
 
 
 def test_a_search_that_gets_ready_is_stopped_at_once(project, monkeypatch):
@@ -55,6 +58,44 @@ def test_a_search_that_gets_ready_is_stopped_at_once(project, monkeypatch):
     solver._thread.join(60.0)
     assert searched == [1]
     assert solver.progress.words.startswith("No lens was found")
+
+
+def test_lenses_are_told_in_words_and_the_best_comes_first(project, monkeypatch):
+    """What a person reads beside them is what orders them: the largest error."""
+
+    def found(state, problem, *, name, **_):
+        names = problem.objective.names
+        at = {one: np.zeros((len(names), 2)) for one in ("far", "near", "met")}
+        at["far"][names.index("wish 1")] = 0.1, -2.0
+        at["near"][names.index("8-6")] = 0.25, 0.1
+        # summed up it is worse than the one before
+        at["near"] += 0.2
+        return tuple(
+            SimpleNamespace(lens=as_lens(project.lens).replace(name=f"{name} 7"), residuals=at[one], breaks=(), lost=())
+            for one in ("far", "met", "near")
+        )
+
+    monkeypatch.setattr(solving, "compile_kernels", lambda picture: None)
+    monkeypatch.setattr(solving, "solve", lambda *_, **__: SimpleNamespace(searches=3, seconds=0.1))
+    monkeypatch.setattr(solving, "outcomes", found)
+    wishes = (GhostWish(ghost="8-6", move_mm=1.0), GhostWish(place_mm=1.0, radius_mm=1.0))
+    solver = Solver(_Session(project.replace(design=Design(wishes=wishes))))
+    solver.start(0.1)
+    solver._thread.join(60.0)
+    words = [one.words for one in solver.progress.found]
+    assert [one.partition("; ")[0] for one in words] == [f"Lens {k}: 8 surfaces, 99.2 mm f/3.5" for k in (1, 2, 3)]
+    assert words[0].endswith("by 0 mm")
+    assert "; met, ghost " in words[0]
+    assert words[1].endswith("; not met, ghost 8-6 is farthest off, by 0.45 mm")
+    assert words[2].endswith("; not met, added ghost 1 is farthest off, by 2 mm")
+    assert [one.changes["lens"].name[-1] for one in solver.progress.found] == ["1", "2", "3"]
+
+
+def test_a_colour_for_a_new_ghost_is_refused_in_the_pages_words(project):
+    wishes = (GhostWish(ghost="8-6", color=(1.0, 0.2, 0.1)), GhostWish(place_mm=1.0, radius_mm=1.0))
+    solver = Solver(_Session(project.replace(design=Design(wishes=wishes))))
+    with pytest.raises(ProjectError, match=r"^added ghost 1 is for a new ghost; colours are chosen for"):
+        solver.start_colors("quarter-wave")
 
 
 def test_colours_that_are_found_keep_the_shot_as_it_is(project):

@@ -10,7 +10,7 @@ from flarewright.editor.autosave import Saved, autosave_path, read_autosave, wri
 from flarewright.editor.deeds import DEEDS, done
 from flarewright.editor.edit_ghosts import Hand, hand, soloed
 from flarewright.editor.edit_lens import own_lens, prescription, table_of
-from flarewright.editor.edit_wishes import direction, new_discs, target_project
+from flarewright.editor.edit_wishes import direction, new_discs, target_project, wish_names
 from flarewright.editor.jobs import Gate, Lane
 from flarewright.editor.session import begin
 from flarewright.editor.view import View
@@ -368,6 +368,15 @@ def test_mute_solo_gain_and_tint_are_rules_that_can_be_taken_back(project):
     assert do(muted, "reset_art") == project
 
 
+def test_from_scratch_needs_a_ghost_that_was_added(project):
+    with pytest.raises(FlarewrightError, match="there is none yet: add a ghost first"):
+        do(project, "set_design", values={"own_ghosts": False, "structure": "any"})
+    added = do(do(project, "add_ghost", place_mm=5.0, radius_mm=1.0), "set_design", values={"own_ghosts": False})
+    assert added.design.own_ghosts is False
+    # the last of them can be taken back all the same
+    assert do(added, "remove_wish", number=0).design.own_ghosts is True
+
+
 def test_wishes_make_the_target(project):
     wished = do(project, "set_wish", ghost="4-1", values={"move_mm": 2.0, "height": 0.5})
     wished = do(wished, "set_wish", ghost="8-6", values={"action": "remove"})
@@ -384,6 +393,11 @@ def test_wishes_make_the_target(project):
     assert do(new, "set_new_wish", number=2, values={"radius_mm": 2.0}).design.wishes[2].radius_mm == 2.0
     assert len(do(new, "remove_wish", number=0).design.wishes) == 2
     assert do(new, "set_design", values={"structure": "any"}).design.structure == "any"
+    # one that is changed keeps its place in the list
+    again = do(new, "set_wish", ghost="4-1", values={"move_mm": 3.0})
+    assert [wish.ghost for wish in again.design.wishes] == ["4-1", "8-6", None]
+    assert do(again, "set_wish", ghost="4-1", values={"move_mm": 0.0, "height": 1.0}).design.wishes[0].ghost == "8-6"
+    assert wish_names(again.design) == ("ghost 4-1", "ghost 8-6", "added ghost 1")
     assert do(new, "clear_wishes").design is None
     with pytest.raises(FlarewrightError, match="crosses the stop"):
         do(project, "set_wish", ghost="8-0", values={"move_mm": 1.0})

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import socket
 from importlib.util import find_spec
 from typing import Annotated
+from urllib.parse import quote
 
 import typer
 
@@ -18,6 +20,9 @@ EPILOG = (
 # of the extra ui
 NEEDED = ("starlette", "uvicorn", "websockets")
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
+# addresses that mean all of this machine's: the one of them to open here, and one that lies beyond any network, to ask
+# the system by which of its own it would go there (nothing is sent)
+EVERYWHERE = {"0.0.0.0": ("127.0.0.1", "192.0.2.1"), "::": ("::1", "2001:db8::1")}
 
 
 def edit(
@@ -48,11 +53,12 @@ def edit(
     from ..editor.session import begin
 
     session, greeting = begin(what)
-    shown = f"[{host}]" if ":" in host else host
 
     def ready(found: int) -> None:
-        address = f"http://{shown}:{found}/" + (f"?token={token}" if token else "")
+        here, *elsewhere = hosts(host)
+        address = _address(here, found, token)
         tell([f"the editor is at {address}  (Ctrl-C ends it)"])
+        tell(f"from other machines it is at {_address(name, found, token)}" for name in elsewhere)
         if not no_browser:
             import threading
             import webbrowser
@@ -61,3 +67,37 @@ def edit(
             threading.Timer(0.3, webbrowser.open, [address]).start()
 
     serve(Desk(session, greeting), host, port, token, ready)
+
+
+def hosts(host: str) -> tuple[str, ...]:
+    """Return by which addresses a server that listens on `host` can be opened: from this machine first.
+
+    Parameters
+    ----------
+    host : str
+
+    Returns
+    -------
+    tuple of str
+        One where it is the same for all.
+    """
+    if host not in EVERYWHERE:
+        return (host,)
+    here, beyond = EVERYWHERE[host]
+    return here, _own_address(beyond) or socket.gethostname()
+
+
+def _own_address(beyond: str) -> str | None:
+    """Return this machine's address towards another one; None without a network."""
+    family = socket.AF_INET6 if ":" in beyond else socket.AF_INET
+    try:
+        with socket.socket(family, socket.SOCK_DGRAM) as probe:
+            probe.connect((beyond, 9))
+            return str(probe.getsockname()[0])
+    except OSError:
+        return None
+
+
+def _address(host: str, port: int, token: str | None) -> str:
+    shown = f"[{host}]" if ":" in host else host
+    return f"http://{shown}:{port}/" + (f"?token={quote(token, safe='')}" if token else "")

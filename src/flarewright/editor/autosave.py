@@ -6,7 +6,7 @@ import hashlib
 import json
 import os
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -35,12 +35,15 @@ class Saved:
         The project file that is edited.
     clean : bool
         Whether that file holds the present project.
+    stamps : dict of str to str
+        What project files held when they were opened or saved here last (`files.stamp_of`).
     """
 
     history: History
     view: View
     file: str | None
     clean: bool
+    stamps: dict[str, str] = field(default_factory=dict)
 
 
 def state_folder() -> Path:
@@ -80,6 +83,7 @@ def write_autosave(path: Path, saved: Saved) -> None:
     moments = saved.history.moments[first : first + KEPT]
     data = {
         "version": VERSION, "file": saved.file, "clean": saved.clean, "at": saved.history.at - first,
+        "stamps": saved.stamps,
         "view": saved.view.model_dump(mode="json"),
         "moments": [
             {"label": m.label, "group": m.group, "file": m.file, "project": m.project.model_dump(mode="json")}
@@ -105,7 +109,8 @@ def read_autosave(path: Path) -> Saved | None:
         at = int(data["at"])
         if not 0 <= at < len(moments):
             return None
-        return Saved(History(moments, at), View.model_validate(data["view"]), data["file"], bool(data["clean"]))
+        view = View.model_validate(data["view"])
+        return Saved(History(moments, at), view, data["file"], bool(data["clean"]), dict(data.get("stamps", {})))
     except (OSError, ValueError, KeyError, TypeError, ValidationError, FlarewrightError):
         # a damaged autosave must not keep the editor from starting
         return None

@@ -20,7 +20,7 @@ from ..model.design import Bounds
 from ..optics.coating_response import WAVELENGTHS_NM, coating_response
 from ..optics.dispersion import refractive_index
 from ..optics.pack import resolve_coatings
-from ..render.coating_plot import PLOT_ANGLES_DEG, STRIP_ANGLES_DEG, coating_figure
+from ..render.coating_plot import PANEL, PLOT_ANGLES_DEG, STRIP_ANGLES_DEG, coating_figure
 from ..render.cross_section import cross_section
 from ..render.figure import to_svg
 from ..render.prepare import as_lens, load_lens, settle
@@ -55,9 +55,9 @@ def section(project: Project, ghost: str | None) -> Section:
     angle = max(project.lights, key=lambda light: light.intensity).field_deg
     drawn = cross_section(settled.lens, settled.order, field_deg=angle, ghost=pair, iris=settled.iris)
     if len(names) > 2:
-        return Section(drawn.svg, "rays are drawn of ghosts that reflect twice")
+        return Section(drawn.svg, "four reflections, whose rays are not drawn")
     missing = pair is not None and any("the ghost" in remark for remark in drawn.remarks)
-    return Section(drawn.svg, "none of its rays crosses the lens in this plane" if missing else "")
+    return Section(drawn.svg, "no ray of it lies in this plane" if missing else "")
 
 
 def coating_svg(project: Project, row: int) -> str:
@@ -76,7 +76,8 @@ def coating_svg(project: Project, row: int) -> str:
     strip = coating_response(coat, medium.n_d, index, STRIP_ANGLES_DEG)
     bare = float(coating_response(None, medium.n_d, index, 0.0).luminous_reflectance[0])
     name = "no coating" if coat is None else format_coating(coat)
-    return to_svg(coating_figure(curves, strip, bare, f"Row {row}: {name}", medium.glass or f"n = {medium.n_d:g}"))
+    glass = medium.glass or f"n = {medium.n_d:g}"
+    return to_svg(coating_figure(curves, strip, bare, f"Row {row}: {name}", glass, PANEL))
 
 
 def colour_map(project: Project, ghost: str) -> bytes:

@@ -42,9 +42,12 @@ def set_wish(project: Project, ghost: str, values: dict[str, Any]) -> Project:
         )
     wish = (wish_of(project, ghost) or GhostWish(ghost=ghost)).replace(**values)
     design = project.design or Design(structure="lens")
-    others = tuple(each for each in design.wishes if each.ghost != ghost)
-    wishes = others if wish == GhostWish(ghost=ghost) else (*others, wish)
-    return _with(project, design, wishes)
+    # one that is changed keeps its place, so that the list on the page stands still
+    numbers = {each.ghost: number for number, each in enumerate(design.wishes)}
+    wishes = list(design.wishes)
+    place = slice(numbers.get(ghost, len(wishes)), numbers.get(ghost, len(wishes)) + 1)
+    wishes[place] = [] if wish == GhostWish(ghost=ghost) else [wish]
+    return _with(project, design, tuple(wishes))
 
 
 def add_ghost(project: Project, place_mm: float, radius_mm: float) -> Project:
@@ -76,6 +79,10 @@ def set_new_wish(project: Project, number: int, values: dict[str, Any]) -> Proje
 def set_design(project: Project, values: dict[str, Any]) -> Project:
     """Change how lenses are looked for: structure, signed, surfaces."""
     design = project.design or Design()
+    if values.get("own_ghosts") is False and not _any_new(design.wishes):
+        raise ProjectError(
+            "from scratch only the ghosts that were added count, and there is none yet: add a ghost first"
+        )
     if values.get("structure") == "any":
         values = {**values, "fixed_rows": ()}
     return _with(project, design.replace(**values), design.wishes)
@@ -87,7 +94,23 @@ def clear_wishes(project: Project) -> Project:
     return changed
 
 
+def wish_names(design: Design) -> tuple[str, ...]:
+    """Return what a person calls the ghost of each wish: the lens' own by its rows, new ones in the order they came."""
+    names, new = [], 0
+    for wish in design.wishes:
+        new += wish.ghost is None
+        names.append(f"added ghost {new}" if wish.ghost is None else f"ghost {wish.ghost}")
+    return tuple(names)
+
+
+def _any_new(wishes: tuple[GhostWish, ...]) -> bool:
+    return any(wish.ghost is None for wish in wishes)
+
+
 def _with(project: Project, design: Design, wishes: tuple[GhostWish, ...]) -> Project:
+    if not _any_new(wishes):
+        # without the last ghost that was added there is nothing to begin from scratch for
+        design = design.replace(own_ghosts=True)
     changed: Project = project.replace(design=design.replace(wishes=wishes))
     return changed
 

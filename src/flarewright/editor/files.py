@@ -172,6 +172,14 @@ def project_path(text: str) -> Path:
     return (path if path.suffix.lower() == ".toml" else path.with_name(f"{path.name}.toml")).resolve()
 
 
+def stamp_of(path: str | Path) -> str | None:
+    """Return what tells the contents of a file from others; None where none can be read."""
+    try:
+        return hashlib.sha256(Path(path).read_bytes()).hexdigest()
+    except OSError:
+        return None
+
+
 def save_project(project: Project, text: str) -> Path:
     """Write a project file.
 

@@ -16,7 +16,7 @@ from . import history as past
 from .autosave import Saved, autosave_path, read_autosave
 from .deeds import done
 from .edit_lens import sentence, table_of
-from .files import open_any, project_path, sample_project, save_project
+from .files import open_any, project_path, sample_project, save_project, stamp_of
 from .keeper import Keeper, claim
 from .view import View
 
@@ -40,8 +40,11 @@ class Session:
         self.revision = 0
         self.listeners: list[Listener] = []
         self.keeper = keeper
-        # when project files were changed as far as this session knows
-        self._stamps = {self.file: _changed_ns(self.file)}
+        # what project files held when they were opened or saved here last, and what was found there instead
+        self._stamps = dict(saved.stamps)
+        if self.file is not None and self.file not in self._stamps:
+            self._stamp(self.file, stamp_of(self.file))
+        self._refused: tuple[Path, str] | None = None
 
     @property
     def file(self) -> str | None:
@@ -108,30 +111,40 @@ class Session:
         Raises
         ------
         FlarewrightError
-            It cannot be written, or another program has changed it since it was read; then the next try overwrites.
+            It cannot be written, or it would overwrite what this session has neither opened nor saved there; then the
+            next try does.
         """
         with self.lock:
-            place = project_path(text)
-            now = _changed_ns(self.file)
-            if str(place) == self.file and now not in (None, self._stamps.get(self.file, now)):
-                self._stamps[self.file] = now
-                raise ProjectError(
-                    f"{place.name} was changed by another program since it was opened here; save again to overwrite "
-                    "it, or save under another name"
-                )
+            self._spare(project_path(text))
             path = save_project(self.project, text)
             self.history, self.clean = past.filed(self.history, str(path)), True
-            self._stamps[self.file] = _changed_ns(self.file)
+            self._stamp(str(path), stamp_of(path))
+            self._refused = None
             self._changed()
             return path
+
+    def _spare(self, place: Path) -> None:
+        """Refuse once to overwrite the work of others."""
+        there, own = stamp_of(place), str(place) == self.file
+        if there is None or self._refused == (place, there) or (own and self._stamps.get(str(place), there) == there):
+            return
+        self._refused = place, there
+        why = "was changed by another program since it was opened or saved here" if own else "is there already"
+        raise ProjectError(f"{place.name} {why}; save again to overwrite it, or save under another name")
+
+    def _stamp(self, file: str, stamp: str | None) -> None:
+        if stamp is not None:
+            self._stamps[file] = stamp
 
     def open(self, text: str) -> None:
         """Open another project or lens; undo leads back."""
         with self.lock:
+            before = stamp_of(Path(text).expanduser())
             project, file = open_any(text)
             self.history = past.committed(self.history, project, f"Open {Path(text).name}", file=file)
             self.clean = file is not None
-            self._stamps[file] = _changed_ns(file)
+            if file is not None:
+                self._stamp(file, before)
             self._changed()
 
     def _move(self, history: past.History) -> None:
@@ -145,17 +158,9 @@ class Session:
         self.tell({"type": "changed"})
 
     def _keep_it(self) -> None:
-        saved = Saved(self.history, self.view, self.file, self.clean)
+        saved = Saved(self.history, self.view, self.file, self.clean, dict(self._stamps))
         warning = {"type": "message", "kind": "warning"}
         self.keeper.keep(saved, lambda why: self.tell(warning | {"text": f"The autosave failed: {why}"}))
-
-
-def _changed_ns(file: str | None) -> int | None:
-    """Return when a file was last changed; None where there is none."""
-    try:
-        return None if file is None else Path(file).stat().st_mtime_ns
-    except OSError:
-        return None
 
 
 def begin(what: str | None) -> tuple[Session, str]:
@@ -196,8 +201,10 @@ def _begun(saved: Saved | None, given: tuple[Project, str | None] | None, keeper
         return Session(saved, keeper), told
     if given is None and saved is not None and saved.file is not None and Path(saved.file).is_file():
         # what was saved may have been changed by other programs since
+        stamps = {name: stamp for name, stamp in saved.stamps.items() if name != saved.file}
         project, file = open_any(saved.file)
-        return Session(replace(saved, history=past.committed(saved.history, project, "Open", file=file)), keeper), ""
+        history = past.committed(saved.history, project, "Open", file=file)
+        return Session(replace(saved, history=history, stamps=stamps), keeper), ""
     project, file = (sample_project(), None) if given is None else given
     view = View() if saved is None else saved.view.replace(found_stops=None)
     fresh = Saved(past.begun(project, file=file), view, file, clean=file is not None)

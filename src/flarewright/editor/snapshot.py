@@ -12,7 +12,7 @@ from .edit_ghosts import hand, soloed
 from .edit_lens import prescription, table_of
 from .edit_path import length_s
 from .edit_shot import coating_text
-from .edit_wishes import direction
+from .edit_wishes import direction, wish_names
 from .screen import Screen
 from .shown import aces_available
 from .solving import Solver
@@ -135,7 +135,7 @@ def _design(project: Project) -> dict[str, Any] | None:
     design = project.design
     if design is None:
         return None
-    return design.model_dump(mode="json", exclude={"bounds"})
+    return design.model_dump(mode="json", exclude={"bounds"}) | {"names": list(wish_names(design))}
 
 
 def ghosts_of(screen: Screen) -> dict[str, Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import threading
 import time
 from collections.abc import Callable
@@ -9,7 +10,7 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
 
-from ..design.candidate import outcomes
+from ..design.candidate import Outcome, outcomes
 from ..design.color_search import solve_colors
 from ..design.colors import coated, color_problem
 from ..design.hunt import until
@@ -19,9 +20,10 @@ from ..design.problem import Over, Problem
 from ..design.report import verdict
 from ..design.search import State, solve
 from ..design.target import problem_of
-from ..errors import FlarewrightError
-from ..model import AsLens, PerRow, Project, Surface
-from .edit_wishes import clear_wishes
+from ..errors import FlarewrightError, ProjectError
+from ..model import AsLens, Design, Lens, PerRow, Project, Surface
+from ..render.prepare import first_order
+from .edit_wishes import clear_wishes, wish_names
 from .session import Session
 from .shown import jpeg, pixels_of
 from .studio import Match as Held
@@ -33,6 +35,9 @@ LOOK_EVERY_S = 1.0
 THUMB_SCALE = 0.4
 
 GETTING_READY = "Getting ready; the first search of a machine takes a minute more"
+HOW_WELL = {"met": "met", "nearly": "nearly met"}
+# a wish as messages of design count it
+_COUNTED = re.compile(r"design\.wishes\[(\d+)\]|\bwish (\d+)\b")
 
 
 @dataclass(frozen=True)
@@ -88,17 +93,26 @@ class Solver:
 
     def start(self, seconds: float) -> None:
         """Begin to search lenses for the project's wishes; what cannot be searched for is refused at once."""
-        self.stop()
         project = self.session.project
-        problem, settled = problem_of(project)
+        wishes = () if project.design is None else project.design.wishes
+        if not wishes:
+            raise ProjectError(
+                "nothing is wished for yet, so there is nothing to search: choose a ghost and say what it shall be, or "
+                "add one, then solve"
+            )
+        self.stop()
+        problem, settled = _in_words(problem_of, project)
         self._begin(partial(self._search, project, problem, settled.lens.name, seconds))
 
     def start_colors(self, kind: str) -> None:
         """Begin to search coatings for the wished colours."""
-        self.stop()
         project = self.session.project
+        wishes = () if project.design is None else project.design.wishes
+        if all(wish.color is None for wish in wishes):
+            raise ProjectError("no colour is wished for yet: choose a ghost, give it a colour, then solve for colours")
+        self.stop()
         films: Any = "film" if kind == "film" else "quarter-wave"
-        problem, lens = color_problem(project, films)
+        problem, lens = _in_words(partial(color_problem, kind=films), project)
 
         def work(_: threading.Event, ready: threading.Event) -> None:
             ready.set()
@@ -106,7 +120,7 @@ class Solver:
             new = coated(lens, problem.structure, films, found.values)
             # the glass stays as it was, and so do opening and zoom
             worn = tuple(row.coating if isinstance(row, Surface) else None for row in new.rows)
-            words = "Coatings for the wished colours"
+            words = "This lens, with coatings for the wished colours"
             changes = {"lens": project.lens, "coating": PerRow(coatings=worn)}
             self._tell(False, words, 0.0, (_found(project, changes, words),))
 
@@ -169,7 +183,8 @@ class Solver:
         told = f"{len(found)} lenses of {state.searches} tries" if found else "No lens was found; search longer"
         proven = obstacles(problem, project)
         if proven:
-            told = f"No lens can do that: {' '.join(f'{one.target}: {one.reason}' for one in proven)} ({told})"
+            why = " ".join(f"{one.target}: {one.reason}" for one in proven)
+            told = f"No lens can do that: {named(why, project.design)} ({told})"
         self._tell(False, told, state.seconds, found)
 
     def _found(
@@ -178,16 +193,55 @@ class Solver:
     ) -> tuple[Found, ...]:  # fmt: skip
         best = outcomes(state, problem, count=count, name=f"After {name}", iris=project.iris, over=over)
         out = []
-        for one in best:
-            worst = max(abs(float(value)) for value in one.residuals.ravel())
-            words = f"{verdict(one)}, off by {worst:.3g} mm at most"
-            changes = {"lens": one.lens, "coating": AsLens(), "f_number": None, "zoom": None}
+        # a person judges them by the error that is told
+        for number, one in enumerate(sorted(best, key=_worst), 1):
+            lens = one.lens.replace(name=f"After {name} {number}")
+            words = named(f"Lens {number}: {described(lens)}; {judged(one, problem)}", project.design)
+            changes = {"lens": lens, "coating": AsLens(), "f_number": None, "zoom": None}
             out.append(_found(project, changes, words))
         return tuple(out)
 
     def _tell(self, running: bool, words: str, seconds: float, found: tuple[Found, ...]) -> None:
         self.progress = Progress(running, words, seconds, found, self.progress.number + 1)
         self.session.tell({"type": "solve"})
+
+
+def _in_words(read: Callable[[Project], Any], project: Project) -> Any:
+    """Read a project as a problem; what is refused is told in the page's own names."""
+    try:
+        return read(project)
+    except FlarewrightError as error:
+        raise type(error)(named(str(error), project.design)) from None
+
+
+def named(text: str, design: Design | None) -> str:
+    """Call wishes what the page calls them, not by their number in the file."""
+    names = () if design is None else wish_names(design)
+
+    def name(found: re.Match[str]) -> str:
+        number = int(found[1] or found[2])
+        return names[number] if number < len(names) else found[0]
+
+    return _COUNTED.sub(name, text)
+
+
+def described(lens: Lens) -> str:
+    """Say in a few words what a lens is."""
+    surfaces = sum(isinstance(row, Surface) for row in lens.rows)
+    return f"{surfaces} surfaces, {first_order(lens).efl:.3g} mm f/{lens.f_number:.3g}"
+
+
+def judged(one: Outcome, problem: Problem) -> str:
+    """Say how well a lens does what is wished, and which ghost is farthest from it."""
+    farthest = abs(one.residuals).max(axis=1).argmax()
+    target = problem.objective.names[int(farthest)]
+    ghost = target if target.startswith("wish") else f"ghost {target}"
+    return f"{HOW_WELL.get(verdict(one), 'not met')}, {ghost} is farthest off, by {_worst(one):.3g} mm"
+
+
+def _worst(one: Outcome) -> float:
+    """Return how far place or size of any ghost is off at most, mm."""
+    return float(abs(one.residuals).max())
 
 
 def _found(project: Project, changes: dict[str, Any], words: str) -> Found:

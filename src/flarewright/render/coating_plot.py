@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import re
+import textwrap
+from dataclasses import dataclass, replace
 from math import ceil, log10
 
 import numpy as np
@@ -16,16 +19,56 @@ Floats = NDArray[np.float64]
 PLOT_ANGLES_DEG = (0.0, 15.0, 30.0, 45.0, 60.0)
 STRIP_ANGLES_DEG = tuple(float(angle) for angle in range(0, 81))
 
-_WIDTH, _HEIGHT = 900, 560
-_LEFT, _RIGHT, _TOP, _BOTTOM = 76.0, 872.0, 84.0, 400.0
 _CURVES = ("#1d3f72", "#2f7fd1", "#2d9a72", "#e08a1e", "#c8313b")
-_STRIPS = ((442.0, "at equal brightness"), (486.0, "beside bare glass"))
-_STRIP_HEIGHT = 24.0
+_STRIPS = ("at equal brightness", "beside bare glass")
 # percent; an ideal film's zero has no place on a logarithmic axis
 _FLOOR = 0.01
+# mean width of a letter over its size
+_LETTER = 0.56
 
 
-def coating_figure(curves: CoatingResponse, strip: CoatingResponse, bare: float, name: str, glass: str) -> Figure:
+@dataclass(frozen=True)
+class Layout:
+    """Where things are on the sheet, px.
+
+    Attributes
+    ----------
+    width, height : int
+    left, right, top, bottom : float
+        Of the axes.
+    headline, words : float
+        Sizes of letters.
+    films : float
+        Baseline of the list of films, whose further lines push all below it down.
+    strips : tuple of float
+        Upper edges of the strips of colour.
+    strip_height : float
+    narrow : bool
+        No room for titles of axes and means of curves: the last tick has the unit, the strips share a line of words.
+    """
+
+    width: int
+    height: int
+    left: float
+    right: float
+    top: float
+    bottom: float
+    headline: float
+    words: float
+    films: float
+    strips: tuple[float, float]
+    strip_height: float
+    narrow: bool = False
+
+
+SHEET = Layout(900, 560, 76.0, 872.0, 84.0, 400.0, 17.0, 11.0, 56.0, (442.0, 486.0), 24.0)
+# beside other things in a window; drawn at its size
+PANEL = Layout(410, 214, 46.0, 398.0, 52.0, 142.0, 11.5, 10.0, 28.0, (174.0, 186.0), 11.0, narrow=True)
+
+
+def coating_figure(
+    curves: CoatingResponse, strip: CoatingResponse, bare: float, name: str, glass: str, layout: Layout = SHEET
+) -> Figure:
     """Draw a coating.
 
     Parameters
@@ -38,19 +81,36 @@ def coating_figure(curves: CoatingResponse, strip: CoatingResponse, bare: float,
         Luminous reflectance of the bare glass at normal incidence: white in the second strip.
     name, glass : str
         For the headline.
+    layout : Layout
+        `SHEET` or `PANEL`.
 
     Returns
     -------
     Figure
     """
+    lines = _lines(_films(curves), (layout.right - layout.left) / (_LETTER * layout.words))
+    at = _lowered(layout, (len(lines) - 1) * 1.2 * layout.words)
     top = 10.0 ** max(ceil(log10(max(100.0 * float(curves.reflectance.max()), 1e-9)) - 1e-12), 0)
-    marks: list[Mark] = [Text(_LEFT, 34.0, f"{name} on {glass}", 17.0), Text(_LEFT, 56.0, _films(curves), 11.0, FAINT)]
-    marks += _axes(curves, top)
+    above = 2.0 * layout.words if not layout.narrow else 1.4 * layout.words
+    marks: list[Mark] = [Text(at.left, layout.films - above, f"{name} on {glass}", at.headline)]
+    for k, line in enumerate(lines):
+        marks.append(Text(at.left, layout.films + 1.2 * k * at.words, line, at.words, FAINT))
+    marks += _axes(at, curves, top)
     for k, row in enumerate(curves.reflectance):
-        marks.append(Line(list(zip(_across(curves), _up(100.0 * row, top), strict=True)), _CURVES[k], 2.0))
-    marks += _legend(curves)
-    marks += _strips(strip, bare)
-    return Figure(_WIDTH, _HEIGHT, f"Reflectance of {name} on {glass}", tuple(marks))
+        points = list(zip(_across(at, curves), _up(at, 100.0 * row, top), strict=True))
+        marks.append(Line(points, _CURVES[k], 1.2 if at.narrow else 2.0))
+    marks += _legend(at, curves)
+    marks += _strips(at, strip, bare)
+    return Figure(at.width, at.height, f"Reflectance of {name} on {glass}", tuple(marks))
+
+
+def _lowered(layout: Layout, by: float) -> Layout:
+    """Move all that is below the list of films."""
+    first, second = layout.strips
+    return replace(
+        layout, top=layout.top + by, bottom=layout.bottom + by, strips=(first + by, second + by),
+        height=layout.height + round(by),
+    )  # fmt: skip
 
 
 def _films(curves: CoatingResponse) -> str:
@@ -59,62 +119,79 @@ def _films(curves: CoatingResponse) -> str:
     return "from the air: " + ", ".join(f"n {film.index:.4g}, {film.thickness_nm:.1f} nm" for film in curves.films)
 
 
-def _across(curves: CoatingResponse, wavelength_nm: Floats | None = None) -> Floats:
+def _lines(words: str, letters: float) -> list[str]:
+    """Break a list of films between films alone."""
+    whole = re.sub(r"(n [\d.]+), ([\d.]+) nm", lambda film: film[0].replace(" ", "\xa0"), words)
+    return [line.replace("\xa0", " ") for line in textwrap.wrap(whole, int(letters))]
+
+
+def _across(at: Layout, curves: CoatingResponse, wavelength_nm: Floats | None = None) -> Floats:
     wave = curves.wavelengths_nm
-    at = wave if wavelength_nm is None else wavelength_nm
-    return np.asarray(_LEFT + (_RIGHT - _LEFT) * (at - wave[0]) / (wave[-1] - wave[0]))
+    nm = wave if wavelength_nm is None else wavelength_nm
+    return np.asarray(at.left + (at.right - at.left) * (nm - wave[0]) / (wave[-1] - wave[0]))
 
 
-def _up(percent: Floats, top: float) -> Floats:
+def _up(at: Layout, percent: Floats, top: float) -> Floats:
     """Place percents on a logarithmic axis, which shows 0.1 % and 5 % side by side; what is less stays on the floor."""
     part = np.log10(np.maximum(percent, _FLOOR) / _FLOOR) / log10(top / _FLOOR)
-    return np.asarray(_BOTTOM - (_BOTTOM - _TOP) * part)
+    return np.asarray(at.bottom - (at.bottom - at.top) * part)
 
 
-def _axes(curves: CoatingResponse, top: float) -> list[Mark]:
+def _axes(at: Layout, curves: CoatingResponse, top: float) -> list[Mark]:
     marks: list[Mark] = []
     wave = curves.wavelengths_nm
     ticks = np.arange(50.0 * ceil(wave[0] / 50.0), wave[-1] + 1.0, 50.0)
-    for nm, x in zip(ticks, _across(curves, ticks), strict=True):
-        marks += [Line([(x, _TOP), (x, _BOTTOM)], "#e3e8ed"), Text(x, _BOTTOM + 16.0, f"{nm:.0f}", 11.0, INK, "middle")]
+    for nm, x in zip(ticks, _across(at, curves, ticks), strict=True):
+        words = f"{nm:.0f} nm" if at.narrow and nm == ticks[-1] else f"{nm:.0f}"
+        marks.append(Line([(x, at.top), (x, at.bottom)], "#e3e8ed"))
+        marks.append(Text(x, at.bottom + 1.4 * at.words, words, at.words, INK, "middle"))
     for decade in range(round(log10(_FLOOR)), round(log10(top))):
         for digit in range(1, 11):
             percent = digit * 10.0**decade
-            y = float(_up(np.array(percent), top))
-            marks.append(Line([(_LEFT, y), (_RIGHT, y)], "#cfd7de" if digit in (1, 10) else "#eef1f4"))
-            if digit in (2, 5, 10) or percent == _FLOOR:
-                marks.append(Text(_LEFT - 8, y + 4, f"{percent:.3g} %", 11, INK, "end"))
-    marks.append(Line([(_LEFT, _TOP), (_LEFT, _BOTTOM), (_RIGHT, _BOTTOM)], INK, 1.2))
-    marks.append(Text(_RIGHT, _BOTTOM + 30.0, "wavelength, nm", 11.0, FAINT, "end"))
+            y = float(_up(at, np.array(percent), top))
+            marks.append(Line([(at.left, y), (at.right, y)], "#cfd7de" if digit in (1, 10) else "#eef1f4"))
+            if digit in ((10,) if at.narrow else (2, 5, 10)) or percent == _FLOOR:
+                marks.append(Text(at.left - 0.7 * at.words, y + 4, f"{percent:.3g} %", at.words, INK, "end"))
+    marks.append(Line([(at.left, at.top), (at.left, at.bottom), (at.right, at.bottom)], INK, 1.2))
+    if not at.narrow:
+        marks.append(Text(at.right, at.bottom + 30.0, "wavelength, nm", at.words, FAINT, "end"))
     return marks
 
 
-def _legend(curves: CoatingResponse) -> list[Mark]:
+def _legend(at: Layout, curves: CoatingResponse) -> list[Mark]:
     marks: list[Mark] = []
     for k, (angle, mean) in enumerate(zip(curves.angles_deg, curves.mean_reflectance, strict=True)):
-        x = _LEFT + 160.0 * k
+        x = at.left + (at.right - at.left) / len(PLOT_ANGLES_DEG) * k
+        words = f"{angle:g}°" if at.narrow else f"{angle:g} degrees, mean {100.0 * mean:.2f} %"
         marks += [
-            Line([(x, _TOP - 12.0), (x + 20.0, _TOP - 12.0)], _CURVES[k], 3.0),
-            Text(x + 26.0, _TOP - 8.0, f"{angle:g} degrees, mean {100.0 * mean:.2f} %", 11.0),
+            Line([(x, at.top - 12.0), (x + 20.0, at.top - 12.0)], _CURVES[k], 3.0),
+            Text(x + 26.0, at.top - 8.0, words, at.words),
         ]
     return marks
 
 
-def _strips(strip: CoatingResponse, bare: float) -> list[Mark]:
+def _strips(at: Layout, strip: CoatingResponse, bare: float) -> list[Mark]:
     """Draw the colours of reflected daylight against the angle: hue alone, and as bright as beside bare glass."""
     light = np.maximum(strip.rgb, 0.0)
     brightest = np.maximum(light.max(axis=1, keepdims=True), 1e-30)
     marks: list[Mark] = []
-    step = (_RIGHT - _LEFT) / len(light)
-    for (y, words), shown in zip(_STRIPS, (light / brightest, light / bare), strict=True):
-        marks.append(Text(_LEFT, y - 5.0, f"reflected daylight {words}", 11.0, FAINT))
+    step = (at.right - at.left) / len(light)
+    if at.narrow:
+        words = f"reflected daylight by angle: {' and '.join(_STRIPS)}"
+        marks.append(Text(at.left, at.strips[0] - 4.0, words, at.words, FAINT))
+    for y, words, shown in zip(at.strips, _STRIPS, (light / brightest, light / bare), strict=True):
+        if not at.narrow:
+            marks.append(Text(at.left, y - 5.0, f"reflected daylight {words}", at.words, FAINT))
         for k, rgb in enumerate(np.rint(255.0 * srgb_oetf(np.minimum(shown, 1.0))).astype(int)):
             # a little wider than its place, so that no paper shows between
             wide = step + (0.5 if k < len(light) - 1 else 0.0)
-            marks.append(Box(_LEFT + k * step, y, wide, _STRIP_HEIGHT, f"#{rgb[0]:02x}{rgb[1]:02x}{rgb[2]:02x}"))
+            marks.append(Box(at.left + k * step, y, wide, at.strip_height, f"#{rgb[0]:02x}{rgb[1]:02x}{rgb[2]:02x}"))
+    foot = at.strips[1] + at.strip_height
     for k, angle in enumerate(strip.angles_deg):
         if angle % 10.0 == 0.0:
-            x = _LEFT + (k + 0.5) * step
-            marks.append(Text(x, _STRIPS[1][0] + _STRIP_HEIGHT + 15.0, f"{angle:g}", 11.0, INK, "middle"))
-    marks.append(Text(_RIGHT, _STRIPS[1][0] + _STRIP_HEIGHT + 30.0, "angle of incidence, degrees", 11.0, FAINT, "end"))
+            x = at.left + (k + 0.5) * step
+            words = f"{angle:g}{'°' if at.narrow else ''}"
+            marks.append(Text(x, foot + 1.3 * at.words, words, at.words, INK, "middle"))
+    if not at.narrow:
+        marks.append(Text(at.right, foot + 30.0, "angle of incidence, degrees", at.words, FAINT, "end"))
     return marks

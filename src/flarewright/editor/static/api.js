@@ -35,10 +35,11 @@ export const sentence = (text) => {
   return (name ? plain.charAt(0) : plain.charAt(0).toUpperCase()) + plain.slice(1) + (/[.!?]$/.test(plain) ? '' : '.');
 };
 
-export function complain(error) {
+export function inWords(error) {
   const lost = error instanceof TypeError && /fetch/i.test(error.message);
-  toast(lost ? 'The editor does not answer. Start flarewright edit again; nothing is lost.' : sentence(error.message), 'error');
+  return lost ? 'The editor does not answer. Start flarewright edit again; nothing is lost.' : sentence(error.message);
 }
+export const complain = (error) => toast(inWords(error), 'error');
 
 // Only the newest call counts: while one is under way, the last of the others waits.
 export function latest(work) {

@@ -1,5 +1,6 @@
 // The page: one state from the server, drawn by panels; every change is a deed that the server does or refuses.
-import { complain, get, latest, post, sentence, under } from './api.js';
+import { complain, get, inWords, latest, post, sentence, under } from './api.js';
+import { fitted } from './section.js';
 import { button, dialog, h, menu, stroke, tips, toast, slider } from './ui.js';
 import { viewport } from './viewport.js';
 import { coatingPanel } from './panel_coating.js';
@@ -33,6 +34,8 @@ function take(state) {
   const shot = (s) => JSON.stringify([s.lights, s.lens, s.camera, s.iris, s.dirt, s.coating, s.pass_gain, s.by_hand, s.view.grey, s.view.unclipped]);
   // another lens has other ghosts, and so has one whose rows have other numbers
   if (old && ghostsOf(old) !== ghostsOf(state)) { Object.assign(app, { ghost: null, wish: null }); app.hint(); }
+  // nor is there a new ghost any more whose wish was undone
+  if (app.wish !== null && state.design?.wishes[app.wish]?.ghost !== null) app.wish = null;
   const now = placesOf(state);
   if (places !== now) app.view.forget();
   places = now;
@@ -164,55 +167,13 @@ const drawSection = latest(async () => {
   if (!answer.ok) { told.replaceChildren(...facts(app.state)); return; }
   const found = await answer.json();
   drawing.innerHTML = found.svg;
-  trim(drawing.firstElementChild);
+  if (found.svg) fitted(drawing.firstElementChild, drawing.clientWidth - 20, drawing.clientHeight - 4);
   told.replaceChildren(...facts(app.state), ...(ghost ? [h('span', {}, found.told ? 'ghost ' : 'rays of ghost ', h('b', {}, ghost), found.told ? `: ${found.told}` : '')] : []));
 });
-// The drawing's own headline and foot stand in the head of this strip already.
-function trim(svg) {
-  if (!svg) return;
-  const [, , width, height] = svg.getAttribute('viewBox').split(' ').map(Number);
-  svg.querySelectorAll('text').forEach((text) => { if (Number(text.getAttribute('y')) < 30) text.remove(); });
-  svg.querySelector('title')?.remove();
-  svg.querySelector('rect[width="100%"]')?.remove();
-  svg.removeAttribute('width');
-  svg.removeAttribute('height');
-  svg.querySelectorAll('text').forEach((text) => { if (Number(text.getAttribute('y')) > height - 30) text.remove(); });
-  svg.querySelectorAll('line').forEach((each) => { if (Number(each.getAttribute('y1')) > height - 30) each.remove(); });
-  // as large as the strip allows
-  const names = [...svg.querySelectorAll('text')];
-  names.forEach((text) => text.remove());
-  const box = svg.getBBox();
-  const clip = svg.querySelector('clipPath rect');
-  const top = Math.max(box.y, clip ? Number(clip.getAttribute('y')) : 0);
-  const low = Math.min(box.y + box.height, clip ? Number(clip.getAttribute('y')) + Number(clip.getAttribute('height')) : height);
-  const [left, wide] = [Math.max(0, box.x) - 4, Math.min(box.width, width) + 8];
-  // row numbers are as large as all other words, whatever the scale; those of close rows step up
-  const [across, down] = [drawing.clientWidth - 20, drawing.clientHeight - 4];
-  let scale = Math.min(across / wide, down / (low - top + 6));
-  let rows = [];
-  for (let round = 0; round < 2; round++) {
-    rows = [];
-    for (const text of names) {
-      const x = Number(text.getAttribute('x')) * scale;
-      const free = rows.findIndex((end) => x - end > 6.2 * text.textContent.length + 2);
-      text.dataset.row = free < 0 ? rows.push(x) - 1 : free;
-      rows[text.dataset.row] = x;
-    }
-    scale = Math.min(across / wide, (down - 11 * rows.length) / (low - top + 6));
-  }
-  const size = 10.5 / scale;
-  for (const text of names) {
-    text.setAttribute('y', top - 2 - 1.02 * size * Number(text.dataset.row));
-    text.style.fontSize = `${size}px`;
-    svg.append(text);
-  }
-  const over = 1.05 * size * rows.length;
-  svg.setAttribute('viewBox', `${left} ${top - 2 - over} ${wide} ${low - top + 4 + over}`);
-}
-export function facts(state) {
+function facts(state) {
   const { facts: f, name } = state.lens;
   const say = (label, value, digits, unit = '') => (value === undefined ? [] : [h('span', {}, `${label} `, h('b', {}, `${Number(value.toPrecision(digits))}${unit}`))]);
-  return [h('b', {}, name), ...say('focal length', f.efl, 5, ' mm'), ...say('f/', f.f_number, 3), ...say('back focus', f.bfl, 5, ' mm')];
+  return [h('b', { title: name }, name), ...say('focal length', f.efl, 5, ' mm'), ...say('f/', f.f_number, 3), ...say('back focus', f.bfl, 5, ' mm')];
 }
 
 // ------------------------------------------------------------------------------------------------------------- header
@@ -282,20 +243,36 @@ async function copyCommand() {
     toast(text, 'good');
   } catch (error) { complain(error); }
 }
-function asking(title, words, value, work) {
+// A file's name: what is refused is said beside it, so that it can be mended, or asked for once more.
+function asking(title, words, value, path, done = () => {}) {
   const box = h('input', { type: 'text', value, style: 'width:420px', name: 'path', spellcheck: 'false' });
-  const form = h('form', { method: 'dialog' }, h('p', { class: 'quietly' }, words), box, h('div', { class: 'buttons', style: 'justify-content:end;margin-top:10px' },
+  const wrong = h('p', { class: 'wrong', role: 'alert' });
+  const form = h('form', {}, h('p', { class: 'quietly' }, words), box, wrong, h('div', { class: 'buttons', style: 'justify-content:end;margin-top:10px' },
     button('Cancel', () => window_.close()), h('button', { class: 'main', type: 'submit' }, title)));
   const window_ = dialog(title, form);
-  form.addEventListener('submit', () => work(box.value));
+  let busy = false;
+  form.addEventListener('submit', async (event) => {
+    event.preventDefault();
+    if (busy || !box.value.trim()) return;
+    busy = true;
+    try {
+      const state = await post(path, { text: box.value.trim() });
+      take(state);
+      window_.close();
+      done(state);
+    } catch (error) { wrong.textContent = inWords(error); }
+    busy = false;
+  });
   box.focus(); box.select();
 }
-function openFile() { asking('Open', 'A project file, a lens file, or a lens’ name. Files can also be dropped on the page.', '', (text) => text.trim() && app.ask('/api/open', { text })); }
-function saveAs() { asking('Save', 'Where the project file shall lie, like shot.toml.', app.state.file ?? 'flare.toml', save); }
-async function save(text = app.state.file) {
+const saved = (state) => toast(state.told, 'good');
+function openFile() { asking('Open', 'A project file, a lens file, or a lens’ name. Files can also be dropped on the page.', '', '/api/open'); }
+function saveAs() { asking('Save', 'Where the project file shall lie, like shot.toml.', app.state.file ?? 'flare.toml', '/api/save', saved); }
+async function save() {
+  const text = app.state.file;
   if (!text) { saveAs(); return; }
   const state = await app.ask('/api/save', { text });
-  if (state) toast(state.told, 'good');
+  if (state) saved(state);
 }
 
 // ------------------------------------------------------------------------------------------------------------- status

@@ -21,8 +21,8 @@ export function coatingPanel(app) {
   let written = null;
   field.element.addEventListener('focusin', () => { written = app.table(); });
   // what a row wears, taken apart: quarter-wave:NM, film:INDEX:NM, or a text of its own
-  const worn = (state) => {
-    const text = line(state)?.coating || 'none';
+  const worn = (state, number = row()) => {
+    const text = state.lens.rows.find((each) => each.row === number)?.coating || 'none';
     const [kind, ...numbers] = text.split(':');
     const plain = numbers.length === { 'quarter-wave': 1, film: 2 }[kind] && numbers.every((each) => Number.isFinite(Number(each)));
     return plain ? { kind, numbers: numbers.map(Number) } : { kind: KINDS.some(([key]) => key === text) ? text : 'text', numbers: [] };
@@ -34,11 +34,11 @@ export function coatingPanel(app) {
   const index = slider({ label: 'Film index', name: 'row_index', tip: 'Magnesium fluoride has 1.38; the nearer to the root of the glass’ index, the less is reflected.', min: 1.2, max: 2.6, step: 0.01, get: () => film()[0], set: (n, held) => wear(`film:${n}:${film()[1]}`, held) });
   const thick = slider({ label: 'Thickness', name: 'row_thickness', tip: 'Of the film: a thicker one reflects more colours in turn.', min: 10, max: 750, step: 1, digits: 0, unit: 'nm', get: () => film()[1], set: (nm, held) => wear(`film:${film()[0]}:${nm}`, held) });
   const plot = h('div', { class: 'plot' });
-  const pair = h('div', { class: 'group', hidden: true });
-  const mapTold = h('span', { class: 'quietly' });
+  const nobody = h('p', { class: 'quietly' }, 'Choose a ghost in the picture: a map will show what colours films on its two mirrors can give it.');
+  const mapTold = h('p');
   const mark = h('i');
   const image = h('img', { alt: 'Colours of the ghost by the centre wavelengths of its two mirrors', draggable: 'false' });
-  pair.append(h('h3', {}, 'Colours of the chosen ghost'), h('p', { class: 'quietly' }, 'Quarter-wave films on its two mirrors: up, the centre wavelength of the first; to the right, of the second. Click to choose.'), h('div', { class: 'map' }, image, mark), mapTold);
+  const pair = h('div', { class: 'beside' }, h('div', { class: 'map' }, image, mark), h('div', { class: 'quietly' }, h('p', {}, 'Quarter-wave films on its two mirrors: up, the centre wavelength of the first; to the right, of the second. Click to choose.'), mapTold));
   let seen = '';
   let seenMap = '';
 
@@ -55,23 +55,34 @@ export function coatingPanel(app) {
     if (!answer.ok) { plot.replaceChildren(h('p', { class: 'quietly' }, (await answer.json()).error)); return; }
     plot.innerHTML = await answer.text();
     plot.querySelector('title')?.remove();
-    // the panel is narrow: the legend says the angles alone
-    plot.querySelectorAll('text').forEach((text) => { text.textContent = text.textContent.replace(/ degrees, mean.*$/, '°'); });
   });
   const at = (event) => {
     const place = image.getBoundingClientRect();
     const nm = (part) => Math.round((LOW + (HIGH - LOW) * Math.max(0, Math.min(1, part))) / 2) * 2;
     return [nm(1 - (event.clientY - place.top) / place.height), nm((event.clientX - place.left) / place.width)];
   };
-  image.addEventListener('pointermove', (event) => { const [first, second] = at(event); const [j, i] = app.ghost.split('-'); mapTold.textContent = `row ${j}: ${first} nm, row ${i}: ${second} nm`; });
+  // where the films are that the two mirrors wear, if they are such: whatever put them on, or took them off
+  function tellWorn(state) {
+    const films = app.ghost.split('-').map((number) => worn(state, Number(number)));
+    const plain = films.every(({ kind, numbers: [nm] }) => kind === 'quarter-wave' && nm >= LOW && nm <= HIGH);
+    mark.hidden = !plain;
+    // a hand reads there what it points at
+    if (!image.matches(':hover')) mapTold.textContent = plain ? pairWords(films.map(({ numbers: [nm] }) => nm)) : '';
+    if (!plain) return;
+    const [up, right] = films.map(({ numbers: [nm] }) => 100 * (nm - LOW) / (HIGH - LOW));
+    mark.style.left = `${right}%`;
+    mark.style.top = `${100 - up}%`;
+  }
+  const pairWords = (nms) => app.ghost.split('-').map((number, k) => `row ${number}: ${nms[k]} nm`).join(', ');
+  image.addEventListener('pointermove', (event) => { mapTold.textContent = pairWords(at(event)); });
+  image.addEventListener('pointerleave', () => { if (!pair.hidden) tellWorn(app.state); });
   image.addEventListener('click', async (event) => {
     const [first, second] = at(event);
     const [j, i] = app.ghost.split('-');
-    mark.style.left = `${event.offsetX}px`; mark.style.top = `${event.offsetY}px`;
     try { await app.deed('set_row_wavelengths', { values: { [j]: first, [i]: second } }); } catch (error) { void error; }
   });
   return {
-    element: h('div', {}, whole.element, h('div', { class: 'group' }, h('h3', {}, 'One row'), rows, kinds.element, quarter.element, index.element, thick.element, field.element), plot, pair),
+    element: h('div', {}, whole.element, h('div', { class: 'group' }, h('h3', {}, 'One row'), rows, kinds.element, quarter.element, index.element, thick.element, field.element), h('div', { class: 'group' }, h('h3', {}, 'Colours of the chosen ghost'), nobody, pair), plot),
     update(state) {
       whole.update(state);
       const here = row();
@@ -81,10 +92,12 @@ export function coatingPanel(app) {
       quarter.element.hidden = kind !== 'quarter-wave';
       index.element.hidden = thick.element.hidden = kind !== 'film';
       drawPlot(JSON.stringify([here, line(state)]));
-      const two = app.ghost && /^\d+-\d+$/.test(app.ghost);
+      const two = Boolean(app.ghost) && /^\d+-\d+$/.test(app.ghost);
       pair.hidden = !two;
+      nobody.hidden = two;
       const key = two ? `${app.ghost}|${state.lens.name}|${JSON.stringify(state.lens.rows.map((each) => each.n_d))}` : '';
-      if (two && key !== seenMap) { image.src = `/api/map?ghost=${app.ghost}&n=${Date.now()}`; mark.style.left = '-99px'; mapTold.textContent = ''; }
+      if (two && key !== seenMap) image.src = `/api/map?ghost=${app.ghost}&n=${Date.now()}`;
+      if (two) tellWorn(state);
       seenMap = key;
     },
   };

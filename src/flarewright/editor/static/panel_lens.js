@@ -11,15 +11,16 @@ const COLUMNS = [
   ['semi_diameter', 'Semi', 'Half the clear diameter, mm: rims cut ghosts. In italics: estimated.'],
   ['coating', 'Coating', 'none, quarter-wave:550, film:1.38:96, early-multicoat… What is coated well makes faint ghosts.'],
 ];
-const WIDTHS = ['22px', '57px', '52px', '58px', '50px', '43px', '50px', ''];
+const WIDTHS = ['22px', '57px', '50px', '58px', '46px', '38px', '44px', ''];
+const NAMES = ['glass', 'coating'];
 
 export function lensPanel(app) {
   const body = h('tbody');
-  const head = h('tr', {}, h('th', {}, '#'), ...COLUMNS.map(([, words, tip]) => h('th', { scope: 'col', tip }, words)));
+  const head = h('tr', {}, h('th', {}, '#'), ...COLUMNS.map(([column, words, tip]) => h('th', { scope: 'col', tip, class: NAMES.includes(column) ? 'name' : null }, words)));
   const table = h('table', { class: 'rows', style: 'table-layout:fixed' }, h('colgroup', {}, ...WIDTHS.map((width) => h('col', { style: width ? `width:${width}` : '' }))), h('thead', {}, head), body);
   const wrong = h('div', { class: 'wrong', role: 'alert' });
   // in sight however long the table is
-  const notes = h('div', { class: 'group quietly', style: 'min-height:40px;position:sticky;bottom:0;background:var(--panel)' });
+  const notes = h('div', { class: 'group quietly notes' });
   const glasses = h('datalist', { id: 'glasses' });
   const facts = h('div', { class: 'facts' });
   const source = h('p', { class: 'quietly' });
@@ -70,7 +71,7 @@ export function lensPanel(app) {
         if (next) next.focus(); else box.blur();
       }
     });
-    return h('td', { class: column === 'glass' || column === 'coating' ? 'name' : '' }, box);
+    return h('td', { class: NAMES.includes(column) ? 'name' : '' }, box);
   }
   function draw(state) {
     const key = JSON.stringify([state.lens.table, state.lens.rows, state.lens.facts.stop]);

@@ -41,7 +41,7 @@ export function lightPanel(app) {
     tick({ label: 'No entrance clip', name: 'unclipped', tip: 'The first surface has no rim: ghosts appear that the entrance hides at this angle (E).', get: (s) => s.view.unclipped, set: (unclipped) => view({ unclipped }) }),
     tick({ label: 'Safe frame', name: 'safe', tip: 'Lines at 90 % and 80 % of the frame (H).', get: (s) => s.view.safe_frame, set: (safe_frame) => view({ safe_frame }) }),
     { element: h('div', { class: 'row', tip: 'A picture under the flare, to judge it in its scene; light adds, so it is added before the view. It is no part of any file.' }, h('label', {}, 'Background'), h('div', { class: 'fields' }, button('Choose…', () => picker.click()), button('None', () => view({ plate: null })), plate, picker)), update: (s) => { plate.textContent = s.view.plate ? s.view.plate.split(/[\\/]/).pop() : ''; } },
-    slider({ label: 'Its brightness', tip: 'Stops of the background alone.', min: -8, max: 8, step: 0.1, digits: 1, unit: 'st', get: (s) => s.view.plate_stops, set: (plate_stops) => view({ plate_stops }) }),
+    slider({ label: 'Its brightness', tip: 'Stops of the background alone.', min: -8, max: 8, step: 0.1, digits: 1, unit: 'stops', get: (s) => s.view.plate_stops, set: (plate_stops) => view({ plate_stops }) }),
   ]);
   const camera = (values, held = '') => app.lively('set_camera', { values }, held, `camera${Object.keys(values)}`);
   const shot = group('Camera', [

@@ -33,7 +33,7 @@ export function targetPanel(app) {
   const design = (values) => app.deed('set_design', { values }).catch(() => {});
   const how = group('Solve', [
     choice({ label: 'Search among', tip: 'Lenses built like this one keep glass, air and stop where they are; any structure may put them elsewhere.', name: 'structure', options: [['lens', 'lenses built like this one'], ['any', 'any structure']], get: (s) => s.design?.structure ?? 'lens', set: (structure) => design({ structure }) }),
-    tick({ label: 'From scratch', tip: 'Only the ghosts that were added count; the lens’ own are left out (thesis section 5.7).', get: (s) => s.design?.own_ghosts === false, set: (scratch) => design(scratch ? { own_ghosts: false, structure: 'any' } : { own_ghosts: true }) }),
+    tick({ label: 'From scratch', tip: 'Only the ghosts that were added count; the lens’ own are left out (thesis section 5.7).', name: 'scratch', off: (s) => (s.design?.wishes.some((wish) => !wish.ghost) ? '' : 'add a ghost first, for it to aim at'), get: (s) => s.design?.own_ghosts === false, set: (scratch) => design(scratch ? { own_ghosts: false, structure: 'any' } : { own_ghosts: true }) }),
     entry({ label: 'Surfaces', tip: 'Of the new lens; empty: as many as this one, or as the ghosts need.', placeholder: 'as needed', digits: 0, get: (s) => s.design?.surfaces, set: (surfaces) => design({ surfaces, ...(surfaces ? { structure: 'any' } : {}) }) }),
   ]);
   let seconds = 20;
@@ -44,11 +44,13 @@ export function targetPanel(app) {
   const stop = button('Stop', () => app.ask('/api/stop'), { id: 'stop', tip: 'End the search and keep the best.' });
   const clear = button('Take all back', () => app.deed('clear_wishes', {}).catch(() => {}), { kind: 'quiet', tip: 'Forget all wishes; the lens stays.' });
   const add = button('Add a ghost', () => app.deed('add_ghost', { place_mm: 5 - 4 * (wishes().filter((wish) => !wish.ghost).length % 5), radius_mm: 1.5 }).then(() => app.chooseWish(wishes().length - 1)).catch(() => {}), { tip: 'One that the lens has not; drag it along the line.', id: 'wish-add' });
+  // why a button cannot be pressed
+  const needed = h('p', { class: 'quietly', id: 'solve-needs' });
   const progress = h('p', { class: 'quietly', id: 'solve-words' });
   const found = h('div', { class: 'candidates' });
 
   const self = {
-    element: h('div', {}, h('div', { class: 'group' }, h('h3', {}, 'Target'), compare, told, list, h('div', { class: 'buttons' }, add, clear)), fields.element, how.element, h('div', { class: 'group' }, time.element, h('div', { class: 'buttons' }, solve, stop, colors, films), progress, found)),
+    element: h('div', {}, h('div', { class: 'group' }, h('h3', {}, 'Target'), compare, told, list, h('div', { class: 'buttons' }, add, clear)), fields.element, how.element, h('div', { class: 'group' }, time.element, h('div', { class: 'buttons' }, solve, stop, colors, films), needed, progress, found)),
     shown() { if (app.state) app.places?.(); },
     next() { const keys = COMPARE.map(([key]) => key); see(keys[(keys.indexOf(app.view.compare) + 1) % keys.length]); },
     update(state) {
@@ -56,7 +58,7 @@ export function targetPanel(app) {
       const chosen = app.wish !== null || Boolean(own());
       told.textContent = app.ghost && !own() && app.wish === null ? `Ghost ${app.ghost} reflects on both sides of the stop; design moves those that reflect twice on one side.`
         : chosen ? 'Drag it along the line, or its rim to resize it.' : 'Click a ghost to say what it shall become.';
-      refill(list, (state.design?.wishes ?? []).map((wish, number) => button(wish.ghost ?? `new ${number + 1}`, () => (wish.ghost ? app.choose(wish.ghost) : app.chooseWish(number)), { kind: (wish.ghost ? wish.ghost === app.ghost && app.wish === null : number === app.wish) ? 'on' : '' })));
+      refill(list, (state.design?.wishes ?? []).map((wish, number) => button(state.design.names[number], () => (wish.ghost ? app.choose(wish.ghost) : app.chooseWish(number)), { kind: (wish.ghost ? wish.ghost === app.ghost && app.wish === null : number === app.wish) ? 'on' : '' })));
       fields.element.hidden = !chosen;
       if (chosen) fields.update(state);
       drop.classList.toggle('on', mine()?.action === 'remove');
@@ -67,12 +69,16 @@ export function targetPanel(app) {
       how.update(state);
       time.update(state);
       const run = state.solve;
-      solve.disabled = colors.disabled = films.disabled = run.running;
+      const wished = wishes().length > 0;
+      const coloured = wishes().some((wish) => wish.color);
+      solve.disabled = run.running || !wished;
+      colors.disabled = films.disabled = run.running || !coloured;
+      needed.textContent = wished ? (coloured ? '' : 'Solve colours needs a ghost that was given a colour.') : 'Nothing is wished for yet: choose a ghost and say what it shall be, or add one; then solve.';
       stop.disabled = !run.running;
       progress.textContent = run.words ? `${run.words}${run.seconds ? ` · ${run.seconds.toFixed(0)} s` : ''}` : '';
       if (found.dataset.number !== String(run.number)) {
         found.dataset.number = String(run.number);
-        found.replaceChildren(...run.found.map((words, k) => h('figure', {}, h('img', { src: `/api/candidate/${k}?n=${run.number}`, alt: `Lens ${k + 1}` }), h('figcaption', {}, words,
+        found.replaceChildren(...run.found.map((words, k) => h('figure', {}, h('img', { src: `/api/candidate/${k}?n=${run.number}`, alt: words }), h('figcaption', {}, words,
           button('Accept', async () => { if (await app.ask('/api/accept', { number: k })) see('physical'); }, { kind: 'main', disabled: run.running, 'data-accept': k })))));
       }
     },

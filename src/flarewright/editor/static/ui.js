@@ -25,8 +25,10 @@ export const stroke = () => `s${Date.now().toString(36)}${strokes++}`;
 export function toast(text, kind = 'info', lasting = kind === 'error' ? 9000 : 4500) {
   const box = h('div', { class: `toast ${kind}`, onclick: () => box.remove() }, text);
   const shelf = document.getElementById('toasts');
+  // what is said again stands there once, and no more than can be read
+  for (const each of [...shelf.children]) if (each.textContent === box.textContent) each.remove();
   shelf.append(box);
-  while (shelf.children.length > 4) shelf.firstChild.remove();
+  while (shelf.children.length > 3) shelf.firstChild.remove();
   setTimeout(() => box.remove(), lasting);
 }
 
@@ -125,15 +127,21 @@ export function choice({ label, tip, get, set, options, name }) {
   return element;
 }
 
-export function tick({ label, tip, get, set, name }) {
+// `off` says why it cannot be ticked; empty: it can.
+export function tick({ label, tip, get, set, name, off = () => '' }) {
   const box = h('input', { type: 'checkbox', name });
+  const why = h('span', { class: 'unit' });
   // until the server has answered, it stays as the hand left it
   let asked = 0;
   box.addEventListener('change', async () => {
     asked += 1;
     try { await set(box.checked); } finally { asked -= 1; }
   });
-  return row(label, tip, [box], (state) => { if (!asked) box.checked = Boolean(get(state)); });
+  return row(label, tip, [box, why], (state) => {
+    if (!asked) box.checked = Boolean(get(state));
+    why.textContent = off(state);
+    box.disabled = Boolean(why.textContent);
+  });
 }
 
 export const button = (words, work, { tip, kind = '', ...rest } = {}) =>

@@ -8,23 +8,29 @@ const NEAR_PX = 16;
 const CLICK_PX = 4;
 const STEEPEST = 80;
 const DISTORTION_STEP = 2;
+const STEPS = [0, -21, 21, -42, 42];
 const INK = 'rgba(240,176,84,.95)';
 
 export function viewport(canvas, app) {
+  const hint = document.getElementById('hint');
   const pen = canvas.getContext('2d', { alpha: false });
   const self = {
     image: null, before: null, fadeFrom: 0, target: null, outline: null, hover: null, compare: 'physical', wipe: 0.5,
     zoom: 1, panX: 0, panY: 0, drag: null, stack: [], at: 0, spot: null, annotate: false, places: [], preview: null,
   };
   let wanted = false;
+  // where words stand in the picture that is being drawn
+  let taken = null;
 
   // ------------------------------------------------------------------------------------------------------ geometry
   const box = () => ({ w: canvas.clientWidth, h: canvas.clientHeight });
   const doubled = () => self.compare === 'side';
+  // how wide the physical picture's part of the page is
+  const half = () => (doubled() ? box().w / 2 : box().w);
   function frame() {
     const [width, height] = app.state.frame.size;
     const { w, h } = box();
-    const room = doubled() ? w / 2 : w;
+    const room = half();
     const fit = Math.min((room - 28) / width, (h - 28) / height) * self.zoom;
     const fw = width * fit;
     const fh = height * fit;
@@ -64,8 +70,8 @@ export function viewport(canvas, app) {
   // a handle far outside is held at the border, so that it can always be taken
   function handle(k) {
     const [x, y] = lightPage(k);
-    const { w, h } = box();
-    const room = doubled() ? w / 2 : w;
+    const { h } = box();
+    const room = half();
     const cx = Math.max(12, Math.min(room - 12, x));
     const cy = Math.max(12, Math.min(h - 12, y));
     return [cx, cy, cx !== x || cy !== y];
@@ -79,6 +85,7 @@ export function viewport(canvas, app) {
   }
   function draw(now) {
     wanted = false;
+    taken = null;
     const { w, h } = box();
     const ratio = devicePixelRatio || 1;
     if (canvas.width !== Math.round(w * ratio) || canvas.height !== Math.round(h * ratio)) {
@@ -93,14 +100,34 @@ export function viewport(canvas, app) {
     if (self.spot && self.spotFrame !== JSON.stringify(f)) self.forget();
     pen.imageSmoothingEnabled = self.zoom < 3;
     pen.imageSmoothingQuality = self.mover.live ? 'low' : 'high';
-    picture(f, now);
-    border(f);
-    if (doubled()) { pen.save(); pen.translate(f.shift, 0); border(f); pen.restore(); }
-    if (app.state.view.safe_frame) safe(f);
-    overlays(f);
-    paths(f);
-    lights();
+    if (doubled()) within(f.shift, w, () => { pen.translate(f.shift, 0); wishedPicture(f, 0); border(f); label('target', f.x + 8, f.y + 16, 'left'); });
+    within(0, half(), () => {
+      picture(f, now);
+      border(f);
+      if (app.state.view.safe_frame) safe(f);
+      overlays(f);
+      paths(f);
+      lights();
+    });
     if (self.measure) { self.measure(now); }
+  }
+  // Nothing of one half spills over into the other.
+  function within(from, to, paint) {
+    pen.save();
+    pen.beginPath();
+    pen.rect(from, 0, to - from, box().h);
+    pen.clip();
+    paint();
+    pen.restore();
+  }
+  function wishedPicture(f, from) {
+    if (!self.target) return;
+    pen.save();
+    pen.beginPath();
+    pen.rect(f.x + from, f.y, f.w - from, f.h);
+    pen.clip();
+    pen.drawImage(self.target, f.x, f.y, f.w, f.h);
+    pen.restore();
   }
   function picture(f, now) {
     const part = Math.min(1, (now - self.fadeFrom) / FADE_MS);
@@ -112,14 +139,7 @@ export function viewport(canvas, app) {
     pen.globalAlpha = 1;
     if (part < 1) redraw(); else self.before = null;
     if (self.compare === 'physical' || !self.target) return;
-    pen.save();
-    if (self.compare === 'side') pen.translate(f.shift, 0);
-    pen.beginPath();
-    const from = self.compare === 'wipe' ? f.w * self.wipe : 0;
-    pen.rect(f.x + from, f.y, f.w - from, f.h);
-    pen.clip();
-    pen.drawImage(self.target, f.x, f.y, f.w, f.h);
-    pen.restore();
+    if (self.compare !== 'side') wishedPicture(f, self.compare === 'wipe' ? f.w * self.wipe : 0);
     if (self.compare === 'wipe') {
       pen.fillStyle = INK;
       pen.fillRect(f.x + f.w * self.wipe - 0.5, f.y, 1, f.h);
@@ -129,16 +149,23 @@ export function viewport(canvas, app) {
       label('physical', f.x + f.w * self.wipe - 10, f.y + f.h - 14, 'right');
       label('target', f.x + f.w * self.wipe + 10, f.y + f.h - 14, 'left');
     }
-    if (self.compare === 'side') { label('physical', f.x + 8, f.y + 16, 'left'); label('target', f.x + f.shift + 8, f.y + 16, 'left'); }
+    if (self.compare === 'side') label('physical', f.x + 8, f.y + 16, 'left');
     if (self.compare === 'target') label('target', f.x + 8, f.y + 16, 'left');
   }
+  // Words step up or down where others stand already, those of the page among them.
   function label(text, x, y, align) {
     pen.font = '11px system-ui, sans-serif';
     pen.textAlign = align;
+    taken ??= [{ left: hint.offsetLeft, right: hint.offsetLeft + hint.offsetWidth, top: hint.offsetTop, bottom: hint.offsetTop + hint.offsetHeight }];
+    const wide = pen.measureText(text).width;
+    const left = x + pen.getTransform().e / (devicePixelRatio || 1) - { left: 0, center: 0.5, right: 1 }[align] * wide;
+    const free = (low) => !taken.some((each) => left < each.right && each.left < left + wide && low - 10 < each.bottom && each.top < low + 3);
+    const low = STEPS.map((step) => y + step).find(free) ?? y;
+    taken.push({ left, right: left + wide, top: low - 10, bottom: low + 3 });
     pen.fillStyle = '#000a';
-    pen.fillText(text, x + 1, y + 1);
+    pen.fillText(text, x + 1, low + 1);
     pen.fillStyle = '#ddd';
-    pen.fillText(text, x, y);
+    pen.fillText(text, x, low);
   }
   function border(f) {
     pen.strokeStyle = '#3c3c3c';
