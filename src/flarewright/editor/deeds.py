@@ -10,6 +10,7 @@ from pydantic import ValidationError
 from ..errors import FlarewrightError, ProjectError
 from ..model import Project
 from . import edit_ghosts, edit_lens, edit_path, edit_shot, edit_wishes
+from .words import sentence
 
 Deed = Callable[..., Project]
 
@@ -80,8 +81,8 @@ def done(project: Project, name: str, values: dict[str, Any]) -> tuple[Project, 
     try:
         return deed(project, **values), label
     except ValidationError as error:
-        raise ProjectError(edit_lens.sentence(error)) from None
+        raise ProjectError(sentence(error)) from None
     except (TypeError, KeyError, IndexError, ValueError) as error:
         if isinstance(error, FlarewrightError):
             raise
-        raise ProjectError(f"{label.lower()}: {edit_lens.sentence(error)}") from None
+        raise ProjectError(f"{label.lower()}: {sentence(error)}") from None

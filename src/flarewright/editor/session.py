@@ -15,10 +15,11 @@ from ..model import Project
 from . import history as past
 from .autosave import Saved, autosave_path, read_autosave
 from .deeds import done
-from .edit_lens import sentence, table_of
+from .edit_lens import table_of
 from .files import open_any, project_path, sample_project, save_project, stamp_of
 from .keeper import Keeper, claim
 from .view import View
+from .words import sentence
 
 Listener = Callable[[dict[str, Any]], None]
 
