@@ -607,6 +607,24 @@ def _join_changes(spots, spots_by, span, densities, changes):
 
 
 @inner
+def _density_changes(parameters, sigma, free, pupil, pupil_by, spots, spots_by, span, densities, changes):
+    """Fill the derivatives of the densities as they are drawn; `densities` are still the triangles' own."""
+    rings, spokes = densities.shape[0], densities.shape[1]
+    for i in range(rings):
+        for j in range(spokes):
+            k = j + 1 if j + 1 < spokes else 0
+            _triangle_changes(
+                parameters, sigma, free, pupil, pupil_by, spots, spots_by, i, j, i + 1, j, i + 1, k, changes[i, j, 0]
+            )
+            if i > 0:
+                _triangle_changes(
+                    parameters, sigma, free, pupil, pupil_by, spots, spots_by, i, j, i + 1, k, i, k, changes[i, j, 1]
+                )
+    if span > 0:
+        _join_changes(spots, spots_by, span, densities, changes)
+
+
+@inner
 def _draw_changes(spots, spots_by, densities, changes, span, left, top, width, height, out):
     """Draw every edge's derivatives once."""
     rings, spokes = densities.shape[0], densities.shape[1]
@@ -651,7 +669,7 @@ def draw_with_changes(parameters, disc_count, sigma, free, frame, left, top, pla
     disc_count : int
     sigma : float
     free : ndarray, shape (Q,), int64
-        Which parameters to derive by.
+        Which parameters to derive by; with none the derivatives cost nothing.
     frame : ndarray, shape (5,)
     left, top : int
         First pixel of the window.
@@ -669,38 +687,33 @@ def draw_with_changes(parameters, disc_count, sigma, free, frame, left, top, pla
     spokes, rings, span = _grain(parameters, disc_count, sigma, frame, True)
     if spokes == 0:
         return
+    derive = free.size > 0
     pupil, spots = np.empty((rings + 1, spokes, 2)), np.empty((rings + 1, spokes, 2))
-    pupil_by = np.empty((rings + 1, spokes, 2, 2 * disc_count + 2))
-    if not _mesh(parameters, disc_count, sigma, frame, spokes, rings, True, pupil, pupil_by):
+    pupil_by = np.empty((rings + 1, spokes, 2, 2 * disc_count + 2 if derive else 0))
+    if not _mesh(parameters, disc_count, sigma, frame, spokes, rings, derive, pupil, pupil_by):
         return
     _land(parameters, pupil, sigma, frame, spots)
-    spots_by = np.empty((rings + 1, spokes, free.size, 2))
-    _spot_changes(parameters, sigma, free, frame, pupil, pupil_by, spots_by)
-    densities, changes = np.empty((rings, spokes, 2)), np.zeros((rings, spokes, 2, free.size))
+    densities = np.empty((rings, spokes, 2))
     _densities(parameters, sigma, pupil, spots, densities)
-    for i in range(rings):
-        for j in range(spokes):
-            k = j + 1 if j + 1 < spokes else 0
-            _triangle_changes(
-                parameters, sigma, free, pupil, pupil_by, spots, spots_by, i, j, i + 1, j, i + 1, k, changes[i, j, 0]
-            )
-            if i > 0:
-                _triangle_changes(
-                    parameters, sigma, free, pupil, pupil_by, spots, spots_by, i, j, i + 1, k, i, k, changes[i, j, 1]
-                )
-    if span > 0:
-        _join_changes(spots, spots_by, span, densities, changes)
-        _join(spots, span, densities)
     # the model's irradiance is per pixel of the model, whatever the picture's scale
-    densities *= frame[4] * frame[4]
-    changes *= frame[4] * frame[4]
+    scale = frame[4] * frame[4]
+    spots_by, changes = np.empty((rings + 1, spokes, free.size, 2)), np.zeros((rings, spokes, 2, free.size))
+    if derive:
+        _spot_changes(parameters, sigma, free, frame, pupil, pupil_by, spots_by)
+        _density_changes(parameters, sigma, free, pupil, pupil_by, spots, spots_by, span, densities, changes)
+        changes *= scale
+    if span > 0:
+        _join(spots, span, densities)
+    densities *= scale
     _draw_mesh(spots, densities, span, True, True, left, top, width, height, plane)
-    _draw_changes(spots, spots_by, densities, changes, span, left, top, width, height, out)
-    variance = parameters[SOFT] * frame[4] * frame[4]
+    variance = parameters[SOFT] * scale
     if variance > 0.0:
         _soften(plane.reshape((height, width + 1, 1)), variance, spots, left, top)
-        if free.size > 0:
-            _soften(out, variance, spots, left, top)
+    if not derive:
+        return
+    _draw_changes(spots, spots_by, densities, changes, span, left, top, width, height, out)
+    if variance > 0.0:
+        _soften(out, variance, spots, left, top)
     for q in range(free.size):
         if free[q] == SOFT:
-            add_spreading(plane, frame[4] * frame[4], out[:, :, q])
+            add_spreading(plane, scale, out[:, :, q])
