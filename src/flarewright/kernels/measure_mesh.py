@@ -489,7 +489,7 @@ def _soften(differences, variance, spots, left, top):
 
 @inner
 def _spot_changes(parameters, sigma, free, frame, pupil, pupil_by, spots_by):
-    """Fill the derivatives of where the mesh lands, (rings + 1, spokes, Q, 2), by the free parameters."""
+    """Fill the derivatives of where the mesh lands, (rings + 1, spokes, 2, Q), by the free parameters."""
     terms = np.empty(TERMS)
     w = sigma * sigma
     for i in range(pupil.shape[0]):
@@ -510,8 +510,8 @@ def _spot_changes(parameters, sigma, free, frame, pupil, pupil_by, spots_by):
                 else:
                     dxi, deta = _pupil_change(n, sigma, pupil_by, i, j)
                     along, across = a_xi * dxi + a_eta * deta, c_xi * dxi + c_eta * deta
-                spots_by[i, j, q, 0] = frame[4] * (frame[2] * along - frame[3] * across)
-                spots_by[i, j, q, 1] = -frame[4] * (frame[3] * along + frame[2] * across)
+                spots_by[i, j, 0, q] = frame[4] * (frame[2] * along - frame[3] * across)
+                spots_by[i, j, 1, q] = -frame[4] * (frame[3] * along + frame[2] * across)
 
 
 @inner
@@ -525,13 +525,22 @@ def _pupil_change(n, sigma, pupil_by, i, j):
 
 
 @inner
-def _triangle_changes(parameters, sigma, free, pupil, pupil_by, spots, spots_by, ia, ja, ib, jb, ic, jc, out):
-    """Fill the derivatives of a triangle's signed density by the free parameters."""
+def _add_triangle(
+    parameters, sigma, free, pupil, pupil_by, spots, spots_by, ia, ja, ib, jb, ic, jc, terms, flux_by, area_by
+):
+    """Add the derivatives of a triangle's flux and of its signed area, as it is divided by, by the free parameters."""
     ax, ay = spots[ia, ja, 0], spots[ia, ja, 1]
     bx, by = spots[ib, jb, 0], spots[ib, jb, 1]
     cx, cy = spots[ic, jc, 0], spots[ic, jc, 1]
     raw = _area(ax, ay, bx, by, cx, cy)
-    area = _steadied(raw)
+    if _steadied(raw) == raw:
+        ax_by, ay_by = 0.5 * (by - cy), 0.5 * (cx - bx)
+        bx_by, by_by = 0.5 * (cy - ay), 0.5 * (ax - cx)
+        cx_by, cy_by = 0.5 * (ay - by), 0.5 * (bx - ax)
+        for q in range(free.size):
+            area_by[q] += ax_by * spots_by[ia, ja, 0, q] + ay_by * spots_by[ia, ja, 1, q]
+            area_by[q] += bx_by * spots_by[ib, jb, 0, q] + by_by * spots_by[ib, jb, 1, q]
+            area_by[q] += cx_by * spots_by[ic, jc, 0, q] + cy_by * spots_by[ic, jc, 1, q]
     pax, pay = pupil[ia, ja, 0], pupil[ia, ja, 1]
     pbx, pby = pupil[ib, jb, 0], pupil[ib, jb, 1]
     pcx, pcy = pupil[ic, jc, 0], pupil[ic, jc, 1]
@@ -539,97 +548,67 @@ def _triangle_changes(parameters, sigma, free, pupil, pupil_by, spots, spots_by,
     xi, eta = (pax + pbx + pcx) / 3.0, (pay + pby + pcy) / 3.0
     u, v, w = xi * xi + eta * eta, xi * sigma, sigma * sigma
     intensity, i_u, i_v = slopes(parameters, FIRST_I, u, v, w)
-    dark = intensity <= 0.0
-    if dark:
-        intensity, i_u, i_v = 0.0, 0.0, 0.0
+    # what is below 0 is drawn as 0
+    if intensity <= 0.0:
+        return
     i_xi, i_eta = 2.0 * xi * i_u + sigma * i_v, 2.0 * eta * i_u
-    terms = np.empty(TERMS)
     monomials(u, v, w, terms)
-    density = -intensity * part / area
     for q in range(free.size):
         n = free[q]
-        flux_change = 0.0
-        if n == SOFT:
-            out[q] = 0.0
+        if n < FIRST_I or n == SOFT:
             continue
-        if FIRST_I <= n < FIRST_DISC:
-            # what is below 0 is drawn as 0; its way up must show
-            out[q] = -terms[n - FIRST_I] * part / area if not dark else 0.0
+        if n < FIRST_DISC:
+            flux_by[q] += terms[n - FIRST_I] * part
             continue
-        if n >= FIRST_DISC:
-            dax, day = _pupil_change(n, sigma, pupil_by, ia, ja)
-            dbx, dby = _pupil_change(n, sigma, pupil_by, ib, jb)
-            dcx, dcy = _pupil_change(n, sigma, pupil_by, ic, jc)
-            grown = 0.5 * (
-                (dbx - dax) * (pcy - pay) + (pbx - pax) * (dcy - day) - (dcx - dax) * (pby - pay)
-                - (pcx - pax) * (dby - day)
-            )  # fmt: skip
-            brighter = (i_xi * (dax + dbx + dcx) + i_eta * (day + dby + dcy)) / 3.0
-            flux_change = brighter * part + intensity * grown
-        wider = _wider(spots, spots_by, ia, ja, ib, jb, ic, jc, q) if raw == area else 0.0
-        out[q] = -flux_change / area - density * wider / area
-
-
-@inner
-def _wider(spots, spots_by, ia, ja, ib, jb, ic, jc, q):
-    """Return the derivative of a triangle's signed area by free parameter q."""
-    ax, ay = spots[ia, ja, 0], spots[ia, ja, 1]
-    bx, by = spots[ib, jb, 0], spots[ib, jb, 1]
-    cx, cy = spots[ic, jc, 0], spots[ic, jc, 1]
-    ux, uy = spots_by[ia, ja, q, 0], spots_by[ia, ja, q, 1]
-    vx, vy = spots_by[ib, jb, q, 0], spots_by[ib, jb, q, 1]
-    tx, ty = spots_by[ic, jc, q, 0], spots_by[ic, jc, q, 1]
-    return 0.5 * ((vx - ux) * (cy - ay) + (bx - ax) * (ty - uy) - (tx - ux) * (by - ay) - (cx - ax) * (vy - uy))
-
-
-@inner
-def _join_changes(spots, spots_by, span, densities, changes):
-    """Give all triangles of each cell the derivatives of their common density; `densities` are still their own."""
-    rings, spokes = densities.shape[0], densities.shape[1]
-    for i in range(rings):
-        for first in range(0, spokes, span):
-            light, area = _cell_light(spots, span, densities, i, first)
-            common = light / area
-            for q in range(changes.shape[3]):
-                change = 0.0
-                for j in range(first, first + span):
-                    k = j + 1 if j + 1 < spokes else 0
-                    one, other = _cell_areas(spots, i, j, spokes)
-                    change += changes[i, j, 0, q] * one
-                    change += (densities[i, j, 0] - common) * _wider(spots, spots_by, i, j, i + 1, j, i + 1, k, q)
-                    if i > 0:
-                        change += changes[i, j, 1, q] * other
-                        change += (densities[i, j, 1] - common) * _wider(spots, spots_by, i, j, i + 1, k, i, k, q)
-                for j in range(first, first + span):
-                    changes[i, j, 0, q] = change / area
-                    if i > 0:
-                        changes[i, j, 1, q] = change / area
+        dax, day = _pupil_change(n, sigma, pupil_by, ia, ja)
+        dbx, dby = _pupil_change(n, sigma, pupil_by, ib, jb)
+        dcx, dcy = _pupil_change(n, sigma, pupil_by, ic, jc)
+        grown = 0.5 * (
+            (dbx - dax) * (pcy - pay) + (pbx - pax) * (dcy - day) - (dcx - dax) * (pby - pay)
+            - (pcx - pax) * (dby - day)
+        )  # fmt: skip
+        brighter = (i_xi * (dax + dbx + dcx) + i_eta * (day + dby + dcy)) / 3.0
+        flux_by[q] += brighter * part + intensity * grown
 
 
 @inner
 def _density_changes(parameters, sigma, free, pupil, pupil_by, spots, spots_by, span, densities, changes):
     """Fill the derivatives of the densities as they are drawn; `densities` are still the triangles' own."""
     rings, spokes = densities.shape[0], densities.shape[1]
+    terms, flux_by, area_by = np.empty(TERMS), np.empty(free.size), np.empty(free.size)
+    wide = max(span, 1)
     for i in range(rings):
-        for j in range(spokes):
-            k = j + 1 if j + 1 < spokes else 0
-            _triangle_changes(
-                parameters, sigma, free, pupil, pupil_by, spots, spots_by, i, j, i + 1, j, i + 1, k, changes[i, j, 0]
-            )
-            if i > 0:
-                _triangle_changes(
-                    parameters, sigma, free, pupil, pupil_by, spots, spots_by, i, j, i + 1, k, i, k, changes[i, j, 1]
-                )
-    if span > 0:
-        _join_changes(spots, spots_by, span, densities, changes)
+        halves = 2 if i > 0 else 1
+        for first in range(0, spokes, wide):
+            light, area = _cell_light(spots, wide, densities, i, first)
+            # without cells every triangle is one
+            for alone in range(halves if span == 0 else 1):
+                flux_by[:] = 0.0
+                area_by[:] = 0.0
+                for j in range(first, first + wide):
+                    k = j + 1 if j + 1 < spokes else 0
+                    for half in range(halves):
+                        if span > 0 or half == alone:
+                            _add_triangle(
+                                parameters, sigma, free, pupil, pupil_by, spots, spots_by, i, j, i + 1,
+                                k if half else j, i if half else i + 1, k, terms, flux_by, area_by,
+                            )  # fmt: skip
+                density = light / area
+                if span == 0:
+                    density, area = densities[i, first, alone], _cell_areas(spots, i, first, spokes)[alone]
+                for j in range(first, first + wide):
+                    for half in range(halves):
+                        if span > 0 or half == alone:
+                            for q in range(free.size):
+                                changes[i, j, half, q] = -(flux_by[q] + density * area_by[q]) / area
 
 
 @inner
 def _draw_changes(spots, spots_by, densities, changes, span, left, top, width, height, out):
     """Draw every edge's derivatives once."""
     rings, spokes = densities.shape[0], densities.shape[1]
-    step = np.empty(changes.shape[3])
-    zero = np.zeros(changes.shape[3])
+    count = changes.shape[3]
+    step, sweep = np.empty(count), np.empty((2, count))
     for i in range(rings):
         for j in range(spokes):
             k = j + 1 if j + 1 < spokes else 0
@@ -640,22 +619,25 @@ def _draw_changes(spots, spots_by, densities, changes, span, left, top, width, h
             half = 1 if i > 0 else 0
             # nothing changes inside a cell
             if span == 0 or j % span == 0:
-                step[:] = changes[i, j, 0] - changes[i, before, half]
+                for q in range(count):
+                    step[q] = changes[i, j, 0, q] - changes[i, before, half, q]
                 add_edge_changes(
                     ax, ay, bx, by, densities[i, j, 0] - densities[i, before, half], step, spots_by[i, j],
-                    spots_by[i + 1, j], left, top, width, height, out,
+                    spots_by[i + 1, j], left, top, width, height, sweep, out,
                 )  # fmt: skip
             outer = densities[i + 1, j, 1] if i + 1 < rings else 0.0
-            step[:] = changes[i, j, 0] - (changes[i + 1, j, 1] if i + 1 < rings else zero)
+            for q in range(count):
+                step[q] = changes[i, j, 0, q] - (changes[i + 1, j, 1, q] if i + 1 < rings else 0.0)
             add_edge_changes(
                 bx, by, cx, cy, densities[i, j, 0] - outer, step, spots_by[i + 1, j], spots_by[i + 1, k], left, top,
-                width, height, out,
+                width, height, sweep, out,
             )  # fmt: skip
             if i > 0 and span == 0:
-                step[:] = changes[i, j, 1] - changes[i, j, 0]
+                for q in range(count):
+                    step[q] = changes[i, j, 1, q] - changes[i, j, 0, q]
                 add_edge_changes(
                     ax, ay, cx, cy, densities[i, j, 1] - densities[i, j, 0], step, spots_by[i, j], spots_by[i + 1, k],
-                    left, top, width, height, out,
+                    left, top, width, height, sweep, out,
                 )  # fmt: skip
 
 
@@ -697,7 +679,7 @@ def draw_with_changes(parameters, disc_count, sigma, free, frame, left, top, pla
     _densities(parameters, sigma, pupil, spots, densities)
     # the model's irradiance is per pixel of the model, whatever the picture's scale
     scale = frame[4] * frame[4]
-    spots_by, changes = np.empty((rings + 1, spokes, free.size, 2)), np.zeros((rings, spokes, 2, free.size))
+    spots_by, changes = np.empty((rings + 1, spokes, 2, free.size)), np.zeros((rings, spokes, 2, free.size))
     if derive:
         _spot_changes(parameters, sigma, free, frame, pupil, pupil_by, spots_by)
         _density_changes(parameters, sigma, free, pupil, pupil_by, spots, spots_by, span, densities, changes)
