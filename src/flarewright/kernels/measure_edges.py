@@ -118,8 +118,8 @@ def _crossing(row, c, light, part, length, t, change, sweep, out):
 def add_edge_changes(x0, y0, x1, y1, weight, change, v0, v1, left, top, width, height, sweep, out):
     """Add the derivatives of `add_edge` by Q parameters.
 
-    `change` (Q,) is the derivative of the weight, `v0` and `v1` (2, Q) those of the ends; `sweep` (2, Q) is room to work
-    in; `out` has shape (height, width + 1, Q).
+    `change` (Q,) is the derivative of the weight, `v0` and `v1` (2, Q) those of the ends; `sweep` (2, Q) is room to
+    work in; `out` has shape (height, width + 1, Q).
     """
     y0, y1, x0, x1 = y0 - top, y1 - top, x0 - left, x1 - left
     dx, dy = x1 - x0, y1 - y0
