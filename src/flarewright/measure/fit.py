@@ -22,6 +22,7 @@ from .views import View, halved
 
 Indices = NDArray[np.int64]
 Made = TypeVar("Made")
+Part = tuple[slice, slice]
 
 # a ghost is fitted on pictures halved until its window has about so many pixels
 AREA = 7000
@@ -119,11 +120,21 @@ def free_numbers(order: int, discs: int, intensity_order: int, soft: bool = Fals
 
 def render(shape: Shape, view: View, scale: float = 1.0) -> Floats:
     """Draw a shape into a picture of a view's size, shape (H, W)."""
-    width, height = view.size_px
-    plane = np.zeros((height, width + 1))
-    draw_with_changes(shape.numbers, shape.discs, view.sigma, _NONE, view.frame, 0, 0, plane, np.zeros((1, 1, 0)))
+    picture = np.zeros(view.pixels.shape[:2])
+    part, light = light_of(shape, view)
+    picture[part] = scale * light
+    return picture
+
+
+def light_of(shape: Shape, view: View) -> tuple[Part, Floats]:
+    """Return which rows and columns of a view a shape touches, and its picture there."""
+    left, top, width, height = window_of(shape.numbers, shape.discs, view.sigma, view.frame, *view.size_px)
+    if not width:
+        return np.s_[0:0, 0:0], np.zeros((0, 0))
+    plane = _PLANES.zeros(height, width + 1)
+    draw_with_changes(shape.numbers, shape.discs, view.sigma, _NONE, view.frame, left, top, plane, _NO_CHANGES)
     sum_along_rows(plane)
-    return scale * plane[:, :width]
+    return np.s_[top : top + height, left : left + width], plane[:, :width].copy()
 
 
 def scaled(frame: Floats, times: int) -> Floats:
