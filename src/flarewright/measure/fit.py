@@ -10,8 +10,9 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from ..kernels.measure_changes import draw_with_changes
 from ..kernels.measure_edges import sum_along_rows
-from ..kernels.measure_mesh import draw_with_changes, window_of
+from ..kernels.measure_mesh import window_of
 from ..kernels.measure_misfit import weigh_misfit
 from ..kernels.measure_normal import normal_equations
 from ..kernels.measure_pupil import DISC_NUMBERS, FIRST_DISC, FIRST_G, FIRST_I, SOFT
