@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+from flarewright.kernels.measure_changes import draw_with_changes
 from flarewright.kernels.measure_edges import sum_along_rows, sum_changes_along_rows
-from flarewright.kernels.measure_mesh import draw_ghosts, draw_with_changes, window_of
+from flarewright.kernels.measure_mesh import draw_ghosts, window_of
 from flarewright.kernels.measure_pupil import BLADES, FIRST_DISC, FIRST_G, FIRST_I, TURN
 from flarewright.measure.numbers import NUMBERS
 

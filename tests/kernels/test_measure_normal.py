@@ -7,9 +7,12 @@ from flarewright.kernels.measure_normal import normal_equations
 
 
 @pytest.mark.parametrize(("height", "width", "count"), [(1, 1, 1), (5, 7, 3), (4, 16, 33)])
-def test_sums_are_those_of_the_whole_matrices(height, width, count):
+# with 0.7 most pixels have the derivatives of those before them
+@pytest.mark.parametrize("even", [0.0, 0.7])
+def test_sums_are_those_of_the_whole_matrices(height, width, count, even):
     random = np.random.default_rng(3)
     changes = random.normal(size=(height, width + 1, count))
+    changes[random.uniform(size=(height, width + 1)) < even] = 0.0
     # what stands in the last column lies right of the window
     weight = random.uniform(size=(height, width)) * (random.uniform(size=(height, width)) > 0.3)
     residual = random.normal(size=(height, width))

@@ -6,8 +6,9 @@ from scipy.special import ive
 from test_measure_mesh import FRAME, SIZE, bladed, draw, draw_finely, even, ghost
 
 from flarewright.kernels._jit import for_python
+from flarewright.kernels.measure_changes import draw_with_changes
 from flarewright.kernels.measure_edges import sum_along_rows, sum_changes_along_rows
-from flarewright.kernels.measure_mesh import draw_with_changes, window_of
+from flarewright.kernels.measure_mesh import window_of
 from flarewright.kernels.measure_pupil import FIRST_DISC, FIRST_G, SOFT
 from flarewright.kernels.measure_soft import reach_of, taps_of
 

@@ -11,7 +11,7 @@ from test_track import ANGLES, drawn, thrice
 from flarewright.io.ghost_model_file import read_ghost_model, write_ghost_model
 from flarewright.measure.compact import compact, curves_of, held_error, numbers_in, rounded, written_numbers
 from flarewright.measure.curves import Pose, posed, spline_basis, value_at
-from flarewright.measure.fit import Shape, evaluate, free_numbers, patches_of, refine, render
+from flarewright.measure.fit import Shape, free_numbers, misfit, patches_of, refine, render
 from flarewright.measure.found import Found
 from flarewright.measure.numbers import NUMBERS, channel_of
 from flarewright.measure.orders import needed_numbers, parabola
@@ -68,7 +68,7 @@ def test_the_parabola_foretells_what_a_step_costs():
     step = 2.0 * np.linalg.cholesky(fit.covariance) @ np.random.default_rng(2).normal(size=free.size)
     numbers = fit.shape.numbers.copy()
     numbers[free] += step
-    there = [evaluate(type(fit.shape)(numbers), free[:0], patch, True, 0.0)[0] for patch in patches]
+    there = [misfit(type(fit.shape)(numbers), patch, True, 0.0).cost for patch in patches]
     foretold = bowl.cost - 2.0 * bowl.side @ step + np.einsum("q,kqr,r->k", step, bowl.matrix, step)
     np.testing.assert_allclose(foretold - bowl.cost, there - bowl.cost, atol=0.15 * np.abs(there - bowl.cost).max())
 
@@ -162,6 +162,6 @@ def test_rounding_moves_no_picture_though_numbers_alone_are_vague():
     alone = held_error(fit)
     assert (alone[fit.free] <= fit.uncertainty[fit.free] * 1.01).all()
     numbers = [rounded(float(a), float(d)) for a, d in zip(fit.shape.numbers, alone, strict=True)]
-    after = sum(evaluate(Shape(np.array(numbers)), fit.free[:0], patch, True, 0.0)[0] for patch in patches)
-    before = sum(evaluate(fit.shape, fit.free[:0], patch, True, 0.0)[0] for patch in patches)
+    after = sum(misfit(Shape(np.array(numbers)), patch, True, 0.0).cost for patch in patches)
+    before = sum(misfit(fit.shape, patch, True, 0.0).cost for patch in patches)
     assert after - before < 3.0

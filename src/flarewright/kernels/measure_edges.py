@@ -105,28 +105,30 @@ def add_edge(x0, y0, x1, y1, weight, left, top, width, height, plane):
 
 
 @inner
-def _crossing(row, c, light, part, swept, t, dx, dy, weight, change, v0, v1, out):
+def _crossing(row, c, light, part, length, t, change, sweep, out):
     """Add one pixel's derivatives: the step's change times the coverage, and the step times what the edge sweeps."""
     near, far = light * (1.0 - part), light * part
-    step = weight * swept
-    here, after = out[row, c], out[row, c + 1]
-    for q in range(change.shape[0]):
-        moved = step * ((v0[q, 0] + t * (v1[q, 0] - v0[q, 0])) * dy - (v0[q, 1] + t * (v1[q, 1] - v0[q, 1])) * dx)
-        here[q] += change[q] * near - moved
-        after[q] += change[q] * far + moved
+    for q in range(change.size):
+        moved = length * (sweep[0, q] + t * sweep[1, q])
+        out[row, c, q] += change[q] * near - moved
+        out[row, c + 1, q] += change[q] * far + moved
 
 
 @inner
-def add_edge_changes(x0, y0, x1, y1, weight, change, v0, v1, left, top, width, height, out):
+def add_edge_changes(x0, y0, x1, y1, weight, change, v0, v1, left, top, width, height, sweep, out):
     """Add the derivatives of `add_edge` by Q parameters.
 
-    `change` (Q,) is the derivative of the weight, `v0` and `v1` (Q, 2) those of the ends; `out` has shape
-    (height, width + 1, Q).
+    `change` (Q,) is the derivative of the weight, `v0` and `v1` (2, Q) those of the ends; `sweep` (2, Q) is room to
+    work in; `out` has shape (height, width + 1, Q).
     """
     y0, y1, x0, x1 = y0 - top, y1 - top, x0 - left, x1 - left
     dx, dy = x1 - x0, y1 - y0
     if max(y0, y1) <= 0.0 or min(y0, y1) >= height or min(x0, x1) >= width:
         return
+    # the light that the edge sweeps over at its first end, and how much more at the other
+    for q in range(change.size):
+        sweep[0, q] = weight * (v0[0, q] * dy - v0[1, q] * dx)
+        sweep[1, q] = weight * (v1[0, q] * dy - v1[1, q] * dx) - sweep[0, q]
     # walk from grid line to grid line; t runs from 0 to 1 along the edge
     t = 0.0
     row, c = int(floor(y0)), int(floor(x0))
@@ -145,7 +147,7 @@ def add_edge_changes(x0, y0, x1, y1, weight, change, v0, v1, left, top, width, h
             middle, length = 0.5 * (t + end), end - t
             if c >= 0:
                 part = x0 + middle * dx - c
-                _crossing(row, c, length * dy, part, length, middle, dx, dy, weight, change, v0, v1, out)
+                _crossing(row, c, length * dy, part, length, middle, change, sweep, out)
             else:
                 for q in range(change.shape[0]):
                     out[row, 0, q] += change[q] * length * dy

@@ -35,21 +35,44 @@ def outline(blades, turn, spots):
 
 
 @inner
-def _edge(tx, ty, cx, cy, radius, spots, every):
-    """Return the mean inward slope on a rim and the part of it that was seen."""
-    height, width = tx.shape
+def _edge(slopes, cx, cy, radius, spots, every, inside):
+    """Return the mean inward slope on a rim and the part of it that was seen; `inside`: none of it lies outside."""
+    height, width = slopes.shape[0], slopes.shape[1]
     total, seen, asked = 0.0, 0, 0
     for k in range(0, spots.shape[0], every):
         asked += 1
         x, y = int(floor(cx + radius * spots[k, 0])), int(floor(cy + radius * spots[k, 1]))
-        if 0 <= x < width and 0 <= y < height:
-            value = tx[y, x] * spots[k, 2] + ty[y, x] * spots[k, 3]
+        if inside or (0 <= x < width and 0 <= y < height):
+            value = slopes[y, x, 0] * spots[k, 2] + slopes[y, x, 1] * spots[k, 3]
             if value == value:
                 total -= value
                 seen += 1
     if seen * 3 < asked or seen < 6:
         return 0.0, 0.0
     return total / seen, seen / asked
+
+
+@inner
+def _vote(slopes, sigma, frame, speeds, sizes, rims, reaches, floor_level, sign, votes):
+    """Fill what one view says of every rim, 0 where it does not see it; `slopes` has shape (H, W, 2)."""
+    height, width = slopes.shape[0], slopes.shape[1]
+    for s in range(speeds.size):
+        away = sigma * speeds[s] * frame[4]
+        cx, cy = frame[0] + frame[2] * away, frame[1] - frame[3] * away
+        for r in range(sizes.size):
+            radius = sizes[r] * frame[4]
+            every = 2 if radius < 8.0 else 1
+            for b in range(rims.shape[0]):
+                reach = radius * reaches[b]
+                votes[s, r, b] = 0.0
+                if cx + reach < 0.0 or cy + reach < 0.0 or cx - reach > width or cy - reach > height:
+                    continue
+                inside = (
+                    cx - reach > 1.0 and cy - reach > 1.0 and cx + reach < width - 1.0 and cy + reach < height - 1.0
+                )
+                slope, part = _edge(slopes, cx, cy, radius, rims[b], every, inside)
+                if part > 0.0:
+                    votes[s, r, b] = (sign * slope - floor_level) * part
 
 
 @compiled
@@ -78,22 +101,26 @@ def search(slopes_x, slopes_y, sigmas, frames, speeds, sizes, rims, floor_level,
     runs : ndarray, shape (S, R, 3), int64
         Filled: first and last view of the best run, and the kind.
     """
+    views = sigmas.size
+    reaches = np.zeros(rims.shape[0])
+    for b in range(rims.shape[0]):
+        for k in range(rims.shape[1]):
+            reaches[b] = max(reaches[b], sqrt(rims[b, k, 0] ** 2 + rims[b, k, 1] ** 2))
+    # view by view: one picture of slopes stays near the processor, all of them do not
+    votes = np.empty((views, speeds.size, sizes.size, rims.shape[0]))
+    slopes = np.empty((slopes_x.shape[1], slopes_x.shape[2], 2), np.float32)
+    for v in range(views):
+        for y in range(slopes.shape[0]):
+            for x in range(slopes.shape[1]):
+                slopes[y, x, 0], slopes[y, x, 1] = slopes_x[v, y, x], slopes_y[v, y, x]
+        _vote(slopes, sigmas[v], frames[v], speeds, sizes, rims, reaches, floor_level, sign, votes[v])
     for s in range(speeds.size):
         for r in range(sizes.size):
             scores[s, r] = 0.0
             for b in range(rims.shape[0]):
                 run, start = 0.0, 0
-                for v in range(sigmas.size):
-                    scale = frames[v, 4]
-                    away = sigmas[v] * speeds[s] * scale
-                    radius = sizes[r] * scale
-                    every = 2 if radius < 8.0 else 1
-                    slope, part = _edge(
-                        slopes_x[v], slopes_y[v], frames[v, 0] + frames[v, 2] * away,
-                        frames[v, 1] - frames[v, 3] * away, radius, rims[b], every,
-                    )  # fmt: skip
-                    if part > 0.0:
-                        run += (sign * slope - floor_level) * part
+                for v in range(views):
+                    run += votes[v, s, r, b]
                     if run <= 0.0:
                         run, start = 0.0, v + 1
                     elif run > scores[s, r]:

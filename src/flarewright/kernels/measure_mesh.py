@@ -1,4 +1,4 @@
-"""Draw a measured ghost from its pupil's mesh: flux-conserving, with exact coverage and exact derivatives.
+"""Draw a measured ghost from its pupil's mesh: flux-conserving, with exact coverage (derivatives: `measure_changes`).
 
 The mesh is a fan of spokes and rings over the open pupil (`kernels.measure_pupil`). A triangle carries the flux of its
 part of the pupil wherever it lands, so folds and caustics need no special care. Far from folds, triangles are joined to
@@ -11,25 +11,21 @@ from math import ceil, floor, pi, sin, sqrt
 import numpy as np
 
 from ._jit import compiled, inner
-from .measure_edges import add_edge, add_edge_changes
+from .measure_edges import add_edge
 from .measure_pupil import (
     BLADES,
-    DISC_NUMBERS,
-    FIRST_DISC,
     FIRST_G,
     FIRST_I,
     SOFT,
-    TERMS,
     TURN,
     at_field,
     border,
     level,
-    monomials,
     place,
     rims,
     slopes,
 )
-from .measure_soft import add_spreading, reach_of, soften, taps_of
+from .measure_soft import reach_of, soften, taps_of
 
 # pixels by which a chord may leave its arc, up to so many spokes
 _CHORD = 0.05
@@ -46,7 +42,7 @@ _WIDE, _FAINT = 12.0, 5e-4
 
 
 @inner
-def _mesh(parameters, disc_count, sigma, frame, spokes, rings, with_changes, pupil, pupil_by):
+def fill_mesh(parameters, disc_count, sigma, frame, spokes, rings, with_changes, pupil, pupil_by):
     """Fill the mesh's pupil points and their derivatives by the discs; False: it is shut."""
     blades = int(parameters[BLADES])
     turn = parameters[TURN] - np.arctan2(frame[3], frame[2]) if blades > 0 else 0.0
@@ -70,13 +66,13 @@ def _mesh(parameters, disc_count, sigma, frame, spokes, rings, with_changes, pup
 
 
 @inner
-def _area(ax, ay, bx, by, cx, cy):
+def area_of(ax, ay, bx, by, cx, cy):
     """Return a triangle's signed area."""
     return 0.5 * ((bx - ax) * (cy - ay) - (cx - ax) * (by - ay))
 
 
 @inner
-def _steadied(area):
+def steadied(area):
     """Return an area that may be divided by: a fold's triangles come close to 0 and keep their sign."""
     if abs(area) < 1e-7:
         return -1e-7 if area < 0.0 else 1e-7
@@ -89,14 +85,14 @@ def _flux(light, sigma, pupil, ia, ja, ib, jb, ic, jc):
     xi = (pupil[ia, ja, 0] + pupil[ib, jb, 0] + pupil[ic, jc, 0]) / 3.0
     eta = (pupil[ia, ja, 1] + pupil[ib, jb, 1] + pupil[ic, jc, 1]) / 3.0
     intensity = level(light, xi * xi + eta * eta, xi * sigma)
-    part = _area(
+    part = area_of(
         pupil[ia, ja, 0], pupil[ia, ja, 1], pupil[ib, jb, 0], pupil[ib, jb, 1], pupil[ic, jc, 0], pupil[ic, jc, 1]
     )
     return max(intensity, 0.0) * part
 
 
 @inner
-def _land(parameters, pupil, sigma, frame, spots):
+def land(parameters, pupil, sigma, frame, spots):
     """Fill where the mesh lands in pixels; frame: axis x, axis y, cos roll, sin roll, scale."""
     f, g = np.empty(6), np.empty(6)
     at_field(parameters, 0, sigma * sigma, f)
@@ -113,7 +109,7 @@ def _land(parameters, pupil, sigma, frame, spots):
 
 
 @inner
-def _densities(parameters, sigma, pupil, spots, densities):
+def fill_densities(parameters, sigma, pupil, spots, densities):
     """Fill the signed density of each triangle, shape (rings, spokes, 2)."""
     rings, spokes = densities.shape[0], densities.shape[1]
     light = np.empty(6)
@@ -121,27 +117,27 @@ def _densities(parameters, sigma, pupil, spots, densities):
     for i in range(rings):
         for j in range(spokes):
             k = j + 1 if j + 1 < spokes else 0
-            area = _area(
+            area = area_of(
                 spots[i, j, 0], spots[i, j, 1], spots[i + 1, j, 0], spots[i + 1, j, 1], spots[i + 1, k, 0],
                 spots[i + 1, k, 1],
             )  # fmt: skip
-            densities[i, j, 0] = -_flux(light, sigma, pupil, i, j, i + 1, j, i + 1, k) / _steadied(area)
+            densities[i, j, 0] = -_flux(light, sigma, pupil, i, j, i + 1, j, i + 1, k) / steadied(area)
             if i == 0:
                 densities[i, j, 1] = 0.0
                 continue
-            area = _area(
+            area = area_of(
                 spots[i, j, 0], spots[i, j, 1], spots[i + 1, k, 0], spots[i + 1, k, 1], spots[i, k, 0], spots[i, k, 1]
             )
-            densities[i, j, 1] = -_flux(light, sigma, pupil, i, j, i + 1, k, i, k) / _steadied(area)
+            densities[i, j, 1] = -_flux(light, sigma, pupil, i, j, i + 1, k, i, k) / steadied(area)
 
 
 @inner
-def _join(spots, span, densities):
+def join(spots, span, densities):
     """Give all triangles of each cell one density, so that the edges between them need not be drawn."""
     rings, spokes = densities.shape[0], densities.shape[1]
     for i in range(rings):
         for first in range(0, spokes, span):
-            light, area = _cell_light(spots, span, densities, i, first)
+            light, area = cell_light(spots, span, densities, i, first)
             densities[i, first : first + span, 0] = light / area
             if i > 0:
                 densities[i, first : first + span, 1] = light / area
@@ -149,14 +145,14 @@ def _join(spots, span, densities):
 
 @inner
 def _cells(parameters, sigma, pupil, spots, span, densities):
-    """Fill what `_densities` and `_join` would: the light of a cell's part of the pupil over its area on the sensor."""
+    """Fill what `fill_densities` and `join` would: light of a cell's part of the pupil over its area on the sensor."""
     rings, spokes = densities.shape[0], densities.shape[1]
     light, wedge = np.empty(6), np.empty(spokes)
     at_field(parameters, FIRST_I, sigma * sigma, light)
     x0, y0 = pupil[0, 0, 0], pupil[0, 0, 1]
     for j in range(spokes):
         k = j + 1 if j + 1 < spokes else 0
-        wedge[j] = _area(x0, y0, pupil[rings, j, 0], pupil[rings, j, 1], pupil[rings, k, 0], pupil[rings, k, 1])
+        wedge[j] = area_of(x0, y0, pupil[rings, j, 0], pupil[rings, j, 1], pupil[rings, k, 0], pupil[rings, k, 1])
     for i in range(rings):
         wide = _span_of(i, span, spokes, rings)
         # parts of a wedge that the two triangles between rings are
@@ -165,7 +161,7 @@ def _cells(parameters, sigma, pupil, spots, span, densities):
             flux, area = 0.0, 0.0
             for j in range(first, first + wide):
                 k = j + 1 if j + 1 < spokes else 0
-                one, other = _cell_areas(spots, i, j, spokes)
+                one, other = cell_areas(spots, i, j, spokes)
                 ax, ay, bx, by = pupil[i, j, 0], pupil[i, j, 1], pupil[i + 1, j, 0], pupil[i + 1, j, 1]
                 cx, cy = pupil[i + 1, k, 0], pupil[i + 1, k, 1]
                 x, y = (ax + bx + cx) / 3.0, (ay + by + cy) / 3.0
@@ -200,11 +196,11 @@ def _chord_of(span, spokes):
 
 
 @inner
-def _cell_light(spots, span, densities, i, first):
+def cell_light(spots, span, densities, i, first):
     """Return the light and the signed area of a cell of `span` spokes that begins at one of them."""
     light, area = 0.0, 0.0
     for j in range(first, first + span):
-        one, other = _cell_areas(spots, i, j, densities.shape[1])
+        one, other = cell_areas(spots, i, j, densities.shape[1])
         light += densities[i, j, 0] * one
         area += one
         if i > 0:
@@ -214,20 +210,20 @@ def _cell_light(spots, span, densities, i, first):
 
 
 @inner
-def _cell_areas(spots, i, j, spokes):
+def cell_areas(spots, i, j, spokes):
     """Return the signed areas of the two triangles between two spokes and two rings, as they are divided by."""
     k = j + 1 if j + 1 < spokes else 0
-    one = _area(
+    one = area_of(
         spots[i, j, 0], spots[i, j, 1], spots[i + 1, j, 0], spots[i + 1, j, 1], spots[i + 1, k, 0], spots[i + 1, k, 1]
     )
-    other = _area(
+    other = area_of(
         spots[i, j, 0], spots[i, j, 1], spots[i + 1, k, 0], spots[i + 1, k, 1], spots[i, k, 0], spots[i, k, 1]
     )
-    return _steadied(one), _steadied(other)
+    return steadied(one), steadied(other)
 
 
 @inner
-def _draw_mesh(spots, densities, span, fine, rim, left, top, width, height, plane):
+def draw_mesh(spots, densities, span, fine, rim, left, top, width, height, plane):
     """Draw every edge once, with the step in density across it; unless fine, one between rings spans several spokes.
 
     Without `rim` the outline is left out.
@@ -316,13 +312,13 @@ def _draw_soft_rim(spots, densities, variance, width, height, plane):
 
 
 @inner
-def _grain(parameters, disc_count, sigma, frame, fine):
+def grain(parameters, disc_count, sigma, frame, fine):
     """Return spokes and rings fine enough for a ghost, and how many spokes a cell of the outermost ring spans.
 
     0 spokes: nothing is open; a span of 0: there are folds, and every triangle stays alone.
     """
     pupil, none = np.empty((3, 8, 2)), np.empty((0, 0, 0, 0))
-    if not _mesh(parameters, disc_count, sigma, frame, 8, 2, False, pupil, none):
+    if not fill_mesh(parameters, disc_count, sigma, frame, 8, 2, False, pupil, none):
         return 0, 0, 0
     reach, least, most = 0.0, 1e300, -1e300
     dark, bright, outwards = 1e300, 0.0, 0.0
@@ -388,27 +384,27 @@ def draw_ghosts(parameters, disc_counts, visible, sigma, frame, plane):
     for g in range(parameters.shape[0]):
         if visible[g] == 0.0:
             continue
-        spokes, rings, span = _grain(parameters[g], disc_counts[g], sigma, frame, False)
+        spokes, rings, span = grain(parameters[g], disc_counts[g], sigma, frame, False)
         if spokes == 0:
             continue
         pupil, spots = np.empty((rings + 1, spokes, 2)), np.empty((rings + 1, spokes, 2))
-        if not _mesh(parameters[g], disc_counts[g], sigma, frame, spokes, rings, False, pupil, none):
+        if not fill_mesh(parameters[g], disc_counts[g], sigma, frame, spokes, rings, False, pupil, none):
             continue
-        _land(parameters[g], pupil, sigma, frame, spots)
+        land(parameters[g], pupil, sigma, frame, spots)
         densities = np.empty((rings, spokes, 2))
         if span > 0:
             _cells(parameters[g], sigma, pupil, spots, span, densities)
         else:
-            _densities(parameters[g], sigma, pupil, spots, densities)
+            fill_densities(parameters[g], sigma, pupil, spots, densities)
         # the model's irradiance is per pixel of the model: a finer picture keeps it
         densities *= visible[g] * frame[4] * frame[4]
         variance = parameters[g, SOFT] * frame[4] * frame[4]
         if not variance > 0.0:
-            _draw_mesh(spots, densities, span, False, True, 0, 0, width, height, plane)
+            draw_mesh(spots, densities, span, False, True, 0, 0, width, height, plane)
             continue
         if span > 0 and _least_radius(spots) > _WIDE * sqrt(variance):
             # without folds, and wide: only the outline's step is steep enough to be seen spread
-            _draw_mesh(spots, densities, span, False, False, 0, 0, width, height, plane)
+            draw_mesh(spots, densities, span, False, False, 0, 0, width, height, plane)
             _draw_soft_rim(spots, densities, variance, width, height, plane)
             continue
         # spread alone, and then laid over the others
@@ -416,8 +412,8 @@ def draw_ghosts(parameters, disc_counts, visible, sigma, frame, plane):
         if w == 0:
             continue
         own = np.zeros((h, w + 1))
-        _draw_mesh(spots, densities, span, False, True, left, top, w, h, own)
-        _soften(own.reshape((h, w + 1, 1)), variance, spots, left, top)
+        draw_mesh(spots, densities, span, False, True, left, top, w, h, own)
+        soften_mesh(own.reshape((h, w + 1, 1)), variance, spots, left, top)
         for y in range(h):
             for c in range(w):
                 plane[top + y, left + c] += own[y, c]
@@ -441,13 +437,13 @@ def window_of(parameters, disc_count, sigma, frame, width, height):
     left, top, width, height : int
         Of the window; width 0 when it touches none.
     """
-    spokes, rings, _ = _grain(parameters, disc_count, sigma, frame, True)
+    spokes, rings, _ = grain(parameters, disc_count, sigma, frame, True)
     if spokes == 0:
         return 0, 0, 0, 0
     pupil, spots = np.empty((rings + 1, spokes, 2)), np.empty((rings + 1, spokes, 2))
-    if not _mesh(parameters, disc_count, sigma, frame, spokes, rings, False, pupil, np.empty((0, 0, 0, 0))):
+    if not fill_mesh(parameters, disc_count, sigma, frame, spokes, rings, False, pupil, np.empty((0, 0, 0, 0))):
         return 0, 0, 0, 0
-    _land(parameters, pupil, sigma, frame, spots)
+    land(parameters, pupil, sigma, frame, spots)
     return _box(spots, reach_of(parameters[SOFT] * frame[4] * frame[4]), width, height)
 
 
@@ -475,7 +471,7 @@ def _box(spots, reach, width, height):
 
 
 @inner
-def _soften(differences, variance, spots, left, top):
+def soften_mesh(differences, variance, spots, left, top):
     """Spread a mesh that was drawn into a window, in place."""
     taps = np.empty(reach_of(variance) + 1)
     taps_of(variance, taps)
@@ -485,222 +481,3 @@ def _soften(differences, variance, spots, left, top):
         differences, taps, int(floor(max(x0, -far))) - left - 1, int(floor(max(y0, -far))) - top - 1,
         int(ceil(min(x1, far))) - left + 2, int(ceil(min(y1, far))) - top + 2,
     )  # fmt: skip
-
-
-@inner
-def _spot_changes(parameters, sigma, free, frame, pupil, pupil_by, spots_by):
-    """Fill the derivatives of where the mesh lands, (rings + 1, spokes, Q, 2), by the free parameters."""
-    terms = np.empty(TERMS)
-    w = sigma * sigma
-    for i in range(pupil.shape[0]):
-        for j in range(pupil.shape[1]):
-            xi, eta = pupil[i, j, 0], pupil[i, j, 1]
-            monomials(xi * xi + eta * eta, xi * sigma, w, terms)
-            _, _, a_xi, a_eta, c_xi, c_eta = place(parameters, xi, eta, sigma)
-            for q in range(free.size):
-                n = free[q]
-                if n == SOFT:
-                    along, across = 0.0, 0.0
-                elif n < FIRST_G:
-                    along, across = sigma * terms[n], 0.0
-                elif n < FIRST_I:
-                    along, across = xi * terms[n - FIRST_G], eta * terms[n - FIRST_G]
-                elif n < FIRST_DISC:
-                    along, across = 0.0, 0.0
-                else:
-                    dxi, deta = _pupil_change(n, sigma, pupil_by, i, j)
-                    along, across = a_xi * dxi + a_eta * deta, c_xi * dxi + c_eta * deta
-                spots_by[i, j, q, 0] = frame[4] * (frame[2] * along - frame[3] * across)
-                spots_by[i, j, q, 1] = -frame[4] * (frame[3] * along + frame[2] * across)
-
-
-@inner
-def _pupil_change(n, sigma, pupil_by, i, j):
-    """Return how a pupil point moves with parameter n of a disc."""
-    disc, which = (n - FIRST_DISC) // DISC_NUMBERS + 1, (n - FIRST_DISC) % DISC_NUMBERS
-    if which == 2:
-        return pupil_by[i, j, 0, 2 * disc + 1], pupil_by[i, j, 1, 2 * disc + 1]
-    by = sigma if which == 0 else sigma * sigma * sigma
-    return by * pupil_by[i, j, 0, 2 * disc], by * pupil_by[i, j, 1, 2 * disc]
-
-
-@inner
-def _triangle_changes(parameters, sigma, free, pupil, pupil_by, spots, spots_by, ia, ja, ib, jb, ic, jc, out):
-    """Fill the derivatives of a triangle's signed density by the free parameters."""
-    ax, ay = spots[ia, ja, 0], spots[ia, ja, 1]
-    bx, by = spots[ib, jb, 0], spots[ib, jb, 1]
-    cx, cy = spots[ic, jc, 0], spots[ic, jc, 1]
-    raw = _area(ax, ay, bx, by, cx, cy)
-    area = _steadied(raw)
-    pax, pay = pupil[ia, ja, 0], pupil[ia, ja, 1]
-    pbx, pby = pupil[ib, jb, 0], pupil[ib, jb, 1]
-    pcx, pcy = pupil[ic, jc, 0], pupil[ic, jc, 1]
-    part = _area(pax, pay, pbx, pby, pcx, pcy)
-    xi, eta = (pax + pbx + pcx) / 3.0, (pay + pby + pcy) / 3.0
-    u, v, w = xi * xi + eta * eta, xi * sigma, sigma * sigma
-    intensity, i_u, i_v = slopes(parameters, FIRST_I, u, v, w)
-    dark = intensity <= 0.0
-    if dark:
-        intensity, i_u, i_v = 0.0, 0.0, 0.0
-    i_xi, i_eta = 2.0 * xi * i_u + sigma * i_v, 2.0 * eta * i_u
-    terms = np.empty(TERMS)
-    monomials(u, v, w, terms)
-    density = -intensity * part / area
-    for q in range(free.size):
-        n = free[q]
-        flux_change = 0.0
-        if n == SOFT:
-            out[q] = 0.0
-            continue
-        if FIRST_I <= n < FIRST_DISC:
-            # what is below 0 is drawn as 0; its way up must show
-            out[q] = -terms[n - FIRST_I] * part / area if not dark else 0.0
-            continue
-        if n >= FIRST_DISC:
-            dax, day = _pupil_change(n, sigma, pupil_by, ia, ja)
-            dbx, dby = _pupil_change(n, sigma, pupil_by, ib, jb)
-            dcx, dcy = _pupil_change(n, sigma, pupil_by, ic, jc)
-            grown = 0.5 * (
-                (dbx - dax) * (pcy - pay) + (pbx - pax) * (dcy - day) - (dcx - dax) * (pby - pay)
-                - (pcx - pax) * (dby - day)
-            )  # fmt: skip
-            brighter = (i_xi * (dax + dbx + dcx) + i_eta * (day + dby + dcy)) / 3.0
-            flux_change = brighter * part + intensity * grown
-        wider = _wider(spots, spots_by, ia, ja, ib, jb, ic, jc, q) if raw == area else 0.0
-        out[q] = -flux_change / area - density * wider / area
-
-
-@inner
-def _wider(spots, spots_by, ia, ja, ib, jb, ic, jc, q):
-    """Return the derivative of a triangle's signed area by free parameter q."""
-    ax, ay = spots[ia, ja, 0], spots[ia, ja, 1]
-    bx, by = spots[ib, jb, 0], spots[ib, jb, 1]
-    cx, cy = spots[ic, jc, 0], spots[ic, jc, 1]
-    ux, uy = spots_by[ia, ja, q, 0], spots_by[ia, ja, q, 1]
-    vx, vy = spots_by[ib, jb, q, 0], spots_by[ib, jb, q, 1]
-    tx, ty = spots_by[ic, jc, q, 0], spots_by[ic, jc, q, 1]
-    return 0.5 * ((vx - ux) * (cy - ay) + (bx - ax) * (ty - uy) - (tx - ux) * (by - ay) - (cx - ax) * (vy - uy))
-
-
-@inner
-def _join_changes(spots, spots_by, span, densities, changes):
-    """Give all triangles of each cell the derivatives of their common density; `densities` are still their own."""
-    rings, spokes = densities.shape[0], densities.shape[1]
-    for i in range(rings):
-        for first in range(0, spokes, span):
-            light, area = _cell_light(spots, span, densities, i, first)
-            common = light / area
-            for q in range(changes.shape[3]):
-                change = 0.0
-                for j in range(first, first + span):
-                    k = j + 1 if j + 1 < spokes else 0
-                    one, other = _cell_areas(spots, i, j, spokes)
-                    change += changes[i, j, 0, q] * one
-                    change += (densities[i, j, 0] - common) * _wider(spots, spots_by, i, j, i + 1, j, i + 1, k, q)
-                    if i > 0:
-                        change += changes[i, j, 1, q] * other
-                        change += (densities[i, j, 1] - common) * _wider(spots, spots_by, i, j, i + 1, k, i, k, q)
-                for j in range(first, first + span):
-                    changes[i, j, 0, q] = change / area
-                    if i > 0:
-                        changes[i, j, 1, q] = change / area
-
-
-@inner
-def _draw_changes(spots, spots_by, densities, changes, span, left, top, width, height, out):
-    """Draw every edge's derivatives once."""
-    rings, spokes = densities.shape[0], densities.shape[1]
-    step = np.empty(changes.shape[3])
-    zero = np.zeros(changes.shape[3])
-    for i in range(rings):
-        for j in range(spokes):
-            k = j + 1 if j + 1 < spokes else 0
-            before = j - 1 if j > 0 else spokes - 1
-            ax, ay = spots[i, j, 0], spots[i, j, 1]
-            bx, by = spots[i + 1, j, 0], spots[i + 1, j, 1]
-            cx, cy = spots[i + 1, k, 0], spots[i + 1, k, 1]
-            half = 1 if i > 0 else 0
-            # nothing changes inside a cell
-            if span == 0 or j % span == 0:
-                step[:] = changes[i, j, 0] - changes[i, before, half]
-                add_edge_changes(
-                    ax, ay, bx, by, densities[i, j, 0] - densities[i, before, half], step, spots_by[i, j],
-                    spots_by[i + 1, j], left, top, width, height, out,
-                )  # fmt: skip
-            outer = densities[i + 1, j, 1] if i + 1 < rings else 0.0
-            step[:] = changes[i, j, 0] - (changes[i + 1, j, 1] if i + 1 < rings else zero)
-            add_edge_changes(
-                bx, by, cx, cy, densities[i, j, 0] - outer, step, spots_by[i + 1, j], spots_by[i + 1, k], left, top,
-                width, height, out,
-            )  # fmt: skip
-            if i > 0 and span == 0:
-                step[:] = changes[i, j, 1] - changes[i, j, 0]
-                add_edge_changes(
-                    ax, ay, cx, cy, densities[i, j, 1] - densities[i, j, 0], step, spots_by[i, j], spots_by[i + 1, k],
-                    left, top, width, height, out,
-                )  # fmt: skip
-
-
-@compiled
-def draw_with_changes(parameters, disc_count, sigma, free, frame, left, top, plane, out):
-    """Draw one ghost of one channel and its derivatives inside a window.
-
-    Parameters
-    ----------
-    parameters : ndarray, shape (N,), float64
-    disc_count : int
-    sigma : float
-    free : ndarray, shape (Q,), int64
-        Which parameters to derive by.
-    frame : ndarray, shape (5,)
-    left, top : int
-        First pixel of the window.
-    plane : ndarray, shape (h, w + 1), float64
-        Zeros, and then differences along rows.
-    out : ndarray, shape (h, w + 1, Q), float64
-        Zeros, and then differences along rows of the derivatives.
-
-    Notes
-    -----
-    The derivative of the drawn picture itself, mesh and all: tests/kernels/test_measure_mesh.py compares it with
-    differences.
-    """
-    height, width = plane.shape[0], plane.shape[1] - 1
-    spokes, rings, span = _grain(parameters, disc_count, sigma, frame, True)
-    if spokes == 0:
-        return
-    pupil, spots = np.empty((rings + 1, spokes, 2)), np.empty((rings + 1, spokes, 2))
-    pupil_by = np.empty((rings + 1, spokes, 2, 2 * disc_count + 2))
-    if not _mesh(parameters, disc_count, sigma, frame, spokes, rings, True, pupil, pupil_by):
-        return
-    _land(parameters, pupil, sigma, frame, spots)
-    spots_by = np.empty((rings + 1, spokes, free.size, 2))
-    _spot_changes(parameters, sigma, free, frame, pupil, pupil_by, spots_by)
-    densities, changes = np.empty((rings, spokes, 2)), np.zeros((rings, spokes, 2, free.size))
-    _densities(parameters, sigma, pupil, spots, densities)
-    for i in range(rings):
-        for j in range(spokes):
-            k = j + 1 if j + 1 < spokes else 0
-            _triangle_changes(
-                parameters, sigma, free, pupil, pupil_by, spots, spots_by, i, j, i + 1, j, i + 1, k, changes[i, j, 0]
-            )
-            if i > 0:
-                _triangle_changes(
-                    parameters, sigma, free, pupil, pupil_by, spots, spots_by, i, j, i + 1, k, i, k, changes[i, j, 1]
-                )
-    if span > 0:
-        _join_changes(spots, spots_by, span, densities, changes)
-        _join(spots, span, densities)
-    # the model's irradiance is per pixel of the model, whatever the picture's scale
-    densities *= frame[4] * frame[4]
-    changes *= frame[4] * frame[4]
-    _draw_mesh(spots, densities, span, True, True, left, top, width, height, plane)
-    _draw_changes(spots, spots_by, densities, changes, span, left, top, width, height, out)
-    variance = parameters[SOFT] * frame[4] * frame[4]
-    if variance > 0.0:
-        _soften(plane.reshape((height, width + 1, 1)), variance, spots, left, top)
-        if free.size > 0:
-            _soften(out, variance, spots, left, top)
-    for q in range(free.size):
-        if free[q] == SOFT:
-            add_spreading(plane, frame[4] * frame[4], out[:, :, q])

@@ -36,23 +36,29 @@ def normal_equations(changes, weight, residual, matrix, side, mean):
     held = 0
     for y in range(weight.shape[0]):
         here[:] = 0.0
-        for x in range(weight.shape[1]):
+        # pixels beside each other of the same derivatives count as one
+        total, light, lit = 0.0, 0.0, False
+        for x in range(weight.shape[1] + 1):
+            moved = 0.0
             for q in range(count):
-                here[q] += changes[y, x, q]
-            w = weight[y, x]
-            if w == 0.0:
-                continue
-            r = residual[y, x]
-            for q in range(count):
-                light = w * here[q]
-                rows[held, q] = here[q]
-                weighted[held, q] = light
-                side[q] += light * r
-                mean[q] += light
-            held += 1
-            if held == _TOGETHER:
-                _add_products(rows, weighted, matrix)
-                held = 0
+                moved += abs(changes[y, x, q])
+            if moved > 0.0 or x == weight.shape[1]:
+                if lit and total > 0.0:
+                    for q in range(count):
+                        rows[held, q] = here[q]
+                        weighted[held, q] = total * here[q]
+                        side[q] += light * here[q]
+                        mean[q] += total * here[q]
+                    held += 1
+                    if held == _TOGETHER:
+                        _add_products(rows, weighted, matrix)
+                        held = 0
+                for q in range(count):
+                    here[q] += changes[y, x, q]
+                total, light, lit = 0.0, 0.0, True
+            if x < weight.shape[1] and weight[y, x] > 0.0:
+                total += weight[y, x]
+                light += weight[y, x] * residual[y, x]
     rows[held:] = 0.0
     weighted[held:] = 0.0
     _add_products(rows, weighted, matrix)

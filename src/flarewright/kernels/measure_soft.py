@@ -14,6 +14,8 @@ from ._jit import inner
 
 # no pixel reaches farther than this
 _FARTHEST = 64
+# numbers that are filtered at once, and columns that are: so many stay near the processor while tap after tap is added
+_CHUNK, _TILE = 1024, 64
 
 
 @inner
@@ -63,89 +65,82 @@ def soften(differences, taps, left, top, right, bottom):
     """
     height, width, count = differences.shape[0], differences.shape[1] - 1, differences.shape[2]
     reach = taps.size - 1
-    x0, x1 = max(left - reach, 1), min(right + reach + 1, width)
-    y0, y1 = max(top - reach, 0), min(bottom + reach, height)
-    if y1 <= y0 or x1 <= x0:
+    x0, y0, y1 = max(left, 1), max(top, 0), min(bottom, height)
+    x1 = max(min(right + 1, width), x0)
+    if y1 <= y0 or left >= width or right + reach < 0:
         return
     flat = differences.reshape(differences.size)
-    both = np.empty(2 * reach + 1)
-    for k in range(-reach, reach + 1):
-        both[reach + k] = taps[abs(k)]
-    _spread_rows(flat, both, count, width, x0, x1, max(top, 0), min(bottom, height))
+    _spread_rows(flat, taps, count, width, x0, x1, y0, y1)
     # down the columns, the light left of the window with them
-    first = 0 if x0 == 1 else x0
-    _spread_columns(flat, taps, count, width, height, first, x1, y0, y1)
+    first, last = max(x0 - reach, 0) * count, min(x1 + reach, width) * count
+    _spread_columns(flat, taps, (width + 1) * count, height, first, last, y0, y1)
 
 
 @inner
-def _spread_rows(flat, both, count, width, x0, x1, y0, y1):
-    """Spread along rows: what differs, mostly nothing, is scattered."""
-    reach = both.size // 2
-    low, high = max(x0 - reach, 1), min(x1 + reach, width)
-    size = (high - low) * count
-    source = np.empty(size)
+def _spread_rows(flat, taps, count, width, x0, x1, y0, y1):
+    """Spread columns x0 to x1 along rows."""
+    reach, size = taps.size - 1, (x1 - x0) * count
+    held, spread = np.zeros(size + 4 * reach * count), np.empty(size + 2 * reach * count)
+    # from the second column that takes in what is spread to the last one
+    first, last = max(x0 - reach, 1), min(x1 + reach, width)
     for y in range(y0, y1):
-        row = y * (width + 1) * count
-        start = row + low * count
-        for i in range(size):
-            source[i] = flat[start + i]
-            flat[start + i] = 0.0
-        first, last = _run(source, 0, size, 0)
-        while first < size:
-            if low * count + first < (reach + 1) * count or low * count + last + reach * count >= width * count:
-                for i in range(first, last + 1):
-                    for k in range(2 * reach + 1):
-                        at = low * count + i + (k - reach) * count
-                        # what spreads beyond the left border is part of the light left of the window
-                        if at < width * count:
-                            flat[row + (at if at >= 0 else i % count)] += both[k] * source[i]
-            else:
-                for k in range(2 * reach + 1):
-                    to, weight = start + (k - reach) * count, both[k]
-                    for i in range(first, last + 1):
-                        flat[to + i] += weight * source[i]
-            first, last = _run(source, 0, size, last + 1)
+        start = y * (width + 1) * count
+        row = flat[start : start + width * count]
+        _copy(row[x0 * count :], held[2 * reach * count : 2 * reach * count + size])
+        _filter(held, taps, count, spread)
+        _copy(spread[(first - x0 + reach) * count :], row[first * count : last * count])
+        # what is spread beyond the left border is part of the light left of the window
+        for i in range((first - x0 + reach) * count):
+            row[i % count] += spread[i]
 
 
 @inner
-def _run(numbers, begin, size, at):
-    """Return the first and last place, from one on, of a run of numbers that are not 0; gaps of eight are none."""
-    while at < size and numbers[begin + at] == 0.0:
-        at += 1
-    first = last = at
-    while at < size and at - last <= 8:
-        if numbers[begin + at] != 0.0:
-            last = at
-        at += 1
-    return first, last
-
-
-@inner
-def _spread_columns(flat, taps, count, width, height, x0, x1, y0, y1):
-    """Spread down the columns, runs of what differs at once; beyond the first and last row they go on as these are."""
+def _spread_columns(flat, taps, stride, height, first, last, y0, y1):
+    """Spread rows y0 to y1 down the columns; beyond the first and the last row they go on as these are."""
     reach = taps.size - 1
-    across = (x1 - x0) * count
-    tails = np.zeros(reach + 1)
-    tails[reach] = taps[reach]
-    for k in range(reach - 1, -1, -1):
-        tails[k] = tails[k + 1] + taps[k]
-    held = np.empty((y1 - y0) * across)
-    for y in range(y0, y1):
-        start, here = (y * (width + 1) + x0) * count, (y - y0) * across
-        for i in range(across):
-            held[here + i] = flat[start + i]
-            flat[start + i] = 0.0
-    for y in range(y0, y1):
-        here = (y - y0) * across
-        first, last = _run(held, here, across, 0)
-        while first < across:
-            for to in range(max(y - reach, y0), min(y + reach + 1, y1)):
-                away = abs(y - to)
-                weight = tails[away] if y == 0 or y == height - 1 else taps[away]
-                start = (to * (width + 1) + x0) * count
-                for n in range(first, last + 1):
-                    flat[start + n] += weight * held[here + n]
-            first, last = _run(held, here, across, last + 1)
+    held, spread = np.empty((y1 - y0 + 4 * reach) * _TILE), np.empty((y1 - y0 + 2 * reach) * _TILE)
+    for begin in range(first, last, _TILE):
+        across = min(_TILE, last - begin)
+        for y in range(y0 - 2 * reach, y1 + 2 * reach):
+            row = held[(y - y0 + 2 * reach) * across : (y - y0 + 2 * reach + 1) * across]
+            near = min(max(y, y0), y1 - 1)
+            if near == y or near == 0 or near == height - 1:
+                _copy(flat[near * stride + begin :], row)
+            else:
+                row[:] = 0.0
+        _filter(held, taps, across, spread[: (y1 - y0 + 2 * reach) * across])
+        for y in range(max(y0 - reach, 0), min(y1 + reach, height)):
+            start = y * stride + begin
+            _copy(spread[(y - y0 + reach) * across :], flat[start : start + across])
+
+
+@inner
+def _copy(source, target):
+    """Fill numbers with the first ones of others."""
+    for i in range(target.size):
+        target[i] = source[i]
+
+
+@inner
+def _filter(source, taps, stride, out):
+    """Fill what an even filter makes of numbers; `source` begins as many strides before `out` as the filter reaches."""
+    reach = taps.size - 1
+    for begin in range(0, out.size, _CHUNK):
+        part = out[begin : begin + _CHUNK]
+        middle = source[begin + reach * stride :]
+        for i in range(part.size):
+            part[i] = taps[0] * middle[i]
+        k = 1
+        while k < reach:
+            before, after = source[begin + (reach - k) * stride :], source[begin + (reach + k) * stride :]
+            left, right = source[begin + (reach - k - 1) * stride :], source[begin + (reach + k + 1) * stride :]
+            for i in range(part.size):
+                part[i] += taps[k] * (before[i] + after[i]) + taps[k + 1] * (left[i] + right[i])
+            k += 2
+        if k == reach:
+            before, after = source[begin:], source[begin + 2 * reach * stride :]
+            for i in range(part.size):
+                part[i] += taps[reach] * (before[i] + after[i])
 
 
 @inner

@@ -5,19 +5,25 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..kernels.measure_changes import draw_with_changes
 from ..kernels.measure_edges import sum_along_rows
-from ..kernels.measure_mesh import draw_with_changes, window_of
+from ..kernels.measure_mesh import window_of
+from ..kernels.measure_misfit import weigh_misfit
 from ..kernels.measure_normal import normal_equations
 from ..kernels.measure_pupil import DISC_NUMBERS, FIRST_DISC, FIRST_G, FIRST_I, SOFT
 from .normal import inverse, solution
 from .numbers import NUMBERS, Floats
+from .room import Room
 from .views import View, halved
 
 Indices = NDArray[np.int64]
+Made = TypeVar("Made")
+Part = tuple[slice, slice]
 
 # a ghost is fitted on pictures halved until its window has about so many pixels
 AREA = 7000
@@ -28,6 +34,8 @@ OUTLIER = 4.0
 # what softness is usual, part of the picture's width
 _SOFTNESS = 0.005
 _NONE = np.zeros(0, np.int64)
+_NO_CHANGES = np.zeros((0, 0, 0))
+_PLANES, _CHANGES = Room(), Room()
 
 
 @dataclass(frozen=True)
@@ -113,11 +121,21 @@ def free_numbers(order: int, discs: int, intensity_order: int, soft: bool = Fals
 
 def render(shape: Shape, view: View, scale: float = 1.0) -> Floats:
     """Draw a shape into a picture of a view's size, shape (H, W)."""
-    width, height = view.size_px
-    plane = np.zeros((height, width + 1))
-    draw_with_changes(shape.numbers, shape.discs, view.sigma, _NONE, view.frame, 0, 0, plane, np.zeros((1, 1, 0)))
+    picture = np.zeros(view.pixels.shape[:2])
+    part, light = light_of(shape, view)
+    picture[part] = scale * light
+    return picture
+
+
+def light_of(shape: Shape, view: View) -> tuple[Part, Floats]:
+    """Return which rows and columns of a view a shape touches, and its picture there."""
+    left, top, width, height = window_of(shape.numbers, shape.discs, view.sigma, view.frame, *view.size_px)
+    if not width:
+        return np.s_[0:0, 0:0], np.zeros((0, 0))
+    plane = _PLANES.zeros(height, width + 1)
+    draw_with_changes(shape.numbers, shape.discs, view.sigma, _NONE, view.frame, left, top, plane, _NO_CHANGES)
     sum_along_rows(plane)
-    return scale * plane[:, :width]
+    return np.s_[top : top + height, left : left + width], plane[:, :width].copy()
 
 
 def scaled(frame: Floats, times: int) -> Floats:
@@ -171,32 +189,53 @@ def patches_of(
     return found
 
 
-def evaluate(
-    shape: Shape, free: Indices, patch: Patch, offset: bool, error: float, tails: bool = True
-) -> tuple[float, int, Floats, Floats]:
-    """Return cost, pixels, normal matrix and right side of one patch."""
+@dataclass(frozen=True)
+class Misfit:
+    """How a shape misses a patch.
+
+    Attributes
+    ----------
+    cost : float
+        Weighted squares.
+    total : float
+        Sum of the weights.
+    count : int
+        Pixels that have weight.
+    weight, residual : ndarray, shape (H, W)
+    """
+
+    cost: float
+    total: float
+    count: int
+    weight: Floats
+    residual: Floats
+
+
+def misfit(shape: Shape, patch: Patch, offset: bool, error: float, tails: bool = True) -> Misfit:
+    """Draw a shape on a patch and weigh what it misses; see `refine`."""
     height, width = patch.pixels.shape
-    plane, changes = np.zeros((height, width + 1)), np.zeros((height, width + 1, free.size))
-    draw_with_changes(shape.numbers, shape.discs, patch.sigma, free, patch.frame, patch.left, patch.top, plane, changes)
-    sum_along_rows(plane)
-    model = plane[:, :width]
-    weight = _weights(patch, model, error)
-    residual = patch.pixels - model
-    total = weight.sum()
-    if offset and total > 0.0:
-        residual = residual - (weight * residual).sum() / total
+    plane, weight, residual = _PLANES.zeros(height, width + 1), np.empty((height, width)), np.empty((height, width))
+    draw_with_changes(
+        shape.numbers, shape.discs, patch.sigma, _NONE, patch.frame, patch.left, patch.top, plane, _NO_CHANGES
+    )
     # heavy tails: other ghosts that are not known yet
-    if error > 0.0 and tails:
-        weight = weight / (1.0 + weight * residual**2 / OUTLIER**2)
-        total = weight.sum()
-    cost = float((weight * residual**2).sum())
-    count = int(np.count_nonzero(weight))
+    outlier = OUTLIER if error > 0.0 and tails else np.inf
+    cost, total, count = weigh_misfit(
+        plane, patch.pixels, patch.weight, max(error, 0.0), outlier, offset, weight, residual
+    )
+    return Misfit(cost, total, count, weight, residual)
+
+
+def equations(shape: Shape, free: Indices, patch: Patch, missed: Misfit, offset: bool) -> tuple[Floats, Floats]:
+    """Return normal matrix and right side of one patch by its misfit."""
+    height, width = patch.pixels.shape
+    plane, changes = _PLANES.zeros(height, width + 1), _CHANGES.zeros(height, width + 1, free.size)
+    draw_with_changes(shape.numbers, shape.discs, patch.sigma, free, patch.frame, patch.left, patch.top, plane, changes)
     matrix, side, mean = np.empty((free.size, free.size)), np.empty(free.size), np.empty(free.size)
-    if free.size:
-        normal_equations(changes, weight, residual, matrix, side, mean)
-    if offset and total > 0.0:
-        matrix -= np.outer(mean, mean) / total
-    return cost, count, matrix, side
+    normal_equations(changes, missed.weight, missed.residual, matrix, side, mean)
+    if offset and missed.total > 0.0:
+        matrix -= np.outer(mean, mean) / missed.total
+    return matrix, side
 
 
 def _weights(patch: Patch, model: Floats, error: float) -> Floats:
@@ -261,39 +300,93 @@ def refine(
     -----
     Marquardt (1963): the damping scales with the diagonal. The Jacobian is the drawn picture's own derivative.
     """
-    run: Callable[..., object] = map if pool is None else pool.map
+    search = _Search(patches, free, width, offset, error, tails, pool)
+    last, matrix = search.descend(shape, steps)
+    covariance = inverse(search.slopes(last)[0] if matrix is None else matrix)
+    return Fit(last.shape, free, covariance, last.cost, sum(one.count for one in last.missed))
 
-    def look(trial: Shape) -> tuple[float, int, Floats, Floats]:
-        parts: list[tuple[float, int, Floats, Floats]] = list(
-            run(lambda patch: evaluate(trial, free, patch, offset, error, tails), patches)  # type: ignore[call-overload]
-        )
-        prior = priors(shape, free, width)
-        at = trial.numbers[free]
-        cost = sum(part[0] for part in parts) + float(prior @ at**2)
-        matrix = np.sum([part[2] for part in parts], axis=0) + np.diag(prior)
-        return cost, sum(part[1] for part in parts), matrix, np.sum([part[3] for part in parts], axis=0) - prior * at
 
-    cost, count, matrix, side = look(shape)
-    damping = 1e-3
-    for _ in range(steps):
-        improved = False
-        for _retry in range(8):
-            step = solution(matrix + damping * np.diag(np.diag(matrix)), side)
-            trial = stepped(shape, free, step)
-            trial_cost, trial_count, trial_matrix, trial_side = look(trial)
-            if trial_cost < cost:
-                improved = True
+def improve(
+    shape: Shape,
+    patches: Sequence[Patch],
+    free: Indices,
+    *,
+    width: int,
+    steps: int,
+    error: float = MODEL_ERROR,
+    tails: bool = True,
+    pool: ThreadPoolExecutor | None = None,
+) -> tuple[Shape, float]:
+    """Return what `refine` makes of a shape, and its cost: for trials, of which nobody asks how sure they are."""
+    last, _ = _Search(patches, free, width, True, error, tails, pool).descend(shape, steps)
+    return last.shape, last.cost
+
+
+@dataclass(frozen=True)
+class _State:
+    """Where a search stands: the prior is that of the shape before."""
+
+    shape: Shape
+    prior: Floats
+    cost: float
+    missed: list[Misfit]
+
+
+@dataclass(frozen=True)
+class _Search:
+    """Levenberg and Marquardt's search; see `refine`."""
+
+    patches: Sequence[Patch]
+    free: Indices
+    width: int
+    offset: bool
+    error: float
+    tails: bool
+    pool: ThreadPoolExecutor | None
+
+    def descend(self, shape: Shape, steps: int) -> tuple[_State, Floats | None]:
+        """Go down step by step; return the last state, and its normal matrix when it is known.
+
+        Most steps that are tried are not taken, and derivatives cost many times what the picture does: they are drawn
+        only where a step begins.
+        """
+        at = self.look(shape, priors(shape, self.free, self.width))
+        damping = 1e-3
+        for _ in range(steps):
+            matrix, side = self.slopes(at)
+            prior = priors(at.shape, self.free, self.width)
+            for _retry in range(8):
+                step = solution(matrix + damping * np.diag(np.diag(matrix)), side)
+                trial = self.look(stepped(at.shape, self.free, step), prior)
+                if trial.cost < at.cost:
+                    break
+                damping = max(damping, 1e-4) * 6.0
+            else:
+                return at, matrix
+            gained, at = at.cost - trial.cost, trial
+            damping *= 0.2
+            # a search needs no more than its model is worth; a measurement ends where noise hides every step
+            if gained < (1e-4 if self.error > 0.0 else 1e-7) * at.cost:
                 break
-            damping = max(damping, 1e-4) * 6.0
-        if not improved:
-            break
-        gained = cost - trial_cost
-        shape, cost, count, matrix, side = trial, trial_cost, trial_count, trial_matrix, trial_side
-        damping *= 0.2
-        # a search needs no more than its model is worth; a measurement ends where noise hides every step
-        if gained < (1e-4 if error > 0.0 else 1e-7) * cost:
-            break
-    return Fit(shape, free, inverse(matrix), cost, count)
+        return at, None
+
+    def look(self, shape: Shape, prior: Floats) -> _State:
+        """Return the state of a shape."""
+        missed = self.each(lambda patch: misfit(shape, patch, self.offset, self.error, self.tails), self.patches)
+        cost = sum(one.cost for one in missed) + float(prior @ shape.numbers[self.free] ** 2)
+        return _State(shape, prior, cost, missed)
+
+    def slopes(self, at: _State) -> tuple[Floats, Floats]:
+        """Return normal matrix and right side."""
+        parts = self.each(
+            lambda patch, missed: equations(at.shape, self.free, patch, missed, self.offset), self.patches, at.missed
+        )
+        matrix = np.sum([part[0] for part in parts], axis=0) + np.diag(at.prior)
+        return matrix, np.sum([part[1] for part in parts], axis=0) - at.prior * at.shape.numbers[self.free]
+
+    def each(self, work: Callable[..., Made], *given: Sequence[object]) -> list[Made]:
+        """Return what is made of every patch, in their order."""
+        return list(map(work, *given) if self.pool is None else self.pool.map(work, *given))
 
 
 def stepped(shape: Shape, free: Indices, step: Floats) -> Shape:
@@ -312,8 +405,7 @@ def cost_of(
     shape: Shape, patches: Sequence[Patch], *, offset: bool = True, error: float = MODEL_ERROR, tails: bool = True
 ) -> float:
     """Return the cost of a shape on patches, without the priors."""
-    none = np.zeros(0, np.int64)
-    return sum(evaluate(shape, none, patch, offset, error, tails)[0] for patch in patches)
+    return sum(misfit(shape, patch, offset, error, tails).cost for patch in patches)
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..kernels.measure_pupil import FIRST_DISC, FIRST_I
-from .fit import Fit, Shape, render
+from .fit import Fit, Shape, light_of
 from .views import Pixels, View
 
 CHANNELS = 3
@@ -46,7 +46,8 @@ def rest_of(ghosts: Sequence[Found], views: Sequence[View], channel: int) -> lis
         left = view.pixels[..., channel].astype(float)
         for ghost in ghosts:
             if ghost.first <= k <= ghost.last:
-                left = left - render(ghost.shapes[channel], view)
+                part, light = light_of(ghost.shapes[channel], view)
+                left[part] -= light
         out.append(left.astype(np.float32))
     return out
 
@@ -67,7 +68,9 @@ def alone(ghost: Found, channel: int, views: Sequence[View], rest: Sequence[Pixe
     few = run[np.unique(np.linspace(0, run.size - 1, min(run.size, most)).round().astype(int))]
     out = []
     for k in few:
-        own = (rest[k] + render(ghost.shapes[channel], views[k])).astype(np.float32)
+        own = rest[k].copy()
+        part, light = light_of(ghost.shapes[channel], views[k])
+        own[part] += light
         out.append(views[k].showing(np.broadcast_to(own[..., None], views[k].pixels.shape)))
     return out
 
@@ -75,7 +78,11 @@ def alone(ghost: Found, channel: int, views: Sequence[View], rest: Sequence[Pixe
 def exchange(old: Shape, new: Shape, ghost: Found, views: Sequence[View], rest: list[Pixels]) -> None:
     """Put a ghost's new light in the place of the old in the rest."""
     for k in range(ghost.first, ghost.last + 1):
-        rest[k] = (rest[k] + (render(old, views[k]) - render(new, views[k]))).astype(np.float32)
+        left = rest[k].astype(float)
+        for shape, sign in ((old, 1.0), (new, -1.0)):
+            part, light = light_of(shape, views[k])
+            left[part] += sign * light
+        rest[k] = left.astype(np.float32)
 
 
 def darkened(shape: Shape) -> Shape:

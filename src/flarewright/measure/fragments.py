@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..kernels.measure_pupil import FIRST_G, FIRST_I
-from .fit import Patch, Shape, cost_of, free_numbers, patches_of, refine, render
+from .fit import Patch, Shape, cost_of, free_numbers, improve, patches_of, render
 from .found import Found, by_light, rest_of
 from .numbers import Floats
 from .views import Pixels, View
@@ -102,7 +102,7 @@ def _as_one(
 
     def fitted(start: Shape, look: Sequence[Patch], order: int, steps: int) -> Shape:
         free = free_numbers(order, start.discs, 1)
-        return refine(start, look, free, width=width, steps=steps, tails=False, pool=pool).shape
+        return improve(start, look, free, width=width, steps=steps, tails=False, pool=pool)[0]
 
     # what one ghost misses shall not pass for an outlier
     trials = [fitted(start, patches, 1, 5) for start in _starts(shape, core)]

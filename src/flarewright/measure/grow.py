@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..kernels.measure_pupil import DISC_NUMBERS, FIRST_DISC, FIRST_G, FIRST_I, MOST_DISCS
-from .fit import MODEL_ERROR, Fit, Patch, Shape, cost_of, free_numbers, patches_of, refine
+from .fit import MODEL_ERROR, Fit, Patch, Shape, cost_of, free_numbers, improve, patches_of, refine
 from .views import View
 
 # part of the cost by which a rim, or a higher order, must lower it to stay
@@ -79,12 +79,12 @@ def grow(
     order = 0
     while found is not None:
         fit, patches = found
-        grown: Fit | None = None
+        grown: Shape | None = None
         if fit.shape.discs < most.discs:
             grown = _with_rim(fit.shape, patches, free_numbers(order, 0, min(order, 1)), width, most, pool)
             before = cost_of(fit.shape, patches, error=most.error)
-            if grown is not None and cost_of(grown.shape, patches, error=most.error) < (1.0 - RIM_PAYS) * before:
-                found = polish(grown.shape, order, min(order, most.intensity_order), 6) or found
+            if grown is not None and cost_of(grown, patches, error=most.error) < (1.0 - RIM_PAYS) * before:
+                found = polish(grown, order, min(order, most.intensity_order), 6) or found
                 continue
         if order >= most.order:
             break
@@ -101,8 +101,8 @@ def grow(
 
 def _with_rim(
     shape: Shape, patches: Sequence[Patch], free: np.ndarray, width: int, most: Growth, pool: ThreadPoolExecutor | None
-) -> Fit | None:
-    """Return the best fit with one more rim, tried from several places on a third of the patches."""
+) -> Shape | None:
+    """Return the best shape with one more rim, tried from several places on a third of the patches."""
     if shape.discs >= MOST_DISCS:
         return None
     few = patches[:: max(1, len(patches) // 8)]
@@ -119,10 +119,10 @@ def _with_rim(
             numbers[0] -= 0.5 * away * numbers[FIRST_G] / max(largest, 0.1)
             numbers[FIRST_G] *= 1.0 + 0.25 * bite
             trial = replace(shape, numbers=numbers, discs=shape.discs + 1)
-            trials.append(refine(trial, few, own, width=width, steps=3, error=most.error, pool=pool))
+            trials.append(improve(trial, few, own, width=width, steps=3, error=most.error, pool=pool))
     everything = np.concatenate([free, [at, at + 2]])
     best = [
-        refine(trial.shape, few, everything, width=width, steps=6, error=most.error, pool=pool)
-        for trial in sorted(trials, key=lambda fit: fit.cost)[:3]
+        improve(trial, few, everything, width=width, steps=6, error=most.error, pool=pool)
+        for trial, _ in sorted(trials, key=lambda each: each[1])[:3]
     ]
-    return min(best, key=lambda fit: fit.cost)
+    return min(best, key=lambda each: each[1])[0]

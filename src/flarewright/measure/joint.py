@@ -14,8 +14,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..kernels.measure_changes import draw_with_changes
 from ..kernels.measure_edges import sum_along_rows, sum_changes_along_rows
-from ..kernels.measure_mesh import draw_with_changes, window_of
+from ..kernels.measure_mesh import window_of
 from ..kernels.measure_pupil import FIRST_I
 from .fit import MODEL_ERROR, Indices, Shape, priors, scaled
 from .found import CHANNELS, Found
@@ -32,15 +33,22 @@ _TERMS = np.arange(FIRST_I, FIRST_I + 4)
 
 @dataclass(frozen=True)
 class _Picture:
-    """One view: what each number of light would add, shape (P, 4 G), what is seen, and the weights.
+    """One view and the G `ghosts` that it shows: what each number of their light would add, shape (P, 4 G).
 
-    An even background is nobody's: the means are taken off. `there`, shape (P, G), is where ghosts are.
+    An even background is nobody's: the means are taken off. `there`, shape (P, G), is where the ghosts are, `pixels` is
+    what is seen.
     """
 
+    ghosts: Indices
     basis: NDArray[np.float32]
     there: NDArray[np.bool_]
     pixels: Floats
     weight: Floats
+
+    @property
+    def columns(self) -> Indices:
+        """Where the numbers of its ghosts stand among those of all."""
+        return _columns(self.ghosts)
 
 
 def lit(
@@ -72,8 +80,11 @@ def lit(
         side: Floats = np.zeros(prior.size)
         np.fill_diagonal(matrix, prior)
         for one in pictures:
-            matrix += (one.basis.T * one.weight) @ one.basis
-            side += one.basis.T @ (one.weight * one.pixels)
+            # a matrix times itself: half of the work, and symmetric to the last bit
+            root = np.sqrt(one.weight)
+            scaled = one.basis * root[:, None]
+            matrix[np.ix_(one.columns, one.columns)] += scaled.T @ scaled
+            side[one.columns] += scaled.T @ (root * one.pixels)
         if m == 1:
             kept = _needed(matrix, side, pictures, needed)
         at = _columns(kept)
@@ -98,16 +109,18 @@ def _needed(matrix: Floats, side: Floats, pictures: Sequence[_Picture], least: f
         at = _columns(kept)
         inverse = np.linalg.inv(matrix[np.ix_(at, at)])
         values = inverse @ side[at]
-        left = [one.pixels - one.basis[:, at] @ values for one in pictures]
+        everything = np.zeros(side.size)
+        everything[at] = values
+        rests = np.zeros(side.size // _TERMS.size)
+        for one in pictures:
+            missed = one.pixels - one.basis @ everything[one.columns]
+            rests[one.ghosts] += (one.weight * missed**2) @ one.there
         gains = np.empty(kept.size)
         for n, k in enumerate(kept):
             own = slice(_TERMS.size * n, _TERMS.size * (n + 1))
             grown = float(values[own] @ np.linalg.solve(inverse[own, own], values[own]))
-            rest = sum(
-                float(one.there[:, k] @ (one.weight * misfit**2)) for one, misfit in zip(pictures, left, strict=True)
-            )
             # u is 1/2 on average over the pupil; a ghost that darkens is none
-            gains[n] = grown / max(grown + rest, 1e-300) if values[own][0] + 0.5 * values[own][1] > 0.0 else -1.0
+            gains[n] = grown / max(grown + rests[k], 1e-300) if values[own][0] + 0.5 * values[own][1] > 0.0 else -1.0
         worst = int(np.argmin(gains))
         if gains[worst] >= least:
             break
@@ -127,11 +140,11 @@ def _pictures(
         pixels = halved(view.pixels[..., channel], times).astype(float)
         variance = halved(view.variance[..., channel], times, variance=True).astype(float)
         height, width = pixels.shape
-        basis = np.zeros((height, width, len(ghosts), _TERMS.size), np.float32)
+        shown = np.array([n for n, ghost in enumerate(ghosts) if ghost.first <= k <= ghost.last], dtype=np.int64)
+        basis = np.zeros((height, width, shown.size, _TERMS.size), np.float32)
         model = np.zeros((height, width))
-        for n, ghost in enumerate(ghosts):
-            if ghost.first <= k <= ghost.last:
-                model += _add(ghost.shapes[channel], view.sigma, scaled(view.frame, times), basis[:, :, n])
+        for n, g in enumerate(shown):
+            model += _add(ghosts[g].shapes[channel], view.sigma, scaled(view.frame, times), basis[:, :, n])
         level = np.maximum(np.abs(model), np.abs(pixels))
         weight = np.where(np.isfinite(variance), 1.0 / (variance + (MODEL_ERROR * level) ** 2), 0.0).ravel()
         columns = basis.reshape(height * width, -1)
@@ -139,7 +152,7 @@ def _pictures(
         seen = np.where(weight > 0.0, pixels.ravel(), 0.0)
         there = columns[:, :: _TERMS.size] != 0.0
         columns = columns - ((weight @ columns) / total).astype(np.float32)
-        return _Picture(columns, there, seen - float(weight @ seen) / total, weight)
+        return _Picture(shown, columns, there, seen - float(weight @ seen) / total, weight)
 
     return list((map if pool is None else pool.map)(one, [int(k) for k in few]))
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..kernels.measure_pupil import DISC_NUMBERS, FIRST_DISC, FIRST_G, FIRST_I
-from .fit import Indices, Patch, Shape, evaluate, priors
+from .fit import Indices, Patch, Shape, equations, misfit, priors
 from .numbers import Floats
 from .smooth import alike
 
@@ -58,10 +58,11 @@ def parabola(shape: Shape, patches: Sequence[Patch], free: Indices, width: int, 
     error : float
         Part of the light that the model may miss.
     """
-    parts = [evaluate(shape, free, patch, True, error) for patch in patches]
+    missed = [misfit(shape, patch, True, error) for patch in patches]
+    parts = [equations(shape, free, patch, one, True) for patch, one in zip(patches, missed, strict=True)]
     return Parabola(
-        shape.numbers[free], np.array([part[0] for part in parts]), np.array([part[3] for part in parts]),
-        np.array([part[2] for part in parts]), priors(shape, free, width),
+        shape.numbers[free], np.array([one.cost for one in missed]), np.array([side for _, side in parts]),
+        np.array([matrix for matrix, _ in parts]), priors(shape, free, width),
     )  # fmt: skip
 
 

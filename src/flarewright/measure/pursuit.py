@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ..kernels.measure_pupil import FIRST_G, FIRST_I
 from ..model.ghost_model import Blades
 from .find import Candidate, candidates, slopes_of
-from .fit import Shape, cost_of, patches_of, presence, render
+from .fit import Shape, cost_of, light_of, patches_of, presence
 from .found import Found, darkened, rest_of
 from .grow import Growth, grow
 from .journal import Journal
@@ -220,7 +220,9 @@ def _span(shape: Shape, views: Sequence[View], rest: Sequence[Pixels], middle: i
 
 
 def _take_off(ghost: Found, views: Sequence[View], rest: Sequence[Pixels]) -> list[Pixels]:
-    return [
-        (picture - render(ghost.shapes[1], view)).astype(np.float32) if ghost.first <= k <= ghost.last else picture
-        for k, (view, picture) in enumerate(zip(views, rest, strict=True))
-    ]
+    out = list(rest)
+    for k in range(ghost.first, ghost.last + 1):
+        out[k] = rest[k].copy()
+        part, light = light_of(ghost.shapes[1], views[k])
+        out[k][part] -= light
+    return out

@@ -12,7 +12,7 @@ import numpy as np
 from ..kernels.measure_pupil import DISC_NUMBERS, FIRST_DISC, FIRST_I
 from ..model.ghost_model import AberrationGhost, Blades
 from .find import rims_of
-from .fit import Fit, Shape, free_numbers, patches_of, presence, refine
+from .fit import Fit, Shape, free_numbers, improve, patches_of, presence, refine
 from .found import CHANNELS, Found, alone, by_light, exchange, rest_of
 from .grow import RIM_PAYS, Growth, grow
 from .joint import lit
@@ -130,10 +130,10 @@ def _rimmed(
     best, least = shape, np.inf
     for start in kinds_of(shape, iris):
         free = free_numbers(1, start.discs, 1)
-        fit = refine(start, few, free, width=shown[0].size_px[0], steps=4, pool=pool)
-        cost = fit.cost / (1.0 - RIM_PAYS) ** start.discs
+        trial, cost = improve(start, few, free, width=shown[0].size_px[0], steps=4, pool=pool)
+        cost /= (1.0 - RIM_PAYS) ** start.discs
         if cost < least:
-            best, least = fit.shape, cost
+            best, least = trial, cost
     return best
 
 
@@ -209,7 +209,7 @@ def _touched(
     if not patches:
         return None
     free = free_numbers(1, shape.discs, 1)
-    return refine(shape, patches, free, width=views[0].size_px[0], steps=steps, pool=pool).shape
+    return improve(shape, patches, free, width=views[0].size_px[0], steps=steps, pool=pool)[0]
 
 
 def _like(green: Shape, own: Shape, alone: Sequence[View], channel: int) -> Shape:

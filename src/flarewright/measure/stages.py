@@ -17,7 +17,7 @@ from ..kernels.measure_pupil import FIRST_DISC, FIRST_I, SOFT
 from ..model.capture import MergedRun
 from ..model.corrections import Corrections
 from ..model.ghost_model import AberrationGhost, Blades, GhostModel, Halo, Reference, Star
-from .fit import Shape, render
+from .fit import Shape, light_of
 from .found import Found
 from .fragments import joined
 from .glow import halo_at, offsets, star_at
@@ -350,7 +350,8 @@ def without(ghosts: Sequence[Found], view: View, number: int) -> Pixels:
     for ghost in ghosts:
         if ghost.first <= number <= ghost.last:
             for m in range(3):
-                left[..., m] -= render(ghost.shapes[m], view)
+                part, light = light_of(ghost.shapes[m], view)
+                left[part][..., m] -= light
     return left.astype(np.float32)
 
 

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..kernels.measure_changes import draw_with_changes
 from ..kernels.measure_edges import sum_along_rows, sum_changes_along_rows
-from ..kernels.measure_mesh import draw_with_changes, window_of
+from ..kernels.measure_mesh import window_of
 from ..kernels.measure_pupil import FIRST_G, FIRST_I
 from .curves import Pose, posed
 from .fit import MODEL_ERROR, OUTLIER, Shape

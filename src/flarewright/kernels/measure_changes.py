@@ -1,0 +1,239 @@
+"""The derivatives of a measured ghost's picture by its numbers: where its mesh lands, how dense its cells are.
+
+Only what the border between two cells crosses, and the step in density across it, changes with a number; so derivatives
+are drawn as the ghost is (`measure_mesh`), edge by edge.
+"""
+
+import numpy as np
+
+from ._jit import compiled, inner
+from .measure_edges import add_edge_changes
+from .measure_mesh import (
+    area_of,
+    cell_areas,
+    cell_light,
+    draw_mesh,
+    fill_densities,
+    fill_mesh,
+    grain,
+    join,
+    land,
+    soften_mesh,
+    steadied,
+)
+from .measure_pupil import DISC_NUMBERS, FIRST_DISC, FIRST_G, FIRST_I, SOFT, TERMS, monomials, place, slopes
+from .measure_soft import add_spreading
+
+
+@inner
+def _spot_changes(parameters, sigma, free, frame, pupil, pupil_by, spots_by):
+    """Fill the derivatives of where the mesh lands, (rings + 1, spokes, 2, Q), by the free parameters."""
+    terms = np.empty(TERMS)
+    w = sigma * sigma
+    for i in range(pupil.shape[0]):
+        for j in range(pupil.shape[1]):
+            xi, eta = pupil[i, j, 0], pupil[i, j, 1]
+            monomials(xi * xi + eta * eta, xi * sigma, w, terms)
+            _, _, a_xi, a_eta, c_xi, c_eta = place(parameters, xi, eta, sigma)
+            for q in range(free.size):
+                n = free[q]
+                if n == SOFT:
+                    along, across = 0.0, 0.0
+                elif n < FIRST_G:
+                    along, across = sigma * terms[n], 0.0
+                elif n < FIRST_I:
+                    along, across = xi * terms[n - FIRST_G], eta * terms[n - FIRST_G]
+                elif n < FIRST_DISC:
+                    along, across = 0.0, 0.0
+                else:
+                    dxi, deta = _pupil_change(n, sigma, pupil_by, i, j)
+                    along, across = a_xi * dxi + a_eta * deta, c_xi * dxi + c_eta * deta
+                spots_by[i, j, 0, q] = frame[4] * (frame[2] * along - frame[3] * across)
+                spots_by[i, j, 1, q] = -frame[4] * (frame[3] * along + frame[2] * across)
+
+
+@inner
+def _pupil_change(n, sigma, pupil_by, i, j):
+    """Return how a pupil point moves with parameter n of a disc."""
+    disc, which = (n - FIRST_DISC) // DISC_NUMBERS + 1, (n - FIRST_DISC) % DISC_NUMBERS
+    if which == 2:
+        return pupil_by[i, j, 0, 2 * disc + 1], pupil_by[i, j, 1, 2 * disc + 1]
+    by = sigma if which == 0 else sigma * sigma * sigma
+    return by * pupil_by[i, j, 0, 2 * disc], by * pupil_by[i, j, 1, 2 * disc]
+
+
+@inner
+def _add_triangle(
+    parameters, sigma, free, pupil, pupil_by, spots, spots_by, ia, ja, ib, jb, ic, jc, terms, flux_by, area_by
+):
+    """Add the derivatives of a triangle's flux and of its signed area, as it is divided by, by the free parameters."""
+    ax, ay = spots[ia, ja, 0], spots[ia, ja, 1]
+    bx, by = spots[ib, jb, 0], spots[ib, jb, 1]
+    cx, cy = spots[ic, jc, 0], spots[ic, jc, 1]
+    raw = area_of(ax, ay, bx, by, cx, cy)
+    if steadied(raw) == raw:
+        ax_by, ay_by = 0.5 * (by - cy), 0.5 * (cx - bx)
+        bx_by, by_by = 0.5 * (cy - ay), 0.5 * (ax - cx)
+        cx_by, cy_by = 0.5 * (ay - by), 0.5 * (bx - ax)
+        for q in range(free.size):
+            area_by[q] += ax_by * spots_by[ia, ja, 0, q] + ay_by * spots_by[ia, ja, 1, q]
+            area_by[q] += bx_by * spots_by[ib, jb, 0, q] + by_by * spots_by[ib, jb, 1, q]
+            area_by[q] += cx_by * spots_by[ic, jc, 0, q] + cy_by * spots_by[ic, jc, 1, q]
+    pax, pay = pupil[ia, ja, 0], pupil[ia, ja, 1]
+    pbx, pby = pupil[ib, jb, 0], pupil[ib, jb, 1]
+    pcx, pcy = pupil[ic, jc, 0], pupil[ic, jc, 1]
+    part = area_of(pax, pay, pbx, pby, pcx, pcy)
+    xi, eta = (pax + pbx + pcx) / 3.0, (pay + pby + pcy) / 3.0
+    u, v, w = xi * xi + eta * eta, xi * sigma, sigma * sigma
+    intensity, i_u, i_v = slopes(parameters, FIRST_I, u, v, w)
+    # what is below 0 is drawn as 0
+    if intensity <= 0.0:
+        return
+    i_xi, i_eta = 2.0 * xi * i_u + sigma * i_v, 2.0 * eta * i_u
+    monomials(u, v, w, terms)
+    for q in range(free.size):
+        n = free[q]
+        if n < FIRST_I or n == SOFT:
+            continue
+        if n < FIRST_DISC:
+            flux_by[q] += terms[n - FIRST_I] * part
+            continue
+        dax, day = _pupil_change(n, sigma, pupil_by, ia, ja)
+        dbx, dby = _pupil_change(n, sigma, pupil_by, ib, jb)
+        dcx, dcy = _pupil_change(n, sigma, pupil_by, ic, jc)
+        grown = 0.5 * (
+            (dbx - dax) * (pcy - pay) + (pbx - pax) * (dcy - day) - (dcx - dax) * (pby - pay)
+            - (pcx - pax) * (dby - day)
+        )  # fmt: skip
+        brighter = (i_xi * (dax + dbx + dcx) + i_eta * (day + dby + dcy)) / 3.0
+        flux_by[q] += brighter * part + intensity * grown
+
+
+@inner
+def _density_changes(parameters, sigma, free, pupil, pupil_by, spots, spots_by, span, densities, changes):
+    """Fill the derivatives of the densities as they are drawn; `densities` are still the triangles' own."""
+    rings, spokes = densities.shape[0], densities.shape[1]
+    terms, flux_by, area_by = np.empty(TERMS), np.empty(free.size), np.empty(free.size)
+    wide = max(span, 1)
+    for i in range(rings):
+        halves = 2 if i > 0 else 1
+        for first in range(0, spokes, wide):
+            light, area = cell_light(spots, wide, densities, i, first)
+            # without cells every triangle is one
+            for alone in range(halves if span == 0 else 1):
+                flux_by[:] = 0.0
+                area_by[:] = 0.0
+                for j in range(first, first + wide):
+                    k = j + 1 if j + 1 < spokes else 0
+                    for half in range(halves):
+                        if span > 0 or half == alone:
+                            _add_triangle(
+                                parameters, sigma, free, pupil, pupil_by, spots, spots_by, i, j, i + 1,
+                                k if half else j, i if half else i + 1, k, terms, flux_by, area_by,
+                            )  # fmt: skip
+                density = light / area
+                if span == 0:
+                    density, area = densities[i, first, alone], cell_areas(spots, i, first, spokes)[alone]
+                for j in range(first, first + wide):
+                    for half in range(halves):
+                        if span > 0 or half == alone:
+                            for q in range(free.size):
+                                changes[i, j, half, q] = -(flux_by[q] + density * area_by[q]) / area
+
+
+@inner
+def _draw_changes(spots, spots_by, densities, changes, span, left, top, width, height, out):
+    """Draw every edge's derivatives once."""
+    rings, spokes = densities.shape[0], densities.shape[1]
+    count = changes.shape[3]
+    step, sweep = np.empty(count), np.empty((2, count))
+    for i in range(rings):
+        for j in range(spokes):
+            k = j + 1 if j + 1 < spokes else 0
+            before = j - 1 if j > 0 else spokes - 1
+            ax, ay = spots[i, j, 0], spots[i, j, 1]
+            bx, by = spots[i + 1, j, 0], spots[i + 1, j, 1]
+            cx, cy = spots[i + 1, k, 0], spots[i + 1, k, 1]
+            half = 1 if i > 0 else 0
+            # nothing changes inside a cell
+            if span == 0 or j % span == 0:
+                for q in range(count):
+                    step[q] = changes[i, j, 0, q] - changes[i, before, half, q]
+                add_edge_changes(
+                    ax, ay, bx, by, densities[i, j, 0] - densities[i, before, half], step, spots_by[i, j],
+                    spots_by[i + 1, j], left, top, width, height, sweep, out,
+                )  # fmt: skip
+            outer = densities[i + 1, j, 1] if i + 1 < rings else 0.0
+            for q in range(count):
+                step[q] = changes[i, j, 0, q] - (changes[i + 1, j, 1, q] if i + 1 < rings else 0.0)
+            add_edge_changes(
+                bx, by, cx, cy, densities[i, j, 0] - outer, step, spots_by[i + 1, j], spots_by[i + 1, k], left, top,
+                width, height, sweep, out,
+            )  # fmt: skip
+            if i > 0 and span == 0:
+                for q in range(count):
+                    step[q] = changes[i, j, 1, q] - changes[i, j, 0, q]
+                add_edge_changes(
+                    ax, ay, cx, cy, densities[i, j, 1] - densities[i, j, 0], step, spots_by[i, j], spots_by[i + 1, k],
+                    left, top, width, height, sweep, out,
+                )  # fmt: skip
+
+
+@compiled
+def draw_with_changes(parameters, disc_count, sigma, free, frame, left, top, plane, out):
+    """Draw one ghost of one channel and its derivatives inside a window.
+
+    Parameters
+    ----------
+    parameters : ndarray, shape (N,), float64
+    disc_count : int
+    sigma : float
+    free : ndarray, shape (Q,), int64
+        Which parameters to derive by; with none the derivatives cost nothing.
+    frame : ndarray, shape (5,)
+    left, top : int
+        First pixel of the window.
+    plane : ndarray, shape (h, w + 1), float64
+        Zeros, and then differences along rows.
+    out : ndarray, shape (h, w + 1, Q), float64
+        Zeros, and then differences along rows of the derivatives.
+
+    Notes
+    -----
+    The derivative of the drawn picture itself, mesh and all: tests/kernels/test_measure_mesh.py compares it with
+    differences.
+    """
+    height, width = plane.shape[0], plane.shape[1] - 1
+    spokes, rings, span = grain(parameters, disc_count, sigma, frame, True)
+    if spokes == 0:
+        return
+    derive = free.size > 0
+    pupil, spots = np.empty((rings + 1, spokes, 2)), np.empty((rings + 1, spokes, 2))
+    pupil_by = np.empty((rings + 1, spokes, 2, 2 * disc_count + 2 if derive else 0))
+    if not fill_mesh(parameters, disc_count, sigma, frame, spokes, rings, derive, pupil, pupil_by):
+        return
+    land(parameters, pupil, sigma, frame, spots)
+    densities = np.empty((rings, spokes, 2))
+    fill_densities(parameters, sigma, pupil, spots, densities)
+    # the model's irradiance is per pixel of the model, whatever the picture's scale
+    scale = frame[4] * frame[4]
+    spots_by, changes = np.empty((rings + 1, spokes, 2, free.size)), np.zeros((rings, spokes, 2, free.size))
+    if derive:
+        _spot_changes(parameters, sigma, free, frame, pupil, pupil_by, spots_by)
+        _density_changes(parameters, sigma, free, pupil, pupil_by, spots, spots_by, span, densities, changes)
+        changes *= scale
+    if span > 0:
+        join(spots, span, densities)
+    densities *= scale
+    draw_mesh(spots, densities, span, True, True, left, top, width, height, plane)
+    variance = parameters[SOFT] * scale
+    if variance > 0.0:
+        soften_mesh(plane.reshape((height, width + 1, 1)), variance, spots, left, top)
+    if not derive:
+        return
+    _draw_changes(spots, spots_by, densities, changes, span, left, top, width, height, out)
+    if variance > 0.0:
+        soften_mesh(out, variance, spots, left, top)
+    for q in range(free.size):
+        if free[q] == SOFT:
+            add_spreading(plane, scale, out[:, :, q])
