@@ -69,6 +69,9 @@ def judged(tab, project):
 
 def test_drag_the_light_and_see_the_flare_move(tab, tmp_path):
     before = tab.shown()
+    rays = "[...document.querySelectorAll('#section polyline')].map((each) => each.getAttribute('points')).join()"
+    tab.until(rays)
+    drawn = tab.js(rays)
     first = tab.light()
     tab.drag(first, (first[0] - 120, first[1] + 60), steps=60, hold_ms=20)
     # pictures came while the hand moved
@@ -80,6 +83,8 @@ def test_drag_the_light_and_see_the_flare_move(tab, tmp_path):
     x, y = project.lights[0].field_deg
     assert x < 7.0
     assert y < 4.0
+    # and so do the rays in the cross-section
+    tab.until(f"({rays}) !== {json.dumps(drawn)}")
     assert judged(tab, project) < 1.5
     # one drag is one step
     assert tab.state()["steps"]["at"] == 1
@@ -163,6 +168,16 @@ def test_a_click_chooses_among_all_ghosts_there(tab):
     tab.rest()
     assert "muted" in tab.page.locator("tr.chosen").inner_text()
     assert tab.state()["by_hand"] == 1
+
+
+def test_who_scrolls_at_once_walks_the_ghosts(tab):
+    place = tab.at(0.62, 0.52)
+    zoom = tab.js("flarewright.view.zoom")
+    tab.page.mouse.click(*place)
+    tab.page.mouse.wheel(0, 100)
+    tab.until("flarewright.ghost && flarewright.view.at === 1")
+    assert tab.js("flarewright.view.zoom") == zoom
+    assert tab.js("flarewright.ghost") == tab.js("flarewright.view.stack")[1]
 
 
 def test_a_drag_goes_on_whatever_is_selected(tab):

@@ -10,7 +10,8 @@ import pytest
 from flarewright.editor import solving
 from flarewright.editor.solving import Solver
 from flarewright.errors import ProjectError
-from flarewright.model import Design, GhostWish, Light
+from flarewright.model import AsLens, Design, Everywhere, GhostWish, Light, Preset, QuarterWave
+from flarewright.optics.pack import resolve_coatings
 from flarewright.render.prepare import as_lens
 
 
@@ -84,11 +85,38 @@ def test_lenses_are_told_in_words_and_the_best_comes_first(project, monkeypatch)
     solver._thread.join(60.0)
     words = [one.words for one in solver.progress.found]
     assert [one.partition("; ")[0] for one in words] == [f"Lens {k}: 8 surfaces, 99.2 mm f/3.5" for k in (1, 2, 3)]
-    assert words[0].endswith("by 0 mm")
-    assert "; met, ghost " in words[0]
+    assert words[0].endswith("; met")
     assert words[1].endswith("; not met, ghost 8-6 is farthest off, by 0.45 mm")
     assert words[2].endswith("; not met, added ghost 1 is farthest off, by 2 mm")
     assert [one.changes["lens"].name[-1] for one in solver.progress.found] == ["1", "2", "3"]
+
+    # the same rows wear the same coatings
+    worn = resolve_coatings(as_lens(project.lens), project.coating)
+    assert any(worn)
+    session = solver.session
+    puts = []
+    session.put = lambda found, label: puts.append(found)
+    solver.accept(0)
+    assert resolve_coatings(puts[0].lens, puts[0].coating) == tuple(worn)
+    # who has taken one may take another; for another lens they are no candidates
+    session.project = puts[0]
+    solver.accept(1)
+    session.project = project.replace(lens="tessar-brendel")
+    assert solver.fitting.found == ()
+    with pytest.raises(ProjectError, match="another lens"):
+        solver.accept(0)
+    session.project = project
+    assert len(solver.fitting.found) == 3
+
+
+@pytest.mark.parametrize("coating", [AsLens(), Everywhere(coating=QuarterWave(center_wavelength_nm=550.0))])
+def test_a_lens_of_other_rows_wears_what_fits_all(project, coating):
+    assert solving._kept(project.replace(coating=coating), as_lens("canon-28-80")) == coating
+
+
+def test_a_lens_of_other_rows_does_not_wear_those_of_the_one_before(project):
+    assert project.coating == Preset(name="thesis")
+    assert solving._kept(project, as_lens("canon-28-80")) is None
 
 
 def test_a_colour_for_a_new_ghost_is_refused_in_the_pages_words(project):

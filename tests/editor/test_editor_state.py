@@ -101,6 +101,27 @@ def test_a_session_goes_on_where_it_was_cut_off(project):
     assert again.project.lights[0].field_deg == (8.0, 4.4)
 
 
+def test_without_a_name_it_goes_on_with_what_was_cut_off(tmp_path):
+    """Also where it had been begun with a lens or a file; not where that was saved, or is open in another editor."""
+    begin(None)[0].keeper.close()
+    session, _ = begin("tessar-brendel")
+    session.do("move_light", {"light": 0, "x": 3.0, "y": 2.0})
+    session.save(str(tmp_path / "shot"))
+    session.do("set_iris", {"values": {"blades": 8}})
+    session.keeper._lane.wait(5.0)
+    beside, _ = begin(None)
+    assert beside.project != session.project
+    beside.keeper.close()
+    session.keeper.close()
+    again, told = begin(None)
+    assert again.history == session.history
+    assert again.file == session.file
+    assert "undo leads back" in told
+    again.save(str(tmp_path / "shot"))
+    again.keeper.close()
+    assert begin(None)[0].project != session.project
+
+
 def test_saving_makes_the_autosave_clean_and_the_file_wins(project, tmp_path):
     session, _ = begin("tessar-brendel")
     session.do("move_light", {"light": 0, "x": 4.0, "y": 2.0})

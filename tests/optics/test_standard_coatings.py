@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from flarewright.model import Everywhere, Standard
+from flarewright.model import Everywhere, Film, Standard
 from flarewright.optics.coating_response import BAND_NM, coating_response
 from flarewright.optics.coatings import film_stack, stack_reflectance, stack_reflectance_transmittance
 from flarewright.optics.pack import resolve_coatings
@@ -130,3 +130,11 @@ def test_the_response_adds_up():
     # bare glass of one index reflects white
     bare = coating_response(None, 1.52, 1.52, 0.0)
     np.testing.assert_allclose(bare.rgb, (0.52 / 2.52) ** 2, rtol=2e-3)
+
+
+def test_the_response_of_a_cemented_surface():
+    """Two glasses of nearly one index reflect next to nothing, by Fresnel; a film between them more."""
+    bare = coating_response(None, 1.62, 1.62, 0.0, (1.60, 1.60))
+    np.testing.assert_allclose(bare.reflectance, (0.02 / 3.22) ** 2, rtol=1e-12)
+    film = coating_response(Film(index=1.38, thickness_nm=100.0), 1.62, 1.62, 0.0, (1.60, 1.60))
+    assert film.luminous_reflectance[0] > 100.0 * bare.luminous_reflectance[0]

@@ -72,11 +72,15 @@ def coating_svg(project: Project, row: int) -> str:
     if medium is None:
         raise ProjectError(f"row {row} has air on both sides, so nothing is coated there")
     index = refractive_index(medium, WAVELENGTHS_NM)
-    curves = coating_response(coat, medium.n_d, index, PLOT_ANGLES_DEG)
-    strip = coating_response(coat, medium.n_d, index, STRIP_ANGLES_DEG)
-    bare = float(coating_response(None, medium.n_d, index, 0.0).luminous_reflectance[0])
+    glass, front = medium.glass or f"n = {medium.n_d:g}", (1.0, np.ones_like(index))
+    if surface.medium is not None and isinstance(before, Surface) and before.medium is not None:
+        # cemented: light comes from glass
+        front = before.medium.n_d, refractive_index(before.medium, WAVELENGTHS_NM)
+        glass += f" behind {before.medium.glass or f'n = {before.medium.n_d:g}'}"
+    curves = coating_response(coat, medium.n_d, index, PLOT_ANGLES_DEG, front)
+    strip = coating_response(coat, medium.n_d, index, STRIP_ANGLES_DEG, front)
+    bare = float(coating_response(None, medium.n_d, index, 0.0, front).luminous_reflectance[0])
     name = "no coating" if coat is None else format_coating(coat)
-    glass = medium.glass or f"n = {medium.n_d:g}"
     return to_svg(coating_figure(curves, strip, bare, f"Row {row}: {name}", glass, PANEL))
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import IO, Any
 
 from ..errors import FlarewrightError
-from .autosave import Saved, autosave_path, write_autosave
+from .autosave import Saved, autosave_path, state_folder, write_autosave
 from .jobs import Lane
 
 # editors of one project at once
@@ -68,8 +68,7 @@ def claim(what: str | None) -> Keeper:
     for number in range(1, MOST + 1):
         path = autosave_path(what, number)
         try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            lock = path.with_suffix(".lock").open("a+b")
+            lock = _opened(path)
         except OSError:
             # nothing can be kept here; the first attempt to write tells it
             return Keeper(path)
@@ -77,6 +76,31 @@ def claim(what: str | None) -> Keeper:
             return Keeper(path, lock, number)
         lock.close()
     return Keeper(autosave_path(what, os.getpid()))
+
+
+def claim_last() -> Keeper | None:
+    """Take the autosave that was written last, whatever it is of; None where there is none or another editor holds it.
+
+    Returns
+    -------
+    Keeper or None
+    """
+    try:
+        written = {path: path.stat().st_mtime_ns for path in state_folder().glob("*.autosave.json")}
+        last = max(written, key=lambda path: written[path])
+        lock = _opened(last)
+    except (OSError, ValueError):
+        return None
+    if _held(lock):
+        return Keeper(last, lock)
+    lock.close()
+    return None
+
+
+def _opened(path: Path) -> IO[Any]:
+    """Open the lock of an autosave."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    return path.with_suffix(".lock").open("a+b")
 
 
 def _held(file: IO[Any]) -> bool:

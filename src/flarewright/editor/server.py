@@ -311,7 +311,7 @@ def _accept(desk: Desk, _request: Request, body: Any) -> Any:
 
 
 def _candidate(desk: Desk, request: Request, _body: Any) -> Any:
-    found, k = desk.solver.progress.found, int(request.path_params["k"])
+    found, k = desk.solver.fitting.found, int(request.path_params["k"])
     if not 0 <= k < len(found):
         raise ProjectError(f"there is no lens {k} among those found")
     return _jpeg(found[k].picture)

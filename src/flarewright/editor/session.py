@@ -17,7 +17,7 @@ from .autosave import Saved, autosave_path, read_autosave
 from .deeds import done
 from .edit_lens import table_of
 from .files import open_any, project_path, sample_project, save_project, stamp_of
-from .keeper import Keeper, claim
+from .keeper import Keeper, claim, claim_last
 from .view import View
 from .words import sentence
 
@@ -170,7 +170,8 @@ def begin(what: str | None) -> tuple[Session, str]:
     Parameters
     ----------
     what : str or None
-        A project file, a lens file or a lens' name; None: what was open last without one, or the sample.
+        A project file, a lens file or a lens' name; None: what was open last where it was not saved, else what was open
+        last without one, or the sample.
 
     Returns
     -------
@@ -183,6 +184,11 @@ def begin(what: str | None) -> tuple[Session, str]:
     FlarewrightError
         When there is no such project or lens.
     """
+    if what is None:
+        # what was cut off is gone on with, also where it had been begun with a file or a lens
+        cut = _cut_off()
+        if cut is not None:
+            return cut
     given: tuple[Project, str | None] | None = None if what is None else open_any(what)
     key = None if what is None else str(Path(what).resolve()) if Path(what).exists() else what
     keeper = claim(key)
@@ -194,6 +200,18 @@ def begin(what: str | None) -> tuple[Session, str]:
     if keeper.number > 1:
         told = f"Another editor has this open too; this one keeps an autosave of its own. {told}".strip()
     return session, told
+
+
+def _cut_off() -> tuple[Session, str] | None:
+    """Go on with the session that was open last, where it had not been saved and nobody has it open."""
+    keeper = claim_last()
+    if keeper is None:
+        return None
+    saved = read_autosave(keeper.path)
+    if saved is not None and not saved.clean:
+        return _begun(saved, None, keeper)
+    keeper.close()
+    return None
 
 
 def _begun(saved: Saved | None, given: tuple[Project, str | None] | None, keeper: Keeper) -> tuple[Session, str]:

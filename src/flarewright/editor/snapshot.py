@@ -87,7 +87,7 @@ def picture_of(screen: Screen) -> dict[str, Any]:
 
 def solve_of(solver: Solver) -> dict[str, Any]:
     """Return how the search stands."""
-    progress = solver.progress
+    progress = solver.fitting
     return {
         "running": progress.running, "words": progress.words, "seconds": round(progress.seconds, 1),
         "number": progress.number, "found": [found.words for found in progress.found],

@@ -21,8 +21,9 @@ from ..design.report import verdict
 from ..design.search import State, solve
 from ..design.target import problem_of
 from ..errors import FlarewrightError, ProjectError
-from ..model import AsLens, Design, Lens, PerRow, Project, Surface
-from ..render.prepare import first_order
+from ..model import AsLens, CoatingChoice, Design, Everywhere, Lens, PerRow, Project, Surface
+from ..optics.pack import resolve_coatings
+from ..render.prepare import as_lens, first_order
 from .edit_wishes import clear_wishes, wish_names
 from .session import Session
 from .shown import jpeg, pixels_of
@@ -33,6 +34,8 @@ from .view import View
 CANDIDATES = 5
 LOOK_EVERY_S = 1.0
 THUMB_SCALE = 0.4
+# of a ghost's place or size
+UNSEEN_MM = 1e-3
 
 GETTING_READY = "Getting ready; the first search of a machine takes a minute more"
 HOW_WELL = {"met": "met", "nearly": "nearly met"}
@@ -86,10 +89,21 @@ class Solver:
     def __init__(self, session: Session) -> None:
         self.session = session
         self.progress = Progress()
+        # the lens that the search began with
+        self._searched: Lens | str | None = None
         self._stop = threading.Event()
         # set once a search can be ended at any time: compiling, at the first one of a machine, cannot
         self._ready = threading.Event()
         self._thread: threading.Thread | None = None
+
+    @property
+    def fitting(self) -> Progress:
+        """How the search stands; without what it found where that is for another lens than the present one."""
+        progress, lens = self.progress, self.session.project.lens
+        # who takes one of them may take another one instead
+        if not progress.found or lens in (self._searched, *(found.changes["lens"] for found in progress.found)):
+            return progress
+        return replace(progress, words=progress.words if progress.running else "", found=())
 
     def start(self, seconds: float) -> None:
         """Begin to search lenses for the project's wishes; what cannot be searched for is refused at once."""
@@ -139,13 +153,14 @@ class Solver:
 
     def accept(self, number: int) -> None:
         """Take what was found, in the project as it stands now."""
-        found = self.progress.found
+        found = self.fitting.found
         if not 0 <= number < len(found):
-            return
+            raise ProjectError("what was found is for another lens than the present one; solve anew")
         self.session.put(found[number].taken(self.session.project), "Accept what was found")
 
     def _begin(self, work: Callable[[threading.Event, threading.Event], None]) -> None:
         stop, ready = self._stop, self._ready = threading.Event(), threading.Event()
+        self._searched = self.session.project.lens
         self._tell(True, GETTING_READY, 0.0, ())
 
         def run() -> None:
@@ -196,14 +211,28 @@ class Solver:
         # a person judges them by the error that is told
         for number, one in enumerate(sorted(best, key=_worst), 1):
             lens = one.lens.replace(name=f"After {name} {number}")
-            words = named(f"Lens {number}: {described(lens)}; {judged(one, problem)}", project.design)
-            changes = {"lens": lens, "coating": AsLens(), "f_number": None, "zoom": None}
+            coating = _kept(project, lens)
+            bare = "" if coating is not None else "; without the coatings, which do not fit it"
+            words = named(f"Lens {number}: {described(lens)}; {judged(one, problem)}{bare}", project.design)
+            changes = {"lens": lens, "coating": coating or AsLens(), "f_number": None, "zoom": None}
             out.append(_found(project, changes, words))
         return tuple(out)
 
     def _tell(self, running: bool, words: str, seconds: float, found: tuple[Found, ...]) -> None:
         self.progress = Progress(running, words, seconds, found, self.progress.number + 1)
         self.session.tell({"type": "solve"})
+
+
+def _kept(project: Project, lens: Lens) -> CoatingChoice | None:
+    """Return what a new lens wears: what the one before did, row for row where it has the same; None where not."""
+    if isinstance(project.coating, Everywhere):
+        return project.coating
+    before = as_lens(project.lens)
+    worn = resolve_coatings(before, project.coating)
+    if not any(worn):
+        return AsLens()
+    same = [isinstance(row, Surface) for row in before.rows] == [isinstance(row, Surface) for row in lens.rows]
+    return PerRow(coatings=tuple(worn)) if same else None
 
 
 def _in_words(read: Callable[[Project], Any], project: Project) -> Any:
@@ -236,7 +265,9 @@ def judged(one: Outcome, problem: Problem) -> str:
     farthest = abs(one.residuals).max(axis=1).argmax()
     target = problem.objective.names[int(farthest)]
     ghost = target if target.startswith("wish") else f"ghost {target}"
-    return f"{HOW_WELL.get(verdict(one), 'not met')}, {ghost} is farthest off, by {_worst(one):.3g} mm"
+    words = HOW_WELL.get(verdict(one), "not met")
+    # what nobody can see is rounding, not an error
+    return words if _worst(one) < UNSEEN_MM else f"{words}, {ghost} is farthest off, by {_worst(one):.3g} mm"
 
 
 def _worst(one: Outcome) -> float:

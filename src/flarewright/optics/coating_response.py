@@ -51,8 +51,14 @@ class CoatingResponse:
     rgb: Floats
 
 
-def coating_response(coating: Coating | None, n_d: float, n_glass: ArrayLike, angles_deg: ArrayLike) -> CoatingResponse:
-    """Compute what a coated surface between air and glass reflects.
+def coating_response(
+    coating: Coating | None,
+    n_d: float,
+    n_glass: ArrayLike,
+    angles_deg: ArrayLike,
+    front: tuple[float, ArrayLike] = (1.0, 1.0),
+) -> CoatingResponse:
+    """Compute what a coated surface between air and glass reflects, or a cemented one.
 
     Parameters
     ----------
@@ -62,16 +68,18 @@ def coating_response(coating: Coating | None, n_d: float, n_glass: ArrayLike, an
     n_glass : array_like
         Index of the glass at `WAVELENGTHS_NM`, or one number for all.
     angles_deg : array_like, shape (A,)
-        Angles of incidence in air, 0 to 90.
+        Angles of incidence in air, or in what stands before, 0 to 90.
+    front : (float, array_like), optional
+        Index at 587.56 nm and at `WAVELENGTHS_NM` of what stands before: air, or the glass it is cemented to.
 
     Returns
     -------
     CoatingResponse
     """
-    indices, thicknesses_nm = film_stack(coating, 1.0, n_d)
+    indices, thicknesses_nm = film_stack(coating, front[0], n_d)
     wave, angles = WAVELENGTHS_NM, np.atleast_1d(np.asarray(angles_deg, dtype=np.float64))
     cosine = np.clip(np.cos(np.radians(angles)), 0.0, 1.0)[:, None]
-    R = stack_reflectance(1.0, n_glass, indices, thicknesses_nm, wave, cosine)
+    R = stack_reflectance(front[1], n_glass, indices, thicknesses_nm, wave, cosine)
     inside = (wave >= BAND_NM[0]) & (wave <= BAND_NM[1])
     rgb = R @ band_weights(D65(), wave, "rec709")
     return CoatingResponse(

@@ -19,10 +19,11 @@ app.under = under;
 const $ = (id) => document.getElementById(id);
 
 // ------------------------------------------------------------------------------------------------------------- state
+// What is drawn depends on, as it was told last: hands write into the state before it is told.
 const ghostsOf = (s) => JSON.stringify([s.lens.name, s.lens.rows.map((row) => row.stop)]);
-// what decides where ghosts lie, as it was told last: a hand writes into the state before it is told
 const placesOf = (s) => JSON.stringify([s.lights, s.lens, s.camera, s.iris, s.view.grey, s.view.unclipped]);
-let places = '';
+const shotOf = (s) => JSON.stringify([s.lights, s.lens, s.camera, s.iris, s.dirt, s.coating, s.pass_gain, s.by_hand, s.view.grey, s.view.unclipped]);
+let known = {};
 function take(state) {
   if (app.state && state.revision < app.state.revision) return;
   const old = app.state;
@@ -31,21 +32,18 @@ function take(state) {
   Object.assign(state.view, asked);
   app.state = state;
   app.light = Math.min(app.light, state.lights.length - 1);
-  const shot = (s) => JSON.stringify([s.lights, s.lens, s.camera, s.iris, s.dirt, s.coating, s.pass_gain, s.by_hand, s.view.grey, s.view.unclipped]);
+  const before = known;
+  known = { ghosts: ghostsOf(state), places: placesOf(state), shot: shotOf(state), design: JSON.stringify(state.design) };
   // another lens has other ghosts, and so has one whose rows have other numbers
-  if (old && ghostsOf(old) !== ghostsOf(state)) { Object.assign(app, { ghost: null, wish: null }); app.hint(); }
-  // nor is there a new ghost any more whose wish was undone
-  if (app.wish !== null && state.design?.wishes[app.wish]?.ghost !== null) app.wish = null;
-  const now = placesOf(state);
-  if (places !== now) app.view.forget();
-  places = now;
-  const moved = !old || shot(old) !== shot(state);
+  if (old && before.ghosts !== known.ghosts) { Object.assign(app, { ghost: null, wish: null }); app.hint(); }
+  if (before.places !== known.places) app.view.forget();
+  const moved = !old || before.shot !== known.shot;
   if (moved) {
     app.view.outline = null;
     // where a hand waits for its picture, that comes first
     if (app.view.released) app.view.afterwards = drawSection; else drawSection();
   }
-  if (moved || JSON.stringify(old?.design) !== JSON.stringify(state.design)) { app.places(); app.view.refreshTarget(); }
+  if (moved || before.design !== known.design) { app.places(); app.view.refreshTarget(); }
   update();
   if (state.picture.number !== app.view.shownNumber) app.view.refresh(Boolean(old));
 }

@@ -76,8 +76,10 @@ export function targetPanel(app) {
       needed.textContent = wished ? (coloured ? '' : 'Solve colours needs a ghost that was given a colour.') : 'Nothing is wished for yet: choose a ghost and say what it shall be, or add one; then solve.';
       stop.disabled = !run.running;
       progress.textContent = run.words ? `${run.words}${run.seconds ? ` · ${run.seconds.toFixed(0)} s` : ''}` : '';
-      if (found.dataset.number !== String(run.number)) {
-        found.dataset.number = String(run.number);
+      // with another lens what was found goes
+      const key = `${run.number} ${run.found.length}`;
+      if (found.dataset.key !== key) {
+        found.dataset.key = key;
         found.replaceChildren(...run.found.map((words, k) => h('figure', {}, h('img', { src: `/api/candidate/${k}?n=${run.number}`, alt: words }), h('figcaption', {}, words,
           button('Accept', async () => { if (await app.ask('/api/accept', { number: k })) see('physical'); }, { kind: 'main', disabled: run.running, 'data-accept': k })))));
       }

@@ -214,7 +214,9 @@ export function tips() {
     const element = event.target.closest?.('[data-tip]');
     if (element) timer = setTimeout(() => { if (element.isConnected) show(element); }, 550);
   });
-  addEventListener('pointerdown', () => { clearTimeout(timer); box.hidden = true; });
+  const hide = () => { clearTimeout(timer); box.hidden = true; };
+  addEventListener('pointerdown', hide);
+  addEventListener('focusout', hide);
   addEventListener('focusin', (event) => {
     const element = event.target.matches(':focus-visible') ? event.target.closest('[data-tip]') : null;
     if (element) show(element); else box.hidden = true;

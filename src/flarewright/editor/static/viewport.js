@@ -16,7 +16,7 @@ export function viewport(canvas, app) {
   const pen = canvas.getContext('2d', { alpha: false });
   const self = {
     image: null, before: null, fadeFrom: 0, target: null, outline: null, hover: null, compare: 'physical', wipe: 0.5,
-    zoom: 1, panX: 0, panY: 0, drag: null, stack: [], at: 0, spot: null, annotate: false, places: [], preview: null,
+    zoom: 1, panX: 0, panY: 0, drag: null, stack: [], at: 0, spot: null, asked: null, annotate: false, places: [], preview: null,
   };
   let wanted = false;
   // where words stand in the picture that is being drawn
@@ -388,15 +388,19 @@ export function viewport(canvas, app) {
     const u = (px - f.x) / f.w;
     const v = (py - f.y) / f.h;
     if (u < 0 || v < 0 || u >= 1 || v >= 1) { app.choose(null); return; }
+    // who scrolls before the answer has come walks when it has
+    const asked = self.asked = { spot: [px, py], steps: 0 };
     try {
       const { ghosts } = await get(`/api/pick?u=${u}&v=${v}`);
+      if (self.asked !== asked) return;
       self.stack = ghosts;
       self.at = 0;
       self.spot = [px, py];
       self.spotFrame = JSON.stringify(f);
       app.choose(ghosts[0] ?? null);
       app.hint();
-    } catch (error) { complain(error); }
+      if (asked.steps) self.walk(asked.steps);
+    } catch (error) { complain(error); } finally { if (self.asked === asked) self.asked = null; }
   }
   // the ghosts that were under the pointer are elsewhere: the wheel zooms again
   self.forget = () => {
@@ -406,7 +410,7 @@ export function viewport(canvas, app) {
   };
   self.walk = (step) => {
     if (!self.stack.length) return;
-    self.at = (self.at + step + self.stack.length) % self.stack.length;
+    self.at = (((self.at + step) % self.stack.length) + self.stack.length) % self.stack.length;
     app.choose(self.stack[self.at], true);
     app.hint();
   };
@@ -462,7 +466,10 @@ export function viewport(canvas, app) {
   canvas.addEventListener('wheel', (event) => {
     event.preventDefault();
     const [px, py] = local(event);
-    if (self.spot && self.stack.length > 1 && Math.hypot(px - self.spot[0], py - self.spot[1]) < 12) { self.walk(event.deltaY > 0 ? 1 : -1); return; }
+    const near = (spot) => spot && Math.hypot(px - spot[0], py - spot[1]) < 12;
+    const step = event.deltaY > 0 ? 1 : -1;
+    if (near(self.asked?.spot)) { self.asked.steps += step; return; }
+    if (near(self.spot) && self.stack.length > 1) { self.walk(step); return; }
     const before = frame();
     const u = (px - before.x) / before.w;
     const v = (py - before.y) / before.h;
