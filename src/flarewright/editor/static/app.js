@@ -36,6 +36,8 @@ function take(state) {
   known = { ghosts: ghostsOf(state), places: placesOf(state), shot: shotOf(state), design: JSON.stringify(state.design) };
   // another lens has other ghosts, and so has one whose rows have other numbers
   if (old && before.ghosts !== known.ghosts) { Object.assign(app, { ghost: null, wish: null }); app.hint(); }
+  // nor is there a new ghost any more whose wish was undone
+  if (app.wish !== null && state.design?.wishes[app.wish]?.ghost !== null) app.wish = null;
   if (before.places !== known.places) app.view.forget();
   const moved = !old || before.shot !== known.shot;
   if (moved) {
