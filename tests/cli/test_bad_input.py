@@ -213,6 +213,11 @@ PROJECT_FILES = {
         PROJECT + "holdout = { image = 'a.png', depth = 'a.exr' }\n",
         "lights[0].holdout",
     ),
+    "sensor of three sides": (
+        PROJECT + "[camera]\nsensor_mm = [36, 24, 1]\n", "camera.sensor_mm should be a list of 2, not 3"),
+    "tint of four colours": (
+        PROJECT + '[[art.rules]]\nselect = "all"\ntint = [1, 1, 1, 1]\n',
+        "art.rules[0].tint should be a list of 3, not 4"),
     "negative sensor": (PROJECT + "[camera]\nsensor_mm = [-36, 24]\n", "above 0 mm"),
 }
 
@@ -304,6 +309,10 @@ COMMAND_LINES = {
     "gain is nan": ([*H, *GOOD, "--gain", "7-3=nan"], "between 0 and 1e9"),
     "gain of an unknown pass": ([*H, *GOOD, "--gain", "glow=2"], "there is no pass 'glow'"),
     "gain of a nonsense row": ([*H, *GOOD, "--gain", "row:x=2"], "chooses no ghosts"),
+    "f-number of many noughts": (
+        [*H, *GOOD, "--fstop", "1e9"], "--fstop should be less than or equal to 256, not 1e+09"),
+    "f-number a hair too large": (
+        [*H, *GOOD, "--fstop", "256.0000001"], "--fstop should be less than or equal to 256, not 256.0000001"),
     "unknown preset": ([*H, *GOOD, "--coating", "preset:gold"], "gold"),
     "coating file missing": ([*H, *GOOD, "--coating", "no.toml"], "no.toml"),
     "unknown quality": ([*H, *GOOD, "--quality", "best"], "--quality should be 'draft', 'final' or 'reference'"),

@@ -37,6 +37,9 @@ _BOUNDS = {
     "less_than": ("less than", "lt"), "less_than_equal": ("less than or equal to", "le"),
 }  # fmt: skip
 
+# places, sizes and colours have just so many entries; lists that may be shorter end later
+_FIXED_LENGTHS = (2, 3)
+
 # lists whose entries stand under a heading of their own
 _HEADINGS = {
     "lights": "[[lights]]", "cameras": "[[cameras]]", "rules": "[[art.rules]]", "wishes": "[[design.wishes]]",
@@ -96,6 +99,8 @@ def _wanted(finding: Finding, keys: Keys) -> str:
         # nobody counts so many noughts
         return f"{words} {f'{bound:g}' if isinstance(bound, float) else bound}"
     match kind:
+        case "too_long" if about["max_length"] in _FIXED_LENGTHS:
+            return f"a list of {about['max_length']}"
         case "tuple_type" if keys and keys[-1] in _HEADINGS:
             return f"tables, each under {_HEADINGS[str(keys[-1])]}"
         case "too_short":
@@ -162,6 +167,9 @@ def written(value: object) -> str:
             return "null"
         case bool():
             return "true" if value else "false"
+        case float() if float(short := f"{value:g}") == value:
+            # 1e+09, not ten digits
+            return short
         case date() | time():
             return value.isoformat()
         case list() | tuple():
