@@ -99,14 +99,12 @@ def _wanted(finding: Finding, keys: Keys) -> str:
         # nobody counts so many noughts
         return f"{words} {f'{bound:g}' if isinstance(bound, float) else bound}"
     match kind:
-        case "too_long" if about["max_length"] in _FIXED_LENGTHS:
-            return f"a list of {about['max_length']}"
         case "tuple_type" if keys and keys[-1] in _HEADINGS:
             return f"tables, each under {_HEADINGS[str(keys[-1])]}"
         case "too_short":
             return f"a list of at least {about['min_length']}"
         case "too_long":
-            return f"a list of at most {about['max_length']}"
+            return f"a list of {'' if about['max_length'] in _FIXED_LENGTHS else 'at most '}{about['max_length']}"
         case "literal_error":
             return str(about["expected"])
         case "union_tag_invalid":
