@@ -409,9 +409,9 @@ def test_every_shipped_lens_can_be_drawn(capsys):
 def test_a_light_too_steep_to_draw_is_told(capsys, folder):
     light = ("lens", "show", "fisheye-nikkor-10.5", "--plot", "a.svg", "--light")
     said = call(capsys, *light, "0,88")
-    assert "flarewright: the light at 88 degrees is drawn at 85, no steeper\n" in said.err
+    assert "flarewright: a light at 88 degrees is too steep to draw and taken at 85\n" in said.err
     assert "light at 85°" in (folder / "a.svg").read_text()
-    assert "no steeper" not in call(capsys, *light, "0,85").err
+    assert "too steep" not in call(capsys, *light, "0,85").err
 
 
 def test_lens_check_tells_and_converts(capsys, folder):

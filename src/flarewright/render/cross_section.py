@@ -114,7 +114,7 @@ def cross_section(
         _draw_glass(sheet, lens, z, semi, k)
     # Steep rays come from far above; only what lies between head and foot is shown of them.
     sheet.parts.append('<g clip-path="url(#sheet)">')
-    remarks = [] if angle == wanted else [f"the light at {wanted:g} degrees is drawn at {angle:g}, no steeper"]
+    remarks = [] if angle == wanted else [f"a light at {wanted:g} degrees is too steep to draw and taken at {angle:g}"]
     remarks += _draw_fans(sheet, lens, order, lead, angle, ghost, _corner(iris))
     sheet.parts.append("</g>")
     _draw_surfaces(sheet, lens, z, semi)
