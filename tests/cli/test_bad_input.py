@@ -213,6 +213,18 @@ PROJECT_FILES = {
         PROJECT + "holdout = { image = 'a.png', depth = 'a.exr' }\n",
         "lights[0].holdout",
     ),
+    "coating is a number": (
+        "coating = 7\n" + PROJECT,
+        'coating: 7 is neither a text nor a table; write "lens", "none", "preset:NAME"',
+    ),
+    "sensor of three sides": (
+        PROJECT + "[camera]\nsensor_mm = [36, 24, 1]\n",
+        "camera.sensor_mm should be a list of 2, not 3",
+    ),
+    "tint of four colours": (
+        PROJECT + '[[art.rules]]\nselect = "all"\ntint = [1, 1, 1, 1]\n',
+        "art.rules[0].tint should be a list of 3, not 4",
+    ),
     "negative sensor": (PROJECT + "[camera]\nsensor_mm = [-36, 24]\n", "above 0 mm"),
 }
 
@@ -297,13 +309,22 @@ COMMAND_LINES = {
     "samples of no reference": ([*H, *GOOD, "--samples", "999"], "--samples works with --quality reference only"),
     "solo of none": ([*H, *GOOD, "--solo", "largest:0"], "'largest:0' chooses no ghosts"),
     "mute nonsense": ([*H, *GOOD, "--mute", "big"], "--mute: 'big' chooses no ghosts"),
-    "solo of a ghost that is not": ([*H, *GOOD, "--solo", "5-1"], "has no ghost 5-1"),
+    "solo of a ghost that is not": ([*H, *GOOD, "--solo", "5-1"], "error: --solo 5-1: Heliar-Tronnier"),
+    "mute of a row that is not": ([*H, *GOOD, "--mute", "row:77"], "error: --mute row:77: nothing reflects at row 77"),
+    "gain of a ghost that is not": ([*H, *GOOD, "--mute", "7-6", "--gain", "5-1=2"], "error: --gain 5-1=2: Heliar"),
+    "rule of a ghost that is not": (
+        [*H, *GOOD, "--rule", "select = '5-1'"], "error: --rule \"select = '5-1'\": Heliar-Tronnier"),
+    "rule of a wide blur": ([*H, *GOOD, "--rule", "select = 'all', blur_mm = 30"], "error: --rule: ghost "),
     "gain without a factor": ([*H, *GOOD, "--gain", "7-3"], "--gain '7-3' is no name and factor"),
     "gain of words": ([*H, *GOOD, "--gain", "7-3=much"], "is no name and factor"),
     "gain below zero": ([*H, *GOOD, "--gain", "7-3=-1"], "between 0 and 1e9"),
     "gain is nan": ([*H, *GOOD, "--gain", "7-3=nan"], "between 0 and 1e9"),
     "gain of an unknown pass": ([*H, *GOOD, "--gain", "glow=2"], "there is no pass 'glow'"),
     "gain of a nonsense row": ([*H, *GOOD, "--gain", "row:x=2"], "chooses no ghosts"),
+    "f-number of many noughts": (
+        [*H, *GOOD, "--fstop", "1e9"], "--fstop should be less than or equal to 256, not 1e+09"),
+    "f-number a hair too large": (
+        [*H, *GOOD, "--fstop", "256.0000001"], "--fstop should be less than or equal to 256, not 256.0000001"),
     "unknown preset": ([*H, *GOOD, "--coating", "preset:gold"], "gold"),
     "coating file missing": ([*H, *GOOD, "--coating", "no.toml"], "no.toml"),
     "unknown quality": ([*H, *GOOD, "--quality", "best"], "--quality should be 'draft', 'final' or 'reference'"),
@@ -408,6 +429,8 @@ COMMAND_LINES = {
     "ghosts focused twice": ([*G, "--focus", "900", "--sensor-distance", "80"], "keep one"),
     "iris image is a folder": ([*H, *GOOD, "--iris-image", "folder.exr"], "--iris-image folder.exr is a folder; give"),
     "output below a file": ([*H, "--light", "1,1", "-o", "lens.toml/a.exr"], "lens.toml is a file and no folder"),
+    "output without a name": ([*H, "--light", "1,1", "-o", ""], "the name of the output is empty"),
+    "output is the folder above": ([*H, "--light", "1,1", "-o", ".."], "cannot write ..: it is a folder"),
     "output is an ending": ([*H, "--light", "1,1", "-o", ".exr"], "an ending without a name; write flare.exr"),
     "ghosts without a light": (["ghosts", "heliar-tronnier"], "missing option '--light'"),
     "ghosts in X-rays": (["ghosts", "heliar-tronnier", "--light", "1,1", "--wavelength-nm", "1"], "not visible"),
@@ -476,6 +499,15 @@ def test_project_files(capsys, folder, case):
 def test_command_lines(capsys, folder, case):
     words, keyword = COMMAND_LINES[case]
     assert refuse(capsys, folder, words, keyword) == ""
+
+
+def test_a_rule_is_named_where_it_was_given(capsys, folder):
+    rule = '[[art.rules]]\nselect = "{}"\ngain = 2\n'
+    (folder / "good.toml").write_text(PROJECT + rule.format("7-6"))
+    (folder / "bad.toml").write_text(PROJECT + rule.format("5-1"))
+    words = ["render", "-o", "a.exr", "--project"]
+    refuse(capsys, folder, [*words, "good.toml", "--solo", "5-1"], "error: --solo 5-1: Heliar-Tronnier")
+    refuse(capsys, folder, [*words, "bad.toml", "--solo", "7-6"], "error: art.rules[0], '5-1': Heliar-Tronnier")
 
 
 def test_every_finding_of_a_lens_file_is_listed_with_its_row(capsys, folder):

@@ -406,6 +406,14 @@ def test_every_shipped_lens_can_be_drawn(capsys):
         assert "nan," not in svg
 
 
+def test_a_light_too_steep_to_draw_is_told(capsys, folder):
+    light = ("lens", "show", "fisheye-nikkor-10.5", "--plot", "a.svg", "--light")
+    said = call(capsys, *light, "0,88")
+    assert "flarewright: a light at 88 degrees is too steep to draw and taken at 85\n" in said.err
+    assert "light at 85°" in (folder / "a.svg").read_text()
+    assert "too steep" not in call(capsys, *light, "0,85").err
+
+
 def test_lens_check_tells_and_converts(capsys, folder):
     said = call(capsys, "lens", "check", "heliar-tronnier")
     assert said.out.startswith("heliar-tronnier: usable, Heliar-Tronnier")

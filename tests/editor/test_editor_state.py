@@ -205,7 +205,7 @@ def test_a_refused_deed_leaves_everything_as_it_was(project):
     ("name", "values", "said"),
     [
         ("set_dirt", {"values": {"dust_per_mm2": -1}}, "dust per mm² must be at least 0, not -1"),
-        ("set_cell", {"row": 0, "column": "n_d", "text": "-1"}, "row 0: index n_d must be more than 1, not -1.0"),
+        ("set_cell", {"row": 0, "column": "n_d", "text": "-1"}, "row 0: index n_d must be more than 1, not -1"),
         ("set_cell", {"row": 0, "column": "v_d", "text": "x"}, "row 0: Abbe number V_d 'x' is no number; write"),
         ("set_cell", {"row": 0, "column": "semi_diameter", "text": "-1"}, "row 0: semi-diameter must be more than 0"),
         ("set_ghost", {"name": "8-6", "values": {"gain": -3}}, "gain must be at least 0, not -3"),

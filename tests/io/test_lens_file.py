@@ -85,7 +85,7 @@ MISTAKES = [
     ("f_number = 2.7\n", "", "f_number is missing"),
     ("f_number = 2.7", "f_number = -2.7", "f_number is -2.7: it must be above 0.3"),
     ("f_number = 2.7", "f_numbr = 2.7", "'f_numbr' is not a known key; did you mean 'f_number'?"),
-    ("f_number = 2.7", "f_number = 2.7\nfield_deg = 90.0", "field_deg is 90.0: it must be below 90 in degrees"),
+    ("f_number = 2.7", "f_number = 2.7\nfield_deg = 90.0", "field_deg is 90: it must be below 90 in degrees"),
     ("f_number = 2.7", 'f_number = 2.7\niris = "round"', "iris is 'round', a table was expected"),
     ("f_number = 2.7", "f_number = 2.7\niris = { blades = 2 }", "an iris has 0 blades (round) or at least 3"),
     (

@@ -491,7 +491,8 @@ def test_culling_leaves_out_what_it_says():
     lost = 1.0 - layer_flux(by_name(culled)["ghosts"], whole)[1] / layer_flux(layers_of(whole)["ghosts"], whole)[1]
     assert 0.0 < culled.summary["ghosts"]["culled_share"] <= 0.05
     assert lost == pytest.approx(culled.summary["ghosts"]["culled_share"], abs=0.01)
-    assert any("left out" in remark for remark in culled.remarks)
+    share = f"{100 * culled.summary['ghosts']['culled_share']:.2g} %"
+    assert any(f"that carry {share} of the ghost light were left out" in remark for remark in culled.remarks)
 
 
 def test_a_path_that_passes_the_picture_by_is_no_light_in_it():

@@ -131,9 +131,13 @@ def check_place(path: Path, suffix: str | tuple[str, ...]) -> None:
     Raises
     ------
     OutputError
-        When the name ends otherwise than in `suffix`, its folder does not exist, or it is a folder itself.
+        When the name is empty or ends otherwise than in `suffix`, its folder does not exist, or it is a folder itself.
     """
     allowed = (suffix,) if isinstance(suffix, str) else suffix
+    if path == Path():
+        raise OutputError(f"the name of the output is empty or '.', which is a folder; write flare{allowed[0]}, say")
+    if path.is_dir():
+        raise OutputError(f"cannot write {path}: it is a folder; give a file name, {path / 'flare'}{allowed[0]} say")
     if path.suffix == "" and path.name.lower() in allowed:
         raise OutputError(
             f"the output {str(path)!r} is an ending without a name; write {path.with_name('flare' + path.name)}"
@@ -144,8 +148,6 @@ def check_place(path: Path, suffix: str | tuple[str, ...]) -> None:
         raise OutputError(f"cannot write {path}: {path.parent} is a file and no folder; choose another place")
     if not path.parent.is_dir():
         raise OutputError(f"cannot write {path}: the folder {path.parent} does not exist; create it first")
-    if path.is_dir():
-        raise OutputError(f"cannot write {path}: it is a folder; give a file name")
 
 
 def check_free(path: Path, force: bool) -> None:

@@ -356,6 +356,7 @@ def render(
         raise ProjectError(f"{flag} is for the PNG alone and --no-png leaves it out; keep one")
     if half and float32:
         raise ProjectError("--half and --float both say how many bits a value has; keep one")
+    from .art_flags import naming_rules
     from .render_flags import Flags, build_project
 
     state = _read_state(resume)
@@ -389,7 +390,8 @@ def render(
     )
     _keep_inputs(settings, project, [output] if no_png else [output, output.with_suffix(".png")])
     try:
-        rendering = _render(settings, threads, run, ledger)
+        with naming_rules(flags, settings):
+            rendering = _render(settings, threads, run, ledger)
     except KeyboardInterrupt:
         if run is not None and run.state_file is not None and run.state_file.exists():
             tell([f"to go on: flarewright render --resume {run.state_file} -o {output}"])

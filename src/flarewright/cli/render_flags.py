@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,9 +13,9 @@ from ..errors import ProjectError
 from ..io.plate_text import parse_grating, parse_imperfection, parse_plate
 from ..io.project_file import ProjectFileError, explain, parse_coating_choice, read_project
 from ..io.spectrum_text import parse_spectrum
-from ..model import Art, Holdout, Iris, Lens, Light, Project, Rule, Scatter
-from ..model.art import PASSES
+from ..model import Art, Holdout, Iris, Lens, Light, Project, Scatter
 from ..model.light import SUN_DEG
+from .art_flags import art_flags
 from .common import field_angles, pair
 
 # Where a finding about a project belongs when flags made the project.
@@ -192,7 +191,7 @@ def build_project(flags: Flags) -> Project:
     changed = {
         "scatter": scatter_flags(flags.scatter, flags.surface_roughness, flags.cleanliness, said),
         "holdout": _holdout(flags, base.holdout if base else None),
-        "art": _art(flags, base.art if base else Art()),
+        "art": art_flags(flags, base.art if base else Art()),
     }
     fields |= {section: table for section, table in changed.items() if table is not None}
     try:
@@ -448,60 +447,6 @@ def scatter_flags(
     if known.get("model") == "none":
         del known["model"]
     return {"model": "harvey-shack", **known, **given}
-
-
-def _art(flags: Flags, base: Art) -> dict[str, Any] | None:
-    """Return the art direction with the flags' rules after the project's, or None when no flag changes it."""
-    if not (flags.rule or flags.mute or flags.solo or flags.gain or flags.physical):
-        return None
-    rules = [*base.rules, *(_told_rule(text) for text in flags.rule)]
-    if flags.solo:
-        rules += [Rule(select="all", enable=False), *(_rule("--solo", text, enable=True) for text in flags.solo)]
-    rules += [_rule("--mute", text, enable=False) for text in flags.mute]
-    passes = dict(base.gain)
-    for text in flags.gain:
-        name, _, number = (part.strip() for part in text.rpartition("="))
-        try:
-            factor = float(number)
-        except ValueError:
-            name = ""
-        if not name:
-            raise ProjectError(
-                f"--gain {text!r} is no name and factor; write --gain ghosts=2 for a pass, --gain 7-3=0.5 for ghosts"
-            )
-        if not 0.0 <= factor <= 1e9:
-            raise ProjectError(f"--gain {text!r} is no factor of light; give a number between 0 and 1e9")
-        if name in PASSES:
-            passes[name] = factor
-        elif re.fullmatch("[a-z]+", name) and name not in ("all", "not"):
-            raise ProjectError(
-                f"--gain: there is no pass {name!r}; known are {', '.join(PASSES)}; ghosts are named like 7-3 or row:7"
-            )
-        else:
-            rules.append(_rule("--gain", name, gain=factor))
-    return {"physical": flags.physical or base.physical, "gain": passes, "rules": rules}
-
-
-def _told_rule(text: str) -> Rule:
-    """Return the rule of `--rule`, whose words are those of a project file's [[art.rules]]."""
-    try:
-        table = tomllib.loads(f"rule = {{ {text} }}")["rule"]
-    except tomllib.TOMLDecodeError:
-        raise ProjectError(
-            f"--rule {text!r} is no rule; write --rule 'select = \"row:7\", gain = 2, tint = [1, 0.6, 0.3]', with the "
-            "words of [[art.rules]] in a project file"
-        ) from None
-    try:
-        return Rule.model_validate(table)
-    except ValidationError as error:
-        raise ProjectError(f"--rule: {explain(error, table, {'': (Rule,)})[0]}") from None
-
-
-def _rule(flag: str, select: str, **changes: Any) -> Rule:
-    try:
-        return Rule.model_validate({"select": select, **changes})
-    except ValidationError as error:
-        raise ProjectError(f"{flag}: {explain(error, {'select': select})[0].removeprefix('select: ')}") from None
 
 
 def in_flags(sentence: str) -> str:

@@ -219,14 +219,19 @@ def _embedded_lens(table: dict[str, Any], folder: Path, problems: list[str]) -> 
 
 
 def expand_coating(value: Any, folder: Path) -> Any:
-    """Return a coating with its short texts expanded: the choice itself, or those inside its table."""
+    """Return a coating with its short texts expanded, the choice itself or those inside its table; refuse the rest."""
     if isinstance(value, str):
         return parse_coating_choice(value, folder=folder)
     if isinstance(value, dict) and isinstance(value.get("coatings"), list):
         return {**value, "coatings": [coating_from(item) for item in value["coatings"]]}
     if isinstance(value, dict) and isinstance(value.get("coating"), str):
         return {**value, "coating": coating_from(value["coating"])}
-    return value
+    if isinstance(value, dict):
+        return value
+    raise ProjectError(
+        f'{shorten(value)} is neither a text nor a table; write "lens", "none", "preset:NAME", "quarter-wave:550" (or '
+        "another film), the name of a coating file, or a table that begins with its kind"
+    )
 
 
 def expand_light(light: Any, where: str, folder: Path, problems: list[str]) -> Any:

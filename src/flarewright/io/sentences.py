@@ -37,6 +37,9 @@ _BOUNDS = {
     "less_than": ("less than", "lt"), "less_than_equal": ("less than or equal to", "le"),
 }  # fmt: skip
 
+# places, sizes and colours have just so many entries; lists that may be shorter end later
+_FIXED_LENGTHS = (2, 3)
+
 # lists whose entries stand under a heading of their own
 _HEADINGS = {
     "lights": "[[lights]]", "cameras": "[[cameras]]", "rules": "[[art.rules]]", "wishes": "[[design.wishes]]",
@@ -101,7 +104,7 @@ def _wanted(finding: Finding, keys: Keys) -> str:
         case "too_short":
             return f"a list of at least {about['min_length']}"
         case "too_long":
-            return f"a list of at most {about['max_length']}"
+            return f"a list of {'' if about['max_length'] in _FIXED_LENGTHS else 'at most '}{about['max_length']}"
         case "literal_error":
             return str(about["expected"])
         case "union_tag_invalid":
@@ -162,6 +165,9 @@ def written(value: object) -> str:
             return "null"
         case bool():
             return "true" if value else "false"
+        case float() if float(short := f"{value:g}") == value:
+            # 1e+09, not ten digits
+            return short
         case date() | time():
             return value.isoformat()
         case list() | tuple():

@@ -22,6 +22,8 @@ _MARGIN_PX = 34.0
 _HEAD_PX = 62.0
 _FOOT_PX = 44.0
 _TALLEST_PX = 460.0
+# steeper rays run nearly straight down the drawing, those of 90 degrees and more come from behind
+_STEEPEST_DEG = 85.0
 _RAYS = 7
 # rays that are tried; where fewer than `_RAYS` of them get through, as of a ghost that fills little of the entrance
 _CANDIDATES, _MORE_CANDIDATES = 401, 8001
@@ -97,8 +99,8 @@ def cross_section(
     z = vertex_positions(lens)
     sensor_z = float(z[-1]) + order.sensor_distance
     semi = [_semi(row, order) for row in lens.rows]
-    angle = hypot(*field_deg) if field_deg is not None else (lens.field_deg or 0.0)
-    angle = min(angle, 85.0)
+    wanted = hypot(*field_deg) if field_deg is not None else (lens.field_deg or 0.0)
+    angle = min(wanted, _STEEPEST_DEG)
     lead = 0.16 * max(sensor_z, 2.0 * max(semi))
     image = min(order.efl * tan(radians(min(angle, 60.0))), 2.0 * max(semi))
     half = 1.08 * max(*semi, image, 0.12 * sensor_z)
@@ -112,7 +114,8 @@ def cross_section(
         _draw_glass(sheet, lens, z, semi, k)
     # Steep rays come from far above; only what lies between head and foot is shown of them.
     sheet.parts.append('<g clip-path="url(#sheet)">')
-    remarks = _draw_fans(sheet, lens, order, lead, angle, ghost, _corner(iris))
+    remarks = [] if angle == wanted else [f"a light at {wanted:g} degrees is too steep to draw and taken at {angle:g}"]
+    remarks += _draw_fans(sheet, lens, order, lead, angle, ghost, _corner(iris))
     sheet.parts.append("</g>")
     _draw_surfaces(sheet, lens, z, semi)
     _draw_stop(sheet, float(z[lens.stop_row]), order.stop_semi_diameter, _blade_reach(lens, semi, order))

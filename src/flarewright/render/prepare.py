@@ -84,6 +84,7 @@ def _completed(reading: LensReading | RawLens | RawSequence, apertures: Aperture
     """Judge what was read, and fill in what it leaves out."""
     if apertures != "auto" and not isinstance(reading, RawLens):
         raise LensError(f"only the columns of a .lens table may be read as {apertures}; leave --apertures out")
+    table = isinstance(reading, RawLens)
     # what other programs wrote needs optics to be judged, so it is repaired here
     if isinstance(reading, RawLens):
         reading = repair(reading, apertures)
@@ -91,10 +92,10 @@ def _completed(reading: LensReading | RawLens | RawSequence, apertures: Aperture
         reading = lens_of_sequence(reading)
     lens, found = reading
     told = list(found)
-    return complete_lens(lens, remarks=told), tuple(told)
+    return complete_lens(lens, remarks=told, focal_length_told=table), tuple(told)
 
 
-def complete_lens(lens: Lens, *, remarks: list[str] | None = None) -> Lens:
+def complete_lens(lens: Lens, *, remarks: list[str] | None = None, focal_length_told: bool = False) -> Lens:
     """Fill in what a prescription leaves out and check that it makes an image.
 
     Parameters
@@ -102,6 +103,8 @@ def complete_lens(lens: Lens, *, remarks: list[str] | None = None) -> Lens:
     lens : Lens
     remarks : list of str, optional
         Estimates are told here.
+    focal_length_told : bool
+        Whether it has been told already how far off the stated focal length is, as the repair of a `.lens` table does.
 
     Returns
     -------
@@ -126,7 +129,7 @@ def complete_lens(lens: Lens, *, remarks: list[str] | None = None) -> Lens:
             )
             remarks.append(f"semi-diameters of {which} estimated from f/{lens.f_number:g} and the field of view")
         stated = lens.stated_focal_length
-        if stated is not None and abs(order.efl / stated - 1.0) > 0.02:
+        if stated is not None and not focal_length_told and abs(order.efl / stated - 1.0) > 0.02:
             remarks.append(f"the focal length is {order.efl:.2f} mm, the file says {stated:g} mm")
         for position in full.positions:
             if position.focal_length is None or position.focus_distance is not None:

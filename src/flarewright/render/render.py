@@ -195,6 +195,11 @@ class _Drawn:
     ledger: Ledger | None = None
 
 
+def _percent(share: float) -> str:
+    """Write a part of the light for a person."""
+    return f"{100.0 * share:.2g} %" if share >= 1e-6 else "less than 0.0001 %"
+
+
 def _ghosts(
     settled: Settled,
     shots: tuple[Shot, ...],
@@ -217,12 +222,13 @@ def _ghosts(
     }
     told = []
     if ghosts.culled:
-        told.append(f"{ghosts.culled} ghosts that carry {ghosts.culled_share:.2e} of the ghost light were left out")
+        share = _percent(ghosts.culled_share)
+        told.append(f"{ghosts.culled} ghosts that carry {share} of the ghost light were left out")
     if ghosts.faint:
         facts |= {"faint": ghosts.faint, "faint_share": ghosts.faint_share}
         told.append(
             f"{len(project.lights)} lights: {ghosts.faint} ghosts of single lights were left out, which carry "
-            f"{ghosts.faint_share:.1e} of the ghost light"
+            f"{_percent(ghosts.faint_share)} of the ghost light"
         )
     two = _Drawn((ghosts.total,), ghosts.singles, {"ghosts": facts}, tuple(told))
     if project.quality.orders == 2:
