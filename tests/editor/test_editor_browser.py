@@ -613,6 +613,14 @@ def test_the_colour_map_is_in_sight_and_marks_what_the_mirrors_wear(tab):
     tab.until("flarewright.state.coating !== 'per-row'")
     assert worn() == before
     assert marked() == pytest.approx(before, abs=3.0)
+    # by keys: along the map, as far as it goes
+    tab.page.focus(".map img")
+    for key in ("ArrowUp", "ArrowUp", "Shift+ArrowLeft"):
+        tab.page.keyboard.press(key)
+    wanted = [max(380.0, before[0] - 50.0), min(750.0, before[1] + 20.0)]
+    tab.until(f"document.querySelector('.map + div').textContent.includes('row 6: {wanted[0]:g} nm')")
+    assert worn() == wanted
+    assert marked() == pytest.approx(wanted, abs=3.0)
     # what no place of the map stands for is marked nowhere
     tab.js("flarewright.deed('set_coating', {text: 'none'})")
     tab.until("document.querySelector('.map i').hidden")

@@ -10,6 +10,8 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
 
+import numpy as np
+
 from ..design.candidate import Outcome, outcomes
 from ..design.color_search import solve_colors
 from ..design.colors import coated, color_problem
@@ -131,7 +133,9 @@ class Solver:
         def work(_: threading.Event, ready: threading.Event) -> None:
             ready.set()
             found = solve_colors(problem)
-            new = coated(lens, problem.structure, films, found.values)
+            # nobody sees, or evaporates, a hundredth of a nanometre
+            values = np.round(found.values, 2) if films == "quarter-wave" else found.values
+            new = coated(lens, problem.structure, films, values)
             # the glass stays as it was, and so do opening and zoom
             worn = tuple(row.coating if isinstance(row, Surface) else None for row in new.rows)
             words = "This lens, with coatings for the wished colours"

@@ -1,6 +1,6 @@
 // Coatings: of the whole lens, of one row, and the colours that a ghost can have.
 import { latest } from './api.js';
-import { button, choice, entry, group, h, refill, slider } from './ui.js';
+import { button, choice, entry, group, h, refill, slider, stroke } from './ui.js';
 
 const KNOWN = [['lens', 'as the lens file says'], ['none', 'bare glass'], ['quarter-wave:550', 'quarter wave at 550 nm'], ['quarter-wave:450', 'quarter wave at 450 nm'], ['uncoated-1930s', 'uncoated, 1930s'], ['single-1950s', 'single film, 1950s'], ['early-multicoat', 'early multicoat'], ['modern-broadband', 'modern broadband']];
 const KINDS = [['none', 'bare glass'], ['quarter-wave', 'quarter wave'], ['film', 'free film'], ['uncoated-1930s', 'uncoated, 1930s'], ['single-1950s', 'single film, 1950s'], ['early-multicoat', 'early multicoat'], ['modern-broadband', 'modern broadband']];
@@ -8,6 +8,8 @@ const FIRST = { 'quarter-wave': 'quarter-wave:550', film: 'film:1.38:100' };
 // ends of the map, as the server draws it
 const LOW = 380;
 const HIGH = 750;
+// where keys begin on mirrors that wear something else
+const MIDDLE = 550;
 
 export function coatingPanel(app) {
   const coat = (text) => app.deed('set_coating', { text }).catch(() => {});
@@ -37,8 +39,8 @@ export function coatingPanel(app) {
   const nobody = h('p', { class: 'quietly' }, 'Choose a ghost in the picture: a map will show what colours films on its two mirrors can give it.');
   const mapTold = h('p');
   const mark = h('i');
-  const image = h('img', { alt: 'Colours of the ghost by the centre wavelengths of its two mirrors', draggable: 'false' });
-  const pair = h('div', { class: 'beside' }, h('div', { class: 'map' }, image, mark), h('div', { class: 'quietly' }, h('p', {}, 'Quarter-wave films on its two mirrors: up, the centre wavelength of the first; to the right, of the second. Click to choose.'), mapTold));
+  const image = h('img', { alt: 'Colours of the ghost by the centre wavelengths of its two mirrors; arrows move along it', draggable: 'false', tabindex: 0 });
+  const pair = h('div', { class: 'beside' }, h('div', { class: 'map' }, image, mark), h('div', { class: 'quietly' }, h('p', {}, 'Quarter-wave films on its two mirrors: up, the centre wavelength of the first; to the right, of the second. Click to choose, or go there with the arrows.'), mapTold));
   let seen = '';
   let seenMap = '';
 
@@ -61,25 +63,41 @@ export function coatingPanel(app) {
     const nm = (part) => Math.round((LOW + (HIGH - LOW) * Math.max(0, Math.min(1, part))) / 2) * 2;
     return [nm(1 - (event.clientY - place.top) / place.height), nm((event.clientX - place.left) / place.width)];
   };
-  // where the films are that the two mirrors wear, if they are such: whatever put them on, or took them off
-  function tellWorn(state) {
+  // the films that the two mirrors wear, if they are such: whatever put them on, or took them off
+  function wornPair(state) {
     const films = app.ghost.split('-').map((number) => worn(state, Number(number)));
-    const plain = films.every(({ kind, numbers: [nm] }) => kind === 'quarter-wave' && nm >= LOW && nm <= HIGH);
-    mark.hidden = !plain;
+    return films.every(({ kind, numbers: [nm] }) => kind === 'quarter-wave' && nm >= LOW && nm <= HIGH) ? films.map(({ numbers: [nm] }) => nm) : null;
+  }
+  function tellWorn(state) {
+    const nms = wornPair(state);
+    mark.hidden = !nms;
     // a hand reads there what it points at
-    if (!image.matches(':hover')) mapTold.textContent = plain ? pairWords(films.map(({ numbers: [nm] }) => nm)) : '';
-    if (!plain) return;
-    const [up, right] = films.map(({ numbers: [nm] }) => 100 * (nm - LOW) / (HIGH - LOW));
+    if (!image.matches(':hover')) mapTold.textContent = nms ? pairWords(nms) : '';
+    if (!nms) return;
+    const [up, right] = nms.map((nm) => 100 * (nm - LOW) / (HIGH - LOW));
     mark.style.left = `${right}%`;
     mark.style.top = `${100 - up}%`;
   }
   const pairWords = (nms) => app.ghost.split('-').map((number, k) => `row ${number}: ${nms[k]} nm`).join(', ');
   image.addEventListener('pointermove', (event) => { mapTold.textContent = pairWords(at(event)); });
   image.addEventListener('pointerleave', () => { if (!pair.hidden) tellWorn(app.state); });
-  image.addEventListener('click', async (event) => {
-    const [first, second] = at(event);
+  let asked = 0;
+  const put = ([first, second], held) => {
     const [j, i] = app.ghost.split('-');
-    try { await app.deed('set_row_wavelengths', { values: { [j]: first, [i]: second } }); } catch (error) { void error; }
+    asked += 1;
+    app.deed('set_row_wavelengths', { values: { [j]: first, [i]: second } }, held).catch(() => {}).finally(() => { asked -= 1; });
+  };
+  image.addEventListener('click', (event) => put(at(event), ''));
+  // keys come faster than answers: they go on from where they were, and that is one step
+  let walked = null;
+  image.addEventListener('keydown', (event) => {
+    const step = { ArrowUp: [1, 0], ArrowDown: [-1, 0], ArrowRight: [0, 1], ArrowLeft: [0, -1] }[event.key];
+    if (!step) return;
+    event.preventDefault();
+    if (!asked) walked = null;
+    walked ??= { nms: wornPair(app.state) ?? [MIDDLE, MIDDLE], held: stroke() };
+    walked.nms = walked.nms.map((nm, k) => Math.max(LOW, Math.min(HIGH, nm + step[k] * (event.shiftKey ? 50 : 10))));
+    put(walked.nms, walked.held);
   });
   return {
     element: h('div', {}, whole.element, h('div', { class: 'group' }, h('h3', {}, 'One row'), rows, kinds.element, quarter.element, index.element, thick.element, field.element), h('div', { class: 'group' }, h('h3', {}, 'Colours of the chosen ghost'), nobody, pair), plot),
