@@ -294,6 +294,15 @@ def test_cells_change_the_lens_and_say_what_is_odd(project):
     )
 
 
+def test_an_image_distance_that_is_not_used_says_so(project):
+    last = len(own_lens(project).rows) - 1
+    changed = prescription(do(project, "set_cell", row=last, column="thickness", text="60"))
+    assert "not used: the sensor stands where" in changed.rows[last]["notes"]["thickness"]
+    place = changed.facts["sensor_distance"]
+    kept = prescription(do(project, "set_cell", row=last, column="thickness", text=f"{place:.2f}"))
+    assert "thickness" not in kept.rows[last]["notes"]
+
+
 def test_facts_of_the_table_are_those_of_the_lens(project):
     table = prescription(project)
     order = first_order(as_lens("heliar-tronnier"), 8.0)

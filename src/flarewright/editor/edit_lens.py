@@ -440,7 +440,7 @@ def prescription(project: Project) -> Prescription:
         coats = resolve_coatings(lens, project.coating)
     except FlarewrightError:
         coats = tuple(None for _ in lens.rows)
-    told = notes(lens)
+    told = notes(lens, facts.get("sensor_distance"))
     rows = tuple(_row(k, row, coats[k], told.get(k, {})) for k, row in enumerate(lens.rows))
     return Prescription(rows, facts, problem, distortion)
 

@@ -12,14 +12,18 @@ from ..optics.shape import sag
 # glass thinner than this at its edge or middle cannot be made
 THIN_MM = 0.5
 STEEP = 0.95
+# the image distance of a patent is rounded
+RECORD_MM = 0.1
 
 
-def notes(lens: Lens) -> dict[int, dict[str, str]]:
-    """Return what a lens maker would frown at.
+def notes(lens: Lens, sensor_distance: float | None = None) -> dict[int, dict[str, str]]:
+    """Return what a lens maker would frown at, and what does nothing.
 
     Parameters
     ----------
     lens : Lens
+    sensor_distance : float, optional
+        Where the sensor stands behind the last vertex, mm; None where that is not known.
 
     Returns
     -------
@@ -33,9 +37,18 @@ def notes(lens: Lens) -> dict[int, dict[str, str]]:
             _rim(row, here)
             _glass(row, here)
         _gap(lens, k, here)
+        if k == len(lens.rows) - 1:
+            _image(row.thickness, sensor_distance, here)
         if here:
             told[k] = here
     return told
+
+
+def _image(thickness: float, sensor_distance: float | None, here: dict[str, str]) -> None:
+    if sensor_distance is not None and thickness != 0.0 and abs(thickness - sensor_distance) > RECORD_MM:
+        here["thickness"] = (
+            f"Kept as a record and not used: the sensor stands where the lens focuses, {sensor_distance:.4g} mm behind."
+        )
 
 
 def _rim(row: Surface, here: dict[str, str]) -> None:
