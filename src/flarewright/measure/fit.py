@@ -238,14 +238,6 @@ def equations(shape: Shape, free: Indices, patch: Patch, missed: Misfit, offset:
     return matrix, side
 
 
-def _weights(patch: Patch, model: Floats, error: float) -> Floats:
-    """Return inverse variances, the model's own error included."""
-    if error <= 0.0:
-        return patch.weight
-    level = np.maximum(np.abs(model), np.abs(patch.pixels))
-    return np.asarray(patch.weight / (1.0 + patch.weight * (error * level) ** 2))
-
-
 def priors(shape: Shape, free: Indices, width: int) -> Floats:
     """Return weak inverse variances of numbers about 0, which keep unseen directions still."""
     spread = np.full(NUMBERS, max(float(np.abs(shape.numbers[FIRST_G])), 0.04 * width))
@@ -440,24 +432,16 @@ def presence(shape: Shape, view: View, channel: int, error: float = MODEL_ERROR)
     if not patches:
         return Presence(0.0, np.inf)
     patch = patches[0]
-    height, width = patch.pixels.shape
-    plane = np.zeros((height, width + 1))
-    none = np.zeros((height, width + 1, 0))
-    draw_with_changes(
-        shape.numbers, shape.discs, patch.sigma, np.zeros(0, np.int64), patch.frame, patch.left, patch.top, plane, none
-    )
-    sum_along_rows(plane)
-    model = plane[:, :width]
-    weight = _weights(patch, model, error)
-    total = weight.sum()
-    if not total > 0.0:
+    missed = misfit(shape, patch, False, error, tails=False)
+    weight, model = missed.weight, patch.pixels - missed.residual
+    if not missed.total > 0.0:
         return Presence(0.0, np.inf)
-    even = model - (weight * model).sum() / total
+    even = model - (weight * model).sum() / missed.total
     power = float((weight * even**2).sum())
     if not power > 1e-9:
         return Presence(0.0, np.inf)
     # other ghosts' edges count less and less: from the shape's own brightness on
-    weight = weight / (1.0 + weight * (patch.pixels - model) ** 2 / (4.0 * OUTLIER) ** 2)
+    weight = weight / (1.0 + weight * missed.residual**2 / (4.0 * OUTLIER) ** 2)
     total = weight.sum()
     even = model - (weight * model).sum() / total
     power = float((weight * even**2).sum())
