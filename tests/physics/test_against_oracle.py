@@ -14,7 +14,9 @@ throughput alone.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -26,6 +28,7 @@ from flarewright.optics import ghosts
 from flarewright.render.analysis import ghosts as analyse
 from flarewright.render.prepare import load_lens
 
+CORPUS = Path(os.environ.get("FLAREWRIGHT_CORPUS", Path(__file__).parents[3] / "shared" / "lens_corpus"))
 FLUX, PLACE, SIZE, FLOOR = 0.01, 0.02, 0.02, 1e-4
 DOUBT = ": the oracle doubts its "
 MOST_UNDECIDED = 2
@@ -130,6 +133,28 @@ def test_a_shipped_lens():
     """The file, its loader and the table together, against the oracle's reading of the same frozen data."""
     a_lens = load_lens("triplet-pestrecov")
     compare_systems(from_lens(a_lens), a_lens, (6.0, 4.0), samples=2000)
+
+
+def test_a_ring_of_steep_rays_around_the_rest():
+    """Rays that are nearly reflected totally pass in a ring thinner than the pre-pass' cells: 4 % of this ghost."""
+    a_lens = load_lens("canon-70-200-tele")
+    compare_systems(from_lens(a_lens), a_lens, (3.0, 0.0), paths=[(20, 13)], samples=2000)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("file", "field", "path"),
+    [
+        ("Canon_25mm_F1.85_(Canon_RF24mm_F1.8_Macro_IS_STM).lens", (2.24, -24.43), (5, 2)),
+        ("Canon_26mm_F1.45_(Canon_EF24mm_f1.4L_II_USM).lens", (-20.15, -11.06), (6, 0)),
+    ],
+)
+def test_rings_of_steep_rays_in_other_lenses(file, field, path):
+    """The same; 2 and 5 % of these ghosts."""
+    if not (CORPUS / file).exists():
+        pytest.skip(f"{CORPUS} is not there")
+    a_lens = load_lens(CORPUS / file)
+    compare_systems(from_lens(a_lens), a_lens, field, paths=[path], samples=2000)
 
 
 @pytest.mark.slow

@@ -16,7 +16,7 @@ from flarewright.optics.holdout import behind, hidden_at
 from flarewright.render.ledger import trace_ledger
 from flarewright.render.prepare import settle
 from flarewright.render.reference import ReferenceRun
-from flarewright.render.render import render
+from flarewright.render.render import BLACK, HIDDEN, render
 from flarewright.render.shot import make_opening, make_shots
 from flarewright.render.spread import covered
 
@@ -156,6 +156,9 @@ def test_a_hidden_light_gives_nothing(tmp_path):
             assert not any(layer.pixels.any() for layer in found.layers)
             assert found.summary["lights"][0]["visible"] == 0.0
             assert sum(found.summary["lights"][0]["direct_throughput_mm2"]) == 0.0
+            # nobody shall look for the fault in the lens
+            assert HIDDEN in found.remarks
+            assert BLACK not in found.remarks
     # a light of its own beside it is not
     other = DISC.replace(field_deg=(-6.0, 2.0), diameter_deg=0.0)
     both = Project(**{**dict(project()), "lights": (DISC.replace(holdout=black), other)})

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from PIL import Image
 from pupil_sum import D_LINE, by_name, count, layer_flux, layers_of, mono, path_of, picture, scene, shots_of
 
 from flarewright.model import D65, Everywhere, Iris, Light, Project, QuarterWave
@@ -412,8 +413,6 @@ def test_draft_and_final_place_their_ghosts_alike():
 
 
 def write_mask(path, grey) -> Iris:
-    from PIL import Image
-
     Image.fromarray(np.round(grey * 255).astype(np.uint8)).save(path)
     return Iris(mask=str(path))
 
@@ -522,3 +521,19 @@ def test_a_black_picture_is_told():
     )
     told = [any("picture is black" in remark for remark in each.remarks) for each in (lit, dark)]
     assert told == [False, True]
+
+
+def test_an_iris_image_that_is_not_square_is_told(tmp_path):
+    told = []
+    for size in ((48, 48), (64, 48)):
+        Image.new("L", size, 255).save(tmp_path / "iris.png")
+        made = Project(
+            lens="tessar-brendel",
+            lights=(Light(field_deg=(8.0, 4.0)),),
+            iris=Iris(mask=str(tmp_path / "iris.png")),
+            camera={"size_px": (48, 27)},
+            quality={"mode": "draft"},
+        )
+        told.append([remark for remark in render(made).remarks if "stretched" in remark])
+    assert told[0] == []
+    assert told[1] == ["the iris image has 64x48 pixels and is stretched to the square around the iris; give a square"]

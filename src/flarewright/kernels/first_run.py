@@ -28,12 +28,13 @@ _WINGS = "f8[::1], f8[::1], f8[::1], f8[::1]"
 ROOTS = {
     "mesh": (
         "mesh.build_mesh",
-        f"{_GEOMETRY}, f8[:,::1], f8[:,:,::1], f8, f8, f8, i8, f8, f8, f8[::1], i8, i8, i8, i8, f8, f8, f8, f8, f8, f8",
+        f"{_GEOMETRY}, f8[:,::1], f8[:,:,::1], f8, f8, f8, i8, f8, f8, f8[::1], i8, i8, i8, i8, f8, f8, f8, f8, f8, "
+        "f8, i8",
         3.1,
     ),
     "prepass": (
         "prepass.find_box",
-        f"{_GEOMETRY}, f8[::1], f8[:,::1], f8, f8, f8, i8, f8, f8, f8[::1], i8, i8, i8, f8, f8, f8[:,::1]",
+        f"{_GEOMETRY}, f8[::1], f8[:,::1], f8, f8, f8, i8, f8, f8, f8[::1], i8, i8, i8, i8, f8, f8, f8[:,::1]",
         2.1,
     ),
     "draw": ("bundle.draw_bundle", f"{_BUNDLE}, f8[::1], i8, f8[:,::1], none, {_CANVAS}, i8", 2.6),

@@ -14,14 +14,15 @@ INNER_BEND = 0.005
 BENT_WEIGHT = 0.002
 # cells in fringes are no larger than this many pixels: of a small one most often one edge tells the pattern
 FRINGE_CELL = 128.0
-# cells whose rays all end, but not at one surface, are halved so often
+# cells whose rays all end, but not at one surface, are halved so often; of a path that passes light beside rays that
+# end once more, and those too where some rays end and the others do not pass
 SLIVER_LEVEL = 3
 
 
 @borrowing
 def _judge(
     data, nodes, crossings, iris_radius, iris_inner, level, rim_level, max_level, h, tolerance, flux_tolerance,
-    fringe_tolerance, faint_radius, scale, view_radius, values,
+    fringe_tolerance, faint_radius, scale, view_radius, slivers, values,
 ):  # fmt: skip
     """Decide whether a cell of 3 x 3 nodes is EMPTY, to be SPLIT, a LEAF, or a FLAT one; `values`, shape (9,), is room.
 
@@ -29,7 +30,7 @@ def _judge(
     """
     if rejected(data, nodes, crossings, iris_radius, 0.25):
         # between rays that end at different surfaces a sliver may pass
-        return SPLIT if level < SLIVER_LEVEL and _ends_differ(data, nodes) else EMPTY
+        return SPLIT if level < SLIVER_LEVEL + slivers and _ends_differ(data, nodes, slivers) else EMPTY
     if level >= max_level:
         return LEAF
     x_low, x_high, y_low, y_high = np.inf, -np.inf, np.inf, -np.inf
@@ -86,14 +87,15 @@ def _judge(
 
 
 @borrowing
-def _ends_differ(data, nodes):
-    """Tell whether all rays of a cell end, and not all at the same surface."""
-    low, high = np.inf, -np.inf
+def _ends_differ(data, nodes, slivers):
+    """Tell whether all rays of a cell end, and not all at the same surface; with slivers also whether some end."""
+    low, high, alive = np.inf, -np.inf, 0
     for k in nodes:
         if data[k, ALIVE] > 0.0:
-            return False
-        low, high = min(low, data[k, X]), max(high, data[k, X])
-    return low < high
+            alive += 1
+        else:
+            low, high = min(low, data[k, X]), max(high, data[k, X])
+    return low < high if alive == 0 else slivers > 0 and alive < nodes.size
 
 
 @borrowing
@@ -148,7 +150,7 @@ def _fan_areas(data, nodes):
 def build_mesh(
     rows, actions, curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, tilt, nearness,
     crossings, iris_radius, iris_inner, box, nx, ny, rim_level, max_level, tolerance, flux_tolerance,
-    fringe_tolerance, faint_radius, scale, view_radius,
+    fringe_tolerance, faint_radius, scale, view_radius, slivers,
 ):  # fmt: skip
     """Trace a path on a grid that is refined where the map bends, folds or is cut, and triangulate it without cracks.
 
@@ -179,6 +181,8 @@ def build_mesh(
         Pixels per mm on the sensor.
     view_radius : float
         Radius around the axis that the picture covers, mm; inf for all.
+    slivers : int
+        1: light passes beside rays that end, and is looked for there; 0: it does not.
 
     Returns
     -------
@@ -230,7 +234,7 @@ def build_mesh(
             for v in range(n_gap.shape[0]):
                 found = _judge(
                     data[v], nodes, crossings, iris_radius, iris_inner, level, rim_level, max_level, h,
-                    tolerance, flux_tolerance, fringe_tolerance, faint_radius, scale, view_radius, values,
+                    tolerance, flux_tolerance, fringe_tolerance, faint_radius, scale, view_radius, slivers, values,
                 )  # fmt: skip
                 if found == SPLIT:
                     verdict = SPLIT

@@ -12,8 +12,10 @@ from .trace import ALIVE, REL, STOP, STOP_X, WEIGHT, X, Y, trace_lanes
 # paths seen by fewer cells of the pre-pass than this are searched for spots between its samples, at most so many a side
 FEW_CELLS = 12
 PROBES = 8
-# how often the gap between two rays that end at different surfaces is halved
+# how often the gap between two rays is halved of which one ends, or both at different surfaces
 HALVINGS = 5
+# where much is kept, light is looked for in gaps of which one ray has met a rim no farther out, of its radius
+NEAR = 2.0
 
 
 @borrowing
@@ -57,7 +59,7 @@ def rejected(data, nodes, crossings, iris_radius, slack):
 @compiled
 def find_box(
     rows, actions, curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, tilt, nearness,
-    crossings, iris_radius, view_radius, box, nx, ny, few_cells, finest_x, finest_y, traced,
+    crossings, iris_radius, view_radius, box, nx, ny, few_cells, slivers, finest_x, finest_y, traced,
 ):  # fmt: skip
     """Bound the part of the pupil that a path accepts, and estimate what it carries.
 
@@ -78,6 +80,8 @@ def find_box(
     few_cells : int
         Where fewer than these are kept, spots are looked for between the samples: FEW_CELLS, or 1 where a second spot
         beside what was found is too little.
+    slivers : int
+        1: gaps between rays are halved however much is kept; 0: only where few cells are.
     finest_x, finest_y : float
         How near to each other samples need to stand where a spot may hide between those of the cells, mm.
     traced : ndarray, shape ((nx + 1) (ny + 1), >= 5 + 2 C)
@@ -99,8 +103,10 @@ def find_box(
     -----
     Hullin 2011, section 4.2, "Ray Bounding". A cell is kept unless one of its limits is exceeded at every corner by
     more than half its variation over the cell. Where few cells are kept, cells whose limits change fast are searched
-    with a finer grid, and the gaps between neighbours that end at different surfaces are halved again and again: one
-    surface takes the rays on one side, another those on the other, and a sliver in between may pass both.
+    with a finer grid. The gaps between neighbours of which one ends, or both at different surfaces, are halved again
+    and again: one surface takes the rays on one side, another those on the other, and a sliver in between may pass
+    both. Shortly before they are reflected totally, rays run so differently from their neighbours that a ring of them
+    may pass around all that passes besides.
     """
     width = ny + 1
     count = (nx + 1) * width
@@ -152,9 +158,10 @@ def find_box(
             rows, actions, curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, tilt, nearness,
             crossings, iris_radius, corners, hx, hy, _probes(hx, finest_x), _probes(hy, finest_y), spots, sums,
         )  # fmt: skip
+    if accepted < few_cells or slivers > 0:
         _halve(
             rows, actions, curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, tilt, nearness,
-            crossings, iris_radius, px, py, data, width, hx, hy, spots, sums,
+            crossings, iris_radius, px, py, data, width, hx, hy, accepted < few_cells, spots, sums,
         )  # fmt: skip
         for m in range(2):
             spots[2 * m] = max(spots[2 * m], box[2 * m])
@@ -267,9 +274,9 @@ def _probe(
 @inner
 def _halve(
     rows, actions, curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, tilt, nearness,
-    crossings, iris_radius, px, py, data, width, hx, hy, spots, sums,
+    crossings, iris_radius, px, py, data, width, hx, hy, few, spots, sums,
 ):  # fmt: skip
-    """Look between neighbours of the grid that end at different surfaces by halving the gap HALVINGS times."""
+    """Look between neighbours of the grid that end, and not both alike, by halving the gap HALVINGS times."""
     # surfaces before the first crossing of the stop
     before = 0
     while before < actions.size and actions[before] != STOP:
@@ -281,10 +288,10 @@ def _halve(
             other = k + 1 if along == 0 else k + width
             if other >= px.size or (along == 0 and other % width == 0):
                 continue
-            if not _apart(data, k, other, before, iris_radius):
+            if not _apart(data, k, other, before, crossings, iris_radius, few):
                 continue
-            gaps[n_gaps, 0], gaps[n_gaps, 1], gaps[n_gaps, 2] = px[k], py[k], data[k, X]
-            gaps[n_gaps, 3], gaps[n_gaps, 4], gaps[n_gaps, 5] = px[other], py[other], data[other, X]
+            gaps[n_gaps, 0], gaps[n_gaps, 1], gaps[n_gaps, 2] = px[k], py[k], _end(data, k)
+            gaps[n_gaps, 3], gaps[n_gaps, 4], gaps[n_gaps, 5] = px[other], py[other], _end(data, other)
             n_gaps += 1
     share = hx * hy * np.cos(tilt)
     for _ in range(HALVINGS):
@@ -294,48 +301,47 @@ def _halve(
             mx[k], my[k] = 0.5 * (gaps[k, 0] + gaps[k, 3]), 0.5 * (gaps[k, 1] + gaps[k, 4])
         middle = np.empty((n_gaps, STOP_X + 2 * crossings))
         trace_lanes(
-            rows,
-            actions,
-            curvature,
-            conic,
-            z_vertex,
-            inv_semi,
-            n_gap,
-            reflectance,
-            sensor_z,
-            tilt,
-            nearness,
-            mx,
-            my,
-            middle,
-        )
+            rows, actions, curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, tilt, nearness,
+            mx, my, middle,
+        )  # fmt: skip
         narrower = np.empty((2 * n_gaps, 6))
         count = 0
         for k in range(n_gaps):
-            if middle[k, ALIVE] > 0.0:
-                if _passes(middle, k, crossings, iris_radius):
-                    _widen(spots, sums, middle, k, mx[k], my[k], hx / PROBES, hy / PROBES, share)
+            if _passes(middle, k, crossings, iris_radius):
+                _widen(spots, sums, middle, k, mx[k], my[k], hx / PROBES, hy / PROBES, share)
                 continue
+            end = _end(middle, k)
             for side in range(2):
                 # the part whose ends still differ
-                if middle[k, X] != gaps[k, 3 * side + 2]:
+                if end != gaps[k, 3 * side + 2]:
                     for m in range(3):
                         narrower[count, m] = gaps[k, 3 * side + m]
-                    narrower[count, 3], narrower[count, 4], narrower[count, 5] = mx[k], my[k], middle[k, X]
+                    narrower[count, 3], narrower[count, 4], narrower[count, 5] = mx[k], my[k], end
                     count += 1
         gaps = narrower
         n_gaps = count
 
 
 @borrowing
-def _apart(data, a, b, before, iris_radius):
-    """Tell whether two rays end at different surfaces, and not both far beyond a rim or beside the iris."""
-    if data[a, ALIVE] > 0.0 or data[b, ALIVE] > 0.0 or data[a, X] == data[b, X]:
+def _end(data, k):
+    """Return how many surfaces a ray passed that ended, -1 of one that did not."""
+    return -1.0 if data[k, ALIVE] > 0.0 else data[k, X]
+
+
+@borrowing
+def _apart(data, a, b, before, crossings, iris_radius, few):
+    """Tell whether two rays end, not both alike, and not both far beyond a rim or beside the iris; none may pass."""
+    if _end(data, a) == _end(data, b):
         return False
-    if _outside(min(data[a, REL], data[b, REL]), max(data[a, REL], data[b, REL]), 0.5):
+    low, high = min(data[a, REL], data[b, REL]), max(data[a, REL], data[b, REL])
+    if low > NEAR and not (few and not _outside(low, high, 0.5)):
         return False
-    if min(data[a, X], data[b, X]) < before:
-        return True
+    if _passes(data, a, crossings, iris_radius) or _passes(data, b, crossings, iris_radius):
+        return False
+    for k in (a, b):
+        # it ended before it could meet the iris
+        if data[k, ALIVE] == 0.0 and data[k, X] < before:
+            return True
     ua, va, ub, vb = data[a, STOP_X], data[a, STOP_X + 1], data[b, STOP_X], data[b, STOP_X + 1]
     ra, rb = np.sqrt(ua * ua + va * va) / iris_radius, np.sqrt(ub * ub + vb * vb) / iris_radius
     return not _outside(min(ra, rb), max(ra, rb), 0.5)

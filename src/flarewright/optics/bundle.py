@@ -201,7 +201,7 @@ def trace_grid(
     pupil, data, triangles = build_mesh(
         *tracing_arguments(packed, fitted, path, tilt), path.stop_crossings, *iris,
         region.box, *cells, rim_level, MAX_LEVEL, tolerance, rim_tolerance, fringe_px, faint_radius, scale,
-        view_radius,
+        view_radius, int(region.slivers),
     )  # fmt: skip
     return Bundle(path, pupil, triangles, dict(zip(fitted, data, strict=True)), packed.halves)
 

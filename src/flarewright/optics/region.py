@@ -125,6 +125,8 @@ class Region:
         Irradiance on the sensor, weighted by flux.
     share : float
         Part of the box that passes light.
+    slivers : bool
+        Light was found between the samples, beside rays that end.
     """
 
     box: Floats
@@ -132,6 +134,7 @@ class Region:
     seen_flux: float
     brightness: float
     share: float
+    slivers: bool = False
 
 
 def find_region(
@@ -177,9 +180,12 @@ def find_region(
     finest = _finest(packed, front)
     box, cells = _looked_at(packed, front, within, quick)
     whole, few_cells = True, 1 if quick else FEW_CELLS
-    held = np.array([np.inf, -np.inf, np.inf, -np.inf])
+    held, slivers = np.array([np.inf, -np.inf, np.inf, -np.inf]), False
     for _ in range(4):
-        found, sums, spots = _scan(packed, middle, box, cells, finest, traced if whole else None, few_cells)
+        found, sums, spots = _scan(
+            packed, middle, box, cells, finest, traced if whole else None, few_cells, slivers=whole and not quick
+        )
+        slivers = slivers or bool(spots[1] > spots[0])
         plenty = sums[4] >= (SPECK if whole else SMALL_REGION)
         near, few = box, cells_across(packed, COARSE) if plenty else cells
         if whole and sums[4] > 0.0:
@@ -201,7 +207,7 @@ def find_region(
         box, cells, whole = found, cells_across(packed, FINER), False
         if not shrunk or (quick and sums[4] >= SPECK):
             break
-    return _region(roomy, sums)
+    return _region(roomy, sums, slivers)
 
 
 def _looked_at(packed: PackedLens, front: Floats, within: Floats | None, quick: bool) -> tuple[Floats, tuple[int, int]]:
@@ -243,11 +249,11 @@ def first_look(
     return data
 
 
-def _region(box: Floats, sums: Floats) -> Region:
+def _region(box: Floats, sums: Floats, slivers: bool) -> Region:
     """Tell what a scan found in a box."""
     seen = float(sums[1]) if sums[3] > 0.0 else 0.0
     share = float(np.clip(sums[5] / _area(box), 1e-3, 1.0))
-    return Region(box, float(sums[0]), seen, float(sums[2] / sums[0]), share)
+    return Region(box, float(sums[0]), seen, float(sums[2] / sums[0]), share, slivers)
 
 
 def _area(box: Floats) -> float:
@@ -285,10 +291,10 @@ def measure_region(
     """
     w, cells = wavelengths_fitted(packed)[0], cells_across(packed, FINER)
     arguments = (*_looking_arguments(packed, w, path, tilt), path.stop_crossings, iris_radius, view_radius)
-    found, sums, _ = _scan(packed, arguments, box, cells, _finest(packed, front_box(packed, tilt)))
+    found, sums, spots = _scan(packed, arguments, box, cells, _finest(packed, front_box(packed, tilt)), slivers=True)
     if found[1] <= found[0] or sums[0] <= 0.0:
         return None
-    return _region(_with_room(found, box, cells), sums)
+    return _region(_with_room(found, box, cells), sums, bool(spots[1] > spots[0]))
 
 
 def grown(packed: PackedLens, region: Region, tilt: float, part: float) -> Region:
@@ -337,9 +343,11 @@ def _scan(
     finest: tuple[float, float],
     traced: Floats | None = None,
     few_cells: int = FEW_CELLS,
+    slivers: bool = False,
 ) -> tuple[Floats, Floats, Floats]:
     """Run the pre-pass over a box at one wavelength."""
-    found, sums, spots = find_box(*arguments, box, *cells, few_cells, *finest, _UNTRACED if traced is None else traced)
+    data = _UNTRACED if traced is None else traced
+    found, sums, spots = find_box(*arguments, box, *cells, few_cells, int(slivers), *finest, data)
     if packed.halves == 1:
         # the kernel counts every ray for its mirror image too
         sums[:3] *= 0.5

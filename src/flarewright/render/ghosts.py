@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import os
 import threading
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import product
+from itertools import pairwise, product
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -46,6 +46,9 @@ _CHUNKS = ((1_100_000, 8), (2_500_000, 4))
 _GHOSTS_A_CHUNK = 16
 # of drafts, whose ghosts are drawn in less time than a picture more is added in
 _DRAFT_CHUNKS = 2
+# drafts of so many pixels whose ghosts are drawn in one go are drawn in bands side by side: fixed by size, never by
+# threads
+_BANDS, _BAND_PX = 2, 300_000
 # and of ghosts that are spread together
 _MOST_CHUNKS = 8
 # so many ghosts of a draft are drawn in no more detail than can be seen among the others
@@ -269,9 +272,12 @@ def _draft(
     colors = [draft_colors(shot, own) * rgb[plain, None] for shot in points]
     coarse = draft_details(points, own, colors) if crowded else None
     place = {k: number for number, k in enumerate(plain)}
+    width, height = shots[0].size_px
+    lone = not alone and _chunks(shots[0], len(order), _DRAFT_CHUNKS) == 1
+    # a single group is drawn by the caller, and the pool's workers are free to help
+    in_bands = partial(_in_bands, pool.map if lone and width * height >= _BANDS * _BAND_PX else None)
 
     def draw(group: list[int]) -> list[Plane | None]:
-        width, height = shots[0].size_px
         sheets: list[NDArray[np.float64] | None] = [None] * DETAILS
         sheets[0] = picture = np.zeros((height, width, 3))
         mine = sorted(k for k in group if k in place)
@@ -284,7 +290,7 @@ def _draft(
                 shifted.setdefault(changed.offset, []).append((path, changed))
         for number, shot in enumerate(points):
             if coarse is None or not alone.isdisjoint(group):
-                draw_draft(shot, ghosts, picture, colors[number][places])
+                in_bands(height, partial(_mark_band, shot, ghosts, colors[number][places], picture))
             else:
                 draw_draft_coarsely(shot, ghosts, coarse[number, places], sheets, colors[number][places])
             for together in shifted.values():
@@ -295,7 +301,7 @@ def _draft(
             for path, changed in by_hand:
                 if changed.framed and not changed.alone:
                     draw_draft_by_hand(shot, path, changed, picture)
-        planes: list[Plane | None] = [None if sheet is None else _summed(sheet) for sheet in sheets]
+        planes: list[Plane | None] = [None if sheet is None else _summed(sheet, in_bands) for sheet in sheets]
         # blurring is linear, so ghosts of one blur are blurred together
         alike: dict[object, list[tuple[Shot, LightPath, PathArt]]] = {}
         for number, (shot, (path, changed)) in enumerate(product(points, by_hand)):
@@ -341,9 +347,27 @@ def _add_spread_drafts(
             _add_to(planes, detail, spread_light(marks))
 
 
-def _summed(sheet: NDArray[np.float64]) -> NDArray[np.float32]:
+def _in_bands(beside: Callable[..., Iterator[None]] | None, height: int, work: Callable[[slice], None]) -> None:
+    """Do something to a picture's rows: at once, or band by band side by side."""
+    if beside is None:
+        work(slice(0, height))
+        return
+    edges = [height * k // _BANDS for k in range(_BANDS + 1)]
+    for _ in beside(work, [slice(*ends) for ends in pairwise(edges)]):
+        pass
+
+
+def _mark_band(
+    shot: Shot, paths: Sequence[LightPath], colors: NDArray[np.float64], picture: NDArray[np.float64], band: slice
+) -> None:
+    draw_draft(shot, paths, picture[band], colors, band.start)
+
+
+def _summed(
+    sheet: NDArray[np.float64], in_bands: Callable[[int, Callable[[slice], None]], None]
+) -> NDArray[np.float32]:
     pixels = np.empty(sheet.shape, dtype=np.float32)
-    sum_rows(sheet, pixels)
+    in_bands(len(sheet), lambda band: sum_rows(sheet[band], pixels[band]))
     return pixels
 
 
@@ -461,12 +485,10 @@ def _collect(
     An item is so many ghosts' work.
     """
     shot = shots[0]
-    width, height = shot.size_px
     pixel_area = 1.0 / float(shot.to_pixels[2] * shot.to_pixels[3])
     luminance = luminance_weights(shot.colorspace)
     alone = len(items) if singles is None else min(singles, len(items))
-    most = min(most, next((n for size, n in _CHUNKS if width * height <= size), 2))
-    chunks = max(1, min(most, (len(items) - alone) * ghosts_each // _GHOSTS_A_CHUNK))
+    chunks = _chunks(shot, (len(items) - alone) * ghosts_each, most)
     rest = [items[alone + c :: chunks] for c in range(chunks)]
     totals: list[Plane | None] = [None] * DETAILS
     layers = []
@@ -482,12 +504,20 @@ def _collect(
         layers.append(to_layer(f"ghost.{path.name}", pixels, pixel_area, about))
         # the layer has its own copy by now
         totals = _added(totals, planes)
-    for planes in pool.map(draw, [group for group in rest if group]):
+    # a single group is drawn here: it may have parts for the pool's workers
+    for planes in (map if chunks == 1 else pool.map)(draw, [group for group in rest if group]):
         totals = _added(totals, planes)
     for planes in pool.map(lambda job: job(), jobs):
         totals = _added(totals, planes)
     total = merge(totals, shot.size_px)
     return to_layer("ghosts", total, pixel_area, {}, reuse=True), tuple(layers)
+
+
+def _chunks(shot: Shot, ghosts: int, most: int) -> int:
+    """Return into how many pictures so many ghosts are drawn side by side."""
+    width, height = shot.size_px
+    most = min(most, next((n for size, n in _CHUNKS if width * height <= size), 2))
+    return max(1, min(most, ghosts // _GHOSTS_A_CHUNK))
 
 
 def _added(totals: Sequence[Plane | None], planes: Sequence[Plane | None]) -> list[Plane | None]:

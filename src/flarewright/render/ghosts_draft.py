@@ -33,7 +33,9 @@ Floats = NDArray[np.float64]
 ROUNDING = 1e-12
 
 
-def draw_draft(shot: Shot, paths: Sequence[LightPath], differences: Floats, colors: Floats | None = None) -> None:
+def draw_draft(
+    shot: Shot, paths: Sequence[LightPath], differences: Floats, colors: Floats | None = None, first_row: int = 0
+) -> None:
     """Mark the paraxial ghosts of some paths.
 
     Parameters
@@ -44,6 +46,8 @@ def draw_draft(shot: Shot, paths: Sequence[LightPath], differences: Floats, colo
         Added to; `kernels.raster.sum_rows` turns it into flux per pixel.
     colors : ndarray, shape (P, W, 3), optional
         From `draft_colors`, or changed by hand; None: looked up.
+    first_row : int
+        Of the picture, which `differences` may hold a band of.
     """
     if not paths:
         return
@@ -51,8 +55,8 @@ def draw_draft(shot: Shot, paths: Sequence[LightPath], differences: Floats, colo
     steps, view, axes = _steps(shot, paths)
     draw_matrix_ghosts(
         *steps, packed.n_gap, packed.reflectance, packed.sensor_z, *view, opening.edges, opening.radius,
-        opening.levels, axes, shot.to_pixels, shot.gain, draft_colors(shot, paths) if colors is None else colors,
-        differences,
+        opening.levels, axes, shot.to_pixels - [0.0, first_row, 0.0, 0.0], shot.gain,
+        draft_colors(shot, paths) if colors is None else colors, differences,
     )  # fmt: skip
 
 

@@ -39,6 +39,7 @@ Progress = Callable[[float, str], None]
 BESIDE_PX = 1_000_000
 """The starburst of a larger picture is not made beside its ghosts: together they hold 100 MB more at 1080p."""
 BLACK = "the picture is black: no light comes through the lens to the sensor"
+HIDDEN = "the picture is black: what stands in front (holdout) hides every light"
 
 
 @dataclass(frozen=True)
@@ -100,8 +101,10 @@ def render(
     """
     settled = settle(project)
     mask = None if settled.iris.mask is None else read_mask(settled.iris.mask)
+    # rules that choose nothing are refused in every quality
+    asked = resolve_art(settled)
     # the judge shows the physics and nothing else
-    art = ResolvedArt() if project.quality.mode == "reference" else resolve_art(settled)
+    art = ResolvedArt() if project.quality.mode == "reference" else asked
     opening = make_opening(settled, mask)
     shots = seen = make_shots(settled, opening)
     tables = scatter_of(settled, shots)
@@ -141,9 +144,11 @@ def render(
         others = [graded(layer, art.gain.get("ghosts", 1.0)) for layer in drawn.others]
         whole = beauty(passes, project.camera.size_px)
     layers = (whole,) if project.output.layers == "beauty" else (whole, *passes, *others)
-    _refuse_endless(layers)
-    if not any(layer.pixels.any() for layer in passes):
-        told = (*told, BLACK)
+    # the beauty is endless where a pass is
+    _refuse_endless((whole, *others))
+    # line by line: what has light shows it soon
+    if not any(line.any() for layer in passes for line in layer.pixels):
+        told = (*told, BLACK if any(shot.share > 0.0 for shot in shots) else HIDDEN)
     account = drawn.ledger
     if ledger and account is None:
         from .ledger import trace_ledger
@@ -154,7 +159,7 @@ def render(
         settled.project,
         layers,
         {**summary, "ledger": account.as_data()} if ledger and account is not None else summary,
-        (*settled.remarks, *drawn.remarks, *told, *_remarks(settled, seen)),
+        (*settled.remarks, *drawn.remarks, *told, *_remarks(settled, seen), *_stretched(mask)),
         account if ledger else None,
     )
 
@@ -162,8 +167,11 @@ def render(
 def _refuse_endless(layers: Sequence[Layer]) -> None:
     """Refuse a picture whose values no file can hold."""
     for layer in layers:
-        # a sum is endless where one of its parts is
-        if not isfinite(layer.pixels.sum(dtype=np.float64)):
+        # a sum is endless where one of its parts is; that of squares is made soonest, but may be where none is
+        values = layer.pixels.ravel()
+        with np.errstate(over="ignore", invalid="ignore"):
+            finite = isfinite(np.vdot(values, values)) or isfinite(values.sum(dtype=np.float64))
+        if not finite:
             raise ProjectError(
                 f"the light of the layer {layer.name} is beyond the numbers that a picture holds (3.4e38): lower the "
                 "intensity of the lights or the gains"
@@ -335,6 +343,14 @@ def _grating_remarks(settled: Settled, shots: tuple[Shot, ...]) -> list[str]:
     orders = grating_orders(shots[0].packed, last, camera.sensor_grating)
     drawn = sum(order.efficiency for order in orders)
     return [f"{len(orders)} orders of the sensor's grating were drawn, which hold {drawn:.1%} of what it reflects"]
+
+
+def _stretched(mask: NDArray[np.float64] | None) -> list[str]:
+    """Tell of an image of the iris that is not square: it stands for the square around the round opening."""
+    if mask is None or mask.shape[0] == mask.shape[1]:
+        return []
+    height, width = mask.shape
+    return [f"the iris image has {width}x{height} pixels and is stretched to the square around the iris; give a square"]
 
 
 def _scene_scale(settled: Settled, shot: Shot) -> float:
