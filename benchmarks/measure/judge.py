@@ -243,7 +243,7 @@ def _judge_ghosts(
             tally.near[name] += same or bool((overlaps[t] >= SAME).any())
             shared = twins.get(ghost.name, ghost.name)
             one_of[shared] = one_of.get(shared, False) or same
-        if same and ghost.snr >= SHARP and merged is not None:
+        if same and seen[t] and ghost.snr >= SHARP and merged is not None:
             tally.centres[name].append(float(np.hypot(*np.subtract(_middle(masks[t]), _middle(merged)))))
     tally.strange += len(free)
     tally.pieces += len(free)

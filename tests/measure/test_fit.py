@@ -46,6 +46,57 @@ def test_planted_numbers_come_back_within_their_uncertainty(planted):
     assert fit.uncertainty[0] < 0.5
 
 
+def veil(seed):
+    """Return light that no ghost makes, alike within a few pixels, shape (H, W), of mean square 1."""
+    rows, columns = np.fft.fftfreq(SIZE[1])[:, None], np.fft.rfftfreq(SIZE[0])[None]
+    noise = np.fft.rfft2(np.random.default_rng(seed).normal(size=SIZE[::-1]))
+    smooth = np.fft.irfft2(noise * np.exp(-2.0 * (3.0 * np.pi) ** 2 * (rows**2 + columns**2)), s=SIZE[::-1])
+    return smooth / smooth.std()
+
+
+def veiled(planted, seed):
+    """Return views of a ghost beside such light, 6 times the noise."""
+    bare = views((planted,), angles=np.linspace(1.0, LARGEST, 12), seed=seed)
+    return [
+        view.showing((view.pixels + 6.0 * NOISE * veil(100 * seed + k)[..., None]).astype(np.float32))
+        for k, view in enumerate(bare)
+    ]
+
+
+def test_what_neighbours_miss_alike_is_no_crowd_of_witnesses():
+    planted = shape(40.0, 24.0, 0.5)
+    free = free_numbers(2, 0, 1)
+    pulls, off = [], []
+    for seed in range(3):
+        shown = veiled(planted, seed)
+        fit = refine(planted, patches_of(planted, shown, 1), free, width=SIZE[0])
+        assert fit.doubt > 100.0
+        away = (fit.shape.numbers - planted.numbers)[free]
+        pulls.append(away / fit.uncertainty[free])
+        off.append(away[:20])
+    assert np.sqrt(np.mean(np.square(pulls))) < 1.7
+    assert np.abs(pulls).max() < 4.0
+    # as pixels that are each a witness, they bent the ghost by 5 pixels a number
+    assert np.sqrt(np.mean(np.square(off))) < 3.5
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_a_far_rim_stays_where_it_is_beside_light_of_others(seed):
+    planted = shape(40.0, 24.0, 0.5, rim=(5.0, 5.5))
+    free = free_numbers(1, 1, 1)
+    shown = veiled(planted, seed)
+    fit = refine(planted, patches_of(planted, shown, 1), free[free != 31], width=SIZE[0], steps=30)
+    assert fit.doubt > 100.0
+    assert fit.shape.numbers[32] == pytest.approx(5.5, abs=0.2)
+
+
+def test_pixels_are_witnesses_of_their_own_where_noise_is_all_that_is_left():
+    planted = GHOSTS[0]
+    shown = views((planted,), angles=FEW)
+    fit = refine(planted, patches_of(planted, shown, 1), free_numbers(1, 0, 1), width=SIZE[0])
+    assert fit.doubt < 3.0
+
+
 @pytest.mark.parametrize("variance", [0.3, 2.5])
 def test_softness_comes_back_within_its_uncertainty_and_through_a_model(variance):
     numbers = GHOSTS[0].numbers.copy()

@@ -77,3 +77,20 @@ def test_two_ghosts_stay_two():
     planted = (shape(-40.0, 34.0, 0.25), shape(-55.0, 14.0, 0.6))
     shown = views(planted, angles=FEW)
     assert len(joined([found(one) for one in planted], shown)) == 2
+
+
+def test_what_a_larger_ghost_gains_by_itself_joins_no_other_to_it():
+    # found as an even disc, which it is not: how much better its own numbers fit tells of no fragment
+    large, small = shape(-40.0, 34.0, 0.5), shape(-52.0, 9.0, 0.1)
+    large.numbers[10], large.numbers[11] = 10.0, 24.0
+    shown = views((large, small), angles=FEW)
+    assert len(joined([found(shape(-40.0, 32.0, 0.5)), found(small)], shown)) == 2
+
+
+def test_light_that_lies_beside_a_ghost_is_no_part_of_it():
+    # small in the middle of the pupil, wide at its rim: most of it lies where the other has nothing
+    small, wide = shape(-40.0, 12.0, 0.6), shape(-42.0, 6.0, 0.1)
+    wide.numbers[11] = 44.0
+    wide.numbers[20:23] *= 20.0
+    shown = views((small, wide), angles=FEW)
+    assert len(joined([found(small), found(wide)], shown)) == 2

@@ -24,11 +24,11 @@ def true(name, mask, level=1.0, snr=10.0, **what):
     return TrueGhost(name, (0, 0, SHAPE[1], SHAPE[0]), mask, light, level, snr, **hard)
 
 
-def judged(ghosts, found):
+def judged(ghosts, found, far=None):
     tally = Tally()
     tally.add_squares("linear", 1.0, 2.0)
     tally.ssim.append((1.0, 1.0))
-    _judge_ghosts(ghosts, found, np.ones(SHAPE, bool), {}, tally)
+    _judge_ghosts(ghosts, found, np.ones(SHAPE, bool) if far is None else far, {}, tally)
     return summary(tally)
 
 
@@ -57,3 +57,13 @@ def test_what_is_nowhere_true_costs_precision_and_fragments_are_one():
     assert (told["true"], told["found"], told["pieces"], told["found, of no true ghost"]) == (1, 2, 3, 1)
     assert told["recall, all"] == told["recall, all, one found for several"] == 1.0
     assert told["precision"] == 0.5
+
+
+def test_centres_are_judged_where_recall_is():
+    # most of the first lies around the light, where nothing is judged; what was found of it lies outside
+    far = ~disc(18, 30, 9)
+    inside, outside = disc(20, 30, 10), disc(60, 30, 10)
+    ghosts = [true("a", inside), true("b", outside)]
+    told = judged(ghosts, [FoundGhost("1", disc(24, 30, 10), 1.0), FoundGhost("2", disc(62, 30, 10), 1.0)], far)
+    assert told["true"] == 1
+    assert told["centre px"]["clean"] == [1, 2.0, 2.0]

@@ -33,6 +33,8 @@ MODEL_ERROR = 0.03
 OUTLIER = 4.0
 # what softness is usual, part of the picture's width
 _SOFTNESS = 0.005
+# pixels that miss a model alike: noise is every pixel's own, what cannot be drawn is not
+_ALIKE = 64.0
 _NONE = np.zeros(0, np.int64)
 _NO_CHANGES = np.zeros((0, 0, 0))
 _PLANES, _CHANGES = Room(), Room()
@@ -68,6 +70,8 @@ class Fit:
         Weighted squares over the pixels looked at.
     count : int
         Pixels looked at.
+    doubt : float
+        How many pixels count as one witness; see `witness`.
     """
 
     shape: Shape
@@ -75,13 +79,14 @@ class Fit:
     covariance: Floats
     cost: float
     count: int
+    doubt: float = 1.0
 
     @property
     def uncertainty(self) -> Floats:
         """Standard deviation of all 45 numbers; 0 for those that were not fitted."""
         deviation = np.zeros(NUMBERS)
         # pixels that the model misses by more than noise make all numbers less certain
-        excess = max(1.0, self.cost / max(self.count - self.free.size, 1))
+        excess = max(self.doubt, self.cost / max(self.count - self.free.size, 1))
         deviation[self.free] = np.sqrt(np.maximum(np.diag(self.covariance), 0.0) * excess)
         return deviation
 
@@ -145,7 +150,11 @@ def scaled(frame: Floats, times: int) -> Floats:
 
 
 def patches_of(
-    shape: Shape, views: Sequence[View], channel: int, masks: Sequence[NDArray[np.bool_]] | None = None
+    shape: Shape,
+    views: Sequence[View],
+    channel: int,
+    masks: Sequence[NDArray[np.bool_]] | None = None,
+    beside: Shape | None = None,
 ) -> list[Patch]:
     """Cut out what a ghost touches, and a margin, from every view.
 
@@ -157,13 +166,15 @@ def patches_of(
     channel : int
     masks : sequence of ndarray of bool, optional
         Where to look, per view.
+    beside : Shape, optional
+        What this one touches is cut out with it.
 
     Returns
     -------
     list of Patch
         Of the views that show it.
     """
-    windows = [window_of(shape.numbers, shape.discs, view.sigma, view.frame, *view.size_px) for view in views]
+    windows = [_window(shape, beside, view) for view in views]
     areas = [window[2] * window[3] for window in windows if window[2]]
     if not areas:
         return []
@@ -187,6 +198,18 @@ def patches_of(
             Patch(view.sigma, scaled(view.frame, times), x0, y0, pixels.astype(float), 1.0 / variance.astype(float))
         )
     return found
+
+
+def _window(shape: Shape, beside: Shape | None, view: View) -> tuple[int, int, int, int]:
+    """Return left, top, width and height of what one shape, or either of two, touches in a view."""
+    left, top, width, height = window_of(shape.numbers, shape.discs, view.sigma, view.frame, *view.size_px)
+    if beside is None:
+        return left, top, width, height
+    x, y, w, h = _window(beside, None, view)
+    if not (width and w):
+        return (left, top, width, height) if width else (x, y, w, h)
+    right, bottom = max(left + width, x + w), max(top + height, y + h)
+    return min(left, x), min(top, y), right - min(left, x), bottom - min(top, y)
 
 
 @dataclass(frozen=True)
@@ -241,13 +264,33 @@ def equations(shape: Shape, free: Indices, patch: Patch, missed: Misfit, offset:
 def priors(shape: Shape, free: Indices, width: int) -> Floats:
     """Return weak inverse variances of numbers about 0, which keep unseen directions still."""
     spread = np.full(NUMBERS, max(float(np.abs(shape.numbers[FIRST_G])), 0.04 * width))
-    spread[[0, 3, FIRST_G]] = 5.0 * width
+    # place and size, and how they change with the field: in focus on the axis a ghost may be large elsewhere
+    spread[[0, 3, FIRST_G, FIRST_G + 3]] = 5.0 * width
     # a slope in brightness that reaches 0 inside the pupil would play a rim's part
     spread[FIRST_I:FIRST_DISC] = 0.5 * max(float(np.abs(shape.numbers[FIRST_I])), 1e-12)
     spread[FIRST_I] *= 20.0
     spread[FIRST_DISC:] = 3.0
     spread[SOFT] = (_SOFTNESS * width) ** 2
     return np.asarray(1.0 / spread[free] ** 2)
+
+
+def witness(cost: float, count: int) -> float:
+    """Return how many pixels count as one witness of a fit, which is at least 1.
+
+    Parameters
+    ----------
+    cost : float
+        Weighted squares that are left.
+    count : int
+        Of pixels that noise alone would leave as much of.
+
+    Notes
+    -----
+    Weights take every pixel for a witness of its own, as noise makes it. What a model cannot draw, other ghosts above
+    all, neighbours see alike: the misfit beyond noise is told `_ALIKE` times. By as much more counts what is known of
+    ghosts before one looks at them (`priors`).
+    """
+    return 1.0 + _ALIKE * max(cost / max(count, 1) - 1.0, 0.0)
 
 
 def refine(
@@ -260,6 +303,7 @@ def refine(
     offset: bool = True,
     error: float = MODEL_ERROR,
     tails: bool = True,
+    alike: bool = True,
     pool: ThreadPoolExecutor | None = None,
 ) -> Fit:
     """Fit one ghost's numbers to patches by Levenberg-Marquardt.
@@ -281,6 +325,8 @@ def refine(
         Part of the light that the model may miss; above 0 outliers count less, too.
     tails : bool
         False: they count as all do.
+    alike : bool
+        Neighbours miss the model alike, see `witness`. False while most ghosts are unknown: the misfit is theirs then.
     pool : executor, optional
         Runs the patches; sums are taken in their order.
 
@@ -292,10 +338,12 @@ def refine(
     -----
     Marquardt (1963): the damping scales with the diagonal. The Jacobian is the drawn picture's own derivative.
     """
-    search = _Search(patches, free, width, offset, error, tails, pool)
+    alike = alike and error > 0.0
+    search = _Search(patches, free, width, offset, error, tails, alike, pool)
     last, matrix = search.descend(shape, steps)
     covariance = inverse(search.slopes(last)[0] if matrix is None else matrix)
-    return Fit(last.shape, free, covariance, last.cost, sum(one.count for one in last.missed))
+    cost, count = sum(one.cost for one in last.missed), sum(one.count for one in last.missed)
+    return Fit(last.shape, free, covariance, cost, count, witness(cost, count - free.size) if alike else 1.0)
 
 
 def improve(
@@ -307,16 +355,17 @@ def improve(
     steps: int,
     error: float = MODEL_ERROR,
     tails: bool = True,
+    alike: bool = True,
     pool: ThreadPoolExecutor | None = None,
 ) -> tuple[Shape, float]:
     """Return what `refine` makes of a shape, and its cost: for trials, of which nobody asks how sure they are."""
-    last, _ = _Search(patches, free, width, True, error, tails, pool).descend(shape, steps)
+    last, _ = _Search(patches, free, width, True, error, tails, alike and error > 0.0, pool).descend(shape, steps)
     return last.shape, last.cost
 
 
 @dataclass(frozen=True)
 class _State:
-    """Where a search stands: the prior is that of the shape before."""
+    """Where a search stands: the prior is that of the state from which the last step was taken."""
 
     shape: Shape
     prior: Floats
@@ -334,6 +383,7 @@ class _Search:
     offset: bool
     error: float
     tails: bool
+    alike: bool
     pool: ThreadPoolExecutor | None
 
     def descend(self, shape: Shape, steps: int) -> tuple[_State, Floats | None]:
@@ -342,14 +392,14 @@ class _Search:
         Most steps that are tried are not taken, and derivatives cost many times what the picture does: they are drawn
         only where a step begins.
         """
-        at = self.look(shape, priors(shape, self.free, self.width))
+        at = self.look(shape)
         damping = 1e-3
         for _ in range(steps):
+            at = self.anew(at)
             matrix, side = self.slopes(at)
-            prior = priors(at.shape, self.free, self.width)
             for _retry in range(8):
                 step = solution(matrix + damping * np.diag(np.diag(matrix)), side)
-                trial = self.look(stepped(at.shape, self.free, step), prior)
+                trial = self.look(stepped(at.shape, self.free, step), at.prior)
                 if trial.cost < at.cost:
                     break
                 damping = max(damping, 1e-4) * 6.0
@@ -362,9 +412,22 @@ class _Search:
                 break
         return at, None
 
-    def look(self, shape: Shape, prior: Floats) -> _State:
+    def look(self, shape: Shape, prior: Floats | None = None) -> _State:
         """Return the state of a shape."""
         missed = self.each(lambda patch: misfit(shape, patch, self.offset, self.error, self.tails), self.patches)
+        return self.weighed(shape, np.zeros(self.free.size) if prior is None else prior, missed)
+
+    def anew(self, at: _State) -> _State:
+        """Return a state with the prior that its shape and its misfit ask for."""
+        prior = priors(at.shape, self.free, self.width)
+        if self.alike:
+            count = sum(one.count for one in at.missed) - self.free.size
+            # where a rim may lie nobody knows beforehand
+            known = (self.free < FIRST_DISC) | (self.free == SOFT)
+            prior[known] *= witness(sum(one.cost for one in at.missed), count)
+        return self.weighed(at.shape, prior, at.missed)
+
+    def weighed(self, shape: Shape, prior: Floats, missed: list[Misfit]) -> _State:
         cost = sum(one.cost for one in missed) + float(prior @ shape.numbers[self.free] ** 2)
         return _State(shape, prior, cost, missed)
 

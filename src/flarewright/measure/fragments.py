@@ -95,37 +95,50 @@ def _as_one(
         if not host.first <= k <= host.last:
             own = own - render(shape, views[k])
         as_one.append(_green(views[k], own + render(core, views[k]) if part.first <= k <= part.last else own))
-    patches = patches_of(shape, as_one, 1)
+    # what the smaller one has beside the larger is lost as well
+    patches = patches_of(shape, as_one, 1, beside=core)
     if not patches:
         return None
     width = views[0].size_px[0]
 
-    def fitted(start: Shape, look: Sequence[Patch], order: int, steps: int) -> Shape:
-        free = free_numbers(order, start.discs, 1)
-        return improve(start, look, free, width=width, steps=steps, tails=False, pool=pool)[0]
+    def fitted(light: Floats, look: Sequence[Patch]) -> Shape:
+        # what one ghost misses shall not pass for an outlier
+        starts = [_improved(start, look, 1, 5, width, pool) for start in _starts(shape, light)]
+        return _improved(min(starts, key=lambda trial: _cost(trial, look)), look, 2, 8, width, pool)
 
-    # what one ghost misses shall not pass for an outlier
-    trials = [fitted(start, patches, 1, 5) for start in _starts(shape, core)]
-    best = fitted(min(trials, key=lambda trial: cost_of(trial, patches, tails=False)), patches, 2, 8)
-    apart = patches_of(shape, as_two, 1)
-    two = cost_of(fitted(shape, apart, 2, 8), apart, tails=False)
-    explained = cost_of(shape, patches, tails=False) - two
-    if best.numbers[FIRST_I] <= 0.0 or cost_of(best, patches, tails=False) - two > _LOST * explained:
+    best = fitted(core.numbers, patches)
+    # the larger one alone is as free as one for both, or what it gains by itself would be taken for a fragment's light
+    apart = patches_of(shape, as_two, 1, beside=core)
+    larger = fitted(np.zeros_like(core.numbers), apart)
+    two = _cost(larger, apart)
+    explained = _cost(larger, patches) - two
+    if best.numbers[FIRST_I] <= 0.0 or _cost(best, patches) - two > _LOST * explained:
         return None
     return replace(both, shapes=(best, best, best))
+
+
+def _improved(
+    start: Shape, look: Sequence[Patch], order: int, steps: int, width: int, pool: ThreadPoolExecutor | None
+) -> Shape:
+    free = free_numbers(order, start.discs, 1)
+    return improve(start, look, free, width=width, steps=steps, tails=False, pool=pool)[0]
+
+
+def _cost(shape: Shape, look: Sequence[Patch]) -> float:
+    return cost_of(shape, look, tails=False)
 
 
 def _green(view: View, pixels: Floats) -> View:
     return view.showing(np.broadcast_to(pixels.astype(np.float32)[..., None], view.pixels.shape))
 
 
-def _starts(shape: Shape, core: Shape) -> list[Shape]:
-    """Return where fits of one ghost begin: as large as the larger one, with all light, more or less in its core."""
+def _starts(shape: Shape, light: Floats) -> list[Shape]:
+    """Return where fits of one ghost begin: as large as the larger one, with light added, more or less in its core."""
     starts = []
     for part in _CORES:
         numbers = shape.numbers.copy()
         size = float(numbers[FIRST_G])
         numbers[FIRST_G], numbers[FIRST_G + 1] = part * size, numbers[FIRST_G + 1] + (1.0 - part) * size
-        numbers[FIRST_I] += max(float(core.numbers[FIRST_I]), 0.0)
+        numbers[FIRST_I] += max(float(light[FIRST_I]), 0.0)
         starts.append(replace(shape, numbers=numbers))
     return starts

@@ -32,6 +32,8 @@ class Growth:
         Part of the light that the model may miss.
     soft : bool
         Whether borders may be soft, once place and size are known.
+    alike : bool
+        See `fit.refine`.
     """
 
     order: int = 2
@@ -39,6 +41,7 @@ class Growth:
     discs: int = 2
     error: float = MODEL_ERROR
     soft: bool = True
+    alike: bool = True
 
 
 def grow(
@@ -73,7 +76,8 @@ def grow(
         if not patches:
             return None
         free = free_numbers(order, start.discs, light, most.soft and order > 0)
-        return refine(start, patches, free, width=width, steps=steps, error=most.error, pool=pool), patches
+        fit = refine(start, patches, free, width=width, steps=steps, error=most.error, alike=most.alike, pool=pool)
+        return fit, patches
 
     found = polish(shape, 0, 0, 8)
     order = 0
@@ -119,10 +123,10 @@ def _with_rim(
             numbers[0] -= 0.5 * away * numbers[FIRST_G] / max(largest, 0.1)
             numbers[FIRST_G] *= 1.0 + 0.25 * bite
             trial = replace(shape, numbers=numbers, discs=shape.discs + 1)
-            trials.append(improve(trial, few, own, width=width, steps=3, error=most.error, pool=pool))
+            trials.append(improve(trial, few, own, width=width, steps=3, error=most.error, alike=most.alike, pool=pool))
     everything = np.concatenate([free, [at, at + 2]])
     best = [
-        improve(trial, few, everything, width=width, steps=6, error=most.error, pool=pool)
+        improve(trial, few, everything, width=width, steps=6, error=most.error, alike=most.alike, pool=pool)
         for trial, _ in sorted(trials, key=lambda each: each[1])[:3]
     ]
     return min(best, key=lambda each: each[1])[0]

@@ -34,6 +34,8 @@ THERE = 0.35
 LEFT_BEHIND = 0.08
 # views that a first fit looks at
 _FEW = 16
+# how far a candidate grows: most of what lies beside it is not known yet, so its misfit tells nothing of it
+_FIRST = Growth(order=1, discs=1, error=0.05, soft=False, alike=False)
 
 
 def beginning(candidate: Candidate, views: Sequence[View], pixels: Sequence[Pixels]) -> Shape:
@@ -187,7 +189,7 @@ def _try(
     few = run[np.unique(np.linspace(0, run.size - 1, min(run.size, _FEW)).round().astype(int))]
     shown = _alone(views, rest, list(few))
     start = beginning(trial, shown, [rest[k] for k in few])
-    fit = grow(start, shown, 1, most=Growth(order=1, discs=1, error=0.05, soft=False), pool=pool)
+    fit = grow(start, shown, 1, most=_FIRST, pool=pool)
     if fit is None or fit.shape.numbers[FIRST_I] <= 0.0:
         return None
     shape = fit.shape
