@@ -97,8 +97,11 @@ def test_scratch_and_colors_write_lenses(folder, capsys):
     (folder / "red.toml").write_text(PROJECT.replace("height = 1.001", "color = [1.0, 0.2, 0.1]"))
     words = ["design", "colors", "red.toml", "-o", "red-lens.toml", "--starts", "4", "--map", "4-1", "--curves", "3"]
     assert run([*words, "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert set(told["rows"]) == {str(k) for k in range(9)} - {"5"}
+    out, said = capsys.readouterr()
+    told = json.loads(out)
+    # row 5 is the stop, rows 1 and 7 are cemented
+    assert set(told["rows"]) == {str(k) for k in range(9)} - {"1", "5", "7"}
+    assert "rows left bare, for no film can be put between cemented glasses: 1, 7" in said
     assert len(told["ghosts"]) == 13
     lens = read_lens(folder / "red-lens.toml")[0]
     assert lens.rows[0].coating.center_wavelength_nm == told["rows"]["0"]["center_wavelength_nm"]

@@ -20,6 +20,11 @@ rows = [
   { stop = true, thickness = 80.0 },
 ]
 """
+SCENE = (
+    '[[cameras]]\nname = "A"\nlens = "heliar-tronnier"\nposition_m = [0, 0, 0]\naim_m = [0, 0, 5]\n'
+    '[[lights]]\nname = "lamp"\nposition_m = [0, 1, 5]\nintensity_cd = 100\n'
+)
+FILM = '{ kind = "film", index = "1.38", thickness_nm = 90.0 }'
 PROJECT = 'lens = "heliar-tronnier"\n[[lights]]\nfield_deg = [10, 5]\n'
 
 
@@ -136,3 +141,54 @@ def test_an_iris_image_is_looked_for_beside_the_file_that_names_it(capsys, folde
     assert run(["project", "check", "sub/shot.toml"]) == 0
     assert run(["project", "check", "sub/whole.toml"]) == 0
     assert Path(load_lens("sub/masked.toml").iris.mask).samefile(folder / "sub" / "iris.png")
+
+
+@pytest.mark.parametrize(
+    ("command", "text", "words"),
+    [
+        ("project", 'f_number = "8"\n' + PROJECT, "f_number should be a number, not '8'"),
+        ("project", PROJECT.replace("5]", "true]"), "lights[0].field_deg[1] should be a number, not true"),
+        ("project", PROJECT + "[output]\nstarburst = 1\n", "output.starburst should be true or false, not 1"),
+        ("project", PROJECT + '[output]\nstarburst = "yes"\n', "output.starburst should be true or false, not 'yes'"),
+        (
+            "project",
+            PROJECT + "[quality]\nwavelengths = true\n",
+            "quality.wavelengths should be a whole number, not true",
+        ),
+        (
+            "project",
+            f'coating = {{ kind = "everywhere", coating = {FILM} }}\n{PROJECT}',
+            "should be a number, not '1.38'",
+        ),
+        (
+            "scene",
+            SCENE.replace("[0, 1", "['0', 1"),
+            "lights[0].position_m[0] should be a number, not '0'",
+        ),
+    ],
+)
+def test_a_value_is_never_taken_for_another_kind(capsys, folder, command, text, words):
+    (folder / "loose.toml").write_text(text)
+    assert words in refused(capsys, [command, "check", "loose.toml"])
+
+
+def test_whole_numbers_are_numbers_and_round_numbers_whole(folder):
+    (folder / "right.toml").write_text("f_number = 8\n" + PROJECT + "[iris]\nblades = 6.0\n")
+    assert run(["project", "check", "right.toml"]) == 0
+
+
+def test_a_flags_rule_is_read_as_strictly(capsys, folder):
+    words = ["render", "heliar-tronnier", "--light", "1,1", "--rule", 'select = "all", gain = "2"', "-o", "x.exr"]
+    assert "--rule: gain should be a number, not '2'" in refused(capsys, words)
+
+
+@pytest.mark.parametrize("words", [["project", "check", "loop.toml"], ["lens", "show", "loop.toml"]])
+def test_a_link_that_leads_nowhere_is_called_one(capsys, folder, words):
+    (folder / "loop.toml").symlink_to("loop.toml")
+    assert "loop.toml is a link that leads nowhere" in refused(capsys, words)
+
+
+def test_a_rule_that_chooses_nothing_is_refused_by_the_judge_too(capsys, folder):
+    words = ["render", "heliar-tronnier", "--light", "1,1", "--quality", "reference", "--solo", "99-98", "-o", "x.exr"]
+    assert "99-98" in refused(capsys, words)
+    assert not (folder / "x.exr").exists()

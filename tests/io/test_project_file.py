@@ -209,7 +209,7 @@ def test_every_mistake_is_told_at_once_where_it_is(tmp_path):
     for words in (
         "lens should be a name, a file or a table, not 3",
         "flare is not a known key; known are schema_version, lens",
-        "coating: coating 'quarter-wave:x' is not understood",
+        "coating 'quarter-wave:x' is not understood",
         "camera.size is not a known key; did you mean 'size_px'?",
         "camera.size_px[0] should be a whole number",
         "camera.blades is not a known key here; it belongs into [iris]",

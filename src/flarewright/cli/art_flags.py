@@ -12,6 +12,7 @@ from pydantic import ValidationError
 
 from ..errors import ProjectError
 from ..io.project_file import explain
+from ..io.taken_for import record_of
 from ..model import Art, Project, Rule
 from ..model.art import PASSES
 
@@ -114,10 +115,10 @@ def _told_rule(text: str) -> Rule:
             f"--rule {text!r} is no rule; write --rule 'select = \"row:7\", gain = 2, tint = [1, 0.6, 0.3]', with the "
             "words of [[art.rules]] in a project file"
         ) from None
-    try:
-        return Rule.model_validate(table)
-    except ValidationError as error:
-        raise ProjectError(f"--rule: {explain(error, table, {'': (Rule,)})[0]}") from None
+    rule, wrong = record_of(Rule.model_validate, table, lambda error: explain(error, table, {"": (Rule,)}))
+    if rule is None:
+        raise ProjectError(f"--rule: {wrong[0]}")
+    return rule
 
 
 def _rule(flag: str, select: str, **changes: Any) -> Rule:

@@ -29,6 +29,7 @@ from ..errors import FlarewrightError
 from ..model.capture import CameraNoise, Capture
 from .photo import PHOTO_SUFFIXES, photo_facts
 from .sentences import did_you_mean, summary, validation_sentences
+from .taken_for import record_of
 from .text_file import read_text
 
 _COLUMNS = tuple(Capture.model_fields)
@@ -139,10 +140,10 @@ def read_camera(path: Path) -> CameraNoise:
         raise FlarewrightError(str(error)) from None
     if not isinstance(data, dict):
         raise FlarewrightError(f"{path} is no camera.json: a JSON object was expected")
-    try:
-        return CameraNoise.model_validate(data)
-    except ValidationError as error:
-        raise FlarewrightError(summary(str(path), validation_sentences(error))) from None
+    noise, problems = record_of(CameraNoise.model_validate, data)
+    if noise is None:
+        raise FlarewrightError(summary(str(path), problems))
+    return noise
 
 
 def _csv_rows(path: Path) -> list[tuple[str, dict[str, Any]]]:

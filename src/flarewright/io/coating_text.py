@@ -15,6 +15,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, get_args
 
@@ -25,6 +26,7 @@ from flarewright.model import Bare, Coating, CoatingChoice, Everywhere, Film, Pe
 from flarewright.model.coating import StandardName
 
 from .sentences import did_you_mean, shorten, validation_sentences
+from .taken_for import record_of
 from .text_file import read_toml
 
 STANDARD_NAMES: tuple[StandardName, ...] = get_args(StandardName)
@@ -105,10 +107,10 @@ def coating_from(value: object) -> Coating | None:
     if isinstance(value, str):
         return None if value.strip() in ("", UNCOATED) else parse_coating(value)
     if isinstance(value, dict):
-        try:
-            coating: Coating = _COATING.validate_python(value)
-        except ValidationError as error:
-            raise ProjectError(f"coating table: {'; '.join(validation_sentences(error, value))}") from None
+        read: Callable[[Any], Coating] = _COATING.validate_python
+        coating, wrong = record_of(read, value)
+        if coating is None:
+            raise ProjectError(f"coating table: {'; '.join(wrong)}")
         return coating
     raise ProjectError(f"coating {shorten(value)} is neither a text nor a table: {HELP}")
 

@@ -7,8 +7,6 @@ import re
 from pathlib import Path
 from typing import Any, TypeVar
 
-from pydantic import ValidationError
-
 from ..errors import FlarewrightError
 from ..model.base import Frozen
 from ..model.corrections import Corrections
@@ -16,7 +14,8 @@ from ..model.ghost_model import GhostModel
 from ..model.ghost_tracks import Tracks
 from ..model.replay_camera import ReplayCamera
 from .atomic import write_atomically
-from .sentences import summary, validation_sentences
+from .sentences import summary
+from .taken_for import record_of
 from .text_file import LARGEST, check_version, lower_first, read_text
 
 Record = TypeVar("Record", bound=Frozen)
@@ -40,11 +39,10 @@ def _read(path: str | Path, what: str, record: type[Record], largest: int = LARG
         check_version(data, _NEWEST, str(path))
     except ValueError as error:
         raise FlarewrightError(str(error)) from None
-    try:
-        return record.model_validate(data)
-    except ValidationError as error:
-        problems = validation_sentences(error, data)
-        raise FlarewrightError(summary(str(path), problems), tuple(problems)) from None
+    found, problems = record_of(record.model_validate, data)
+    if found is None:
+        raise FlarewrightError(summary(str(path), problems), tuple(problems))
+    return found
 
 
 def read_ghost_model(path: str | Path) -> GhostModel:

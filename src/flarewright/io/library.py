@@ -43,13 +43,21 @@ def lens_path(name_or_path: str | Path) -> Path:
     path = Path(text).expanduser()
     if path.exists():
         return path
+    if path.is_symlink():
+        raise LensError(f"{text} is a link that leads nowhere: give the path of the file itself")
     if path.suffix.lower() in (".toml", ".lens", ".zmx") or path.parent != Path():
         raise LensError(
             f"{text} does not exist: check the path, or choose a shipped lens (flarewright lenses lists them)"
         )
-    near = difflib.get_close_matches(_key(text), by_key, n=3, cutoff=0.5)
-    hint = f": did you mean {' or '.join(by_key[key] for key in near)}?" if near else ""
+    near = near_names(text)
+    hint = f": did you mean {' or '.join(near)}?" if near else ""
     raise LensError(f"{text!r} is neither a shipped lens nor a file{hint or ': flarewright lenses lists the names'}")
+
+
+def near_names(text: str) -> tuple[str, ...]:
+    """Return the shipped lenses whose names look like a text, the nearest first; three at most."""
+    by_key = {_key(name): name for name in shipped()}
+    return tuple(by_key[key] for key in difflib.get_close_matches(_key(text), by_key, n=3, cutoff=0.5))
 
 
 def is_shipped(path: Path) -> bool:

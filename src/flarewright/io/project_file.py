@@ -43,6 +43,7 @@ from .plate_text import parse_plate
 from .project_text import ABOUT, FILES, HOLDOUT_FILES, lens_location, project_text
 from .sentences import Keys, did_you_mean, shorten, summary, validation_sentences
 from .spectrum_text import parse_spectrum
+from .taken_for import record_of
 from .text_file import check_version, read_toml
 
 __all__ = [
@@ -133,11 +134,9 @@ def project_from_data(data: dict[str, Any], *, folder: Path, where: str) -> Proj
     """
     problems: list[str] = []
     expanded = _expanded(data, folder, problems)
-    try:
-        project = Project.model_validate(expanded)
-    except ValidationError as error:
-        problems += explain(error, expanded)
-    if not problems:
+    project, wrong = record_of(Project.model_validate, expanded, lambda error: explain(error, expanded))
+    problems += wrong
+    if project is not None and not problems:
         return project
     raise ProjectFileError(summary(where, problems), tuple(problems))
 
@@ -161,7 +160,8 @@ def _expanded(data: dict[str, Any], folder: Path, problems: list[str]) -> dict[s
         try:
             out["coating"] = expand_coating(out["coating"], folder)
         except FlarewrightError as error:
-            problems.append(f"coating: {error}")
+            # a short text's own sentence begins so
+            problems.append(str(error) if str(error).startswith("coating ") else f"coating: {error}")
             del out["coating"]
     for section, key in (("", "filter"), ("camera", "cover_glass")):
         _expand_plate(out, section, key, problems)

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from pydantic import ValidationError
-
 from ..model.scatter import RowScatter, Scatter
-from .sentences import did_you_mean, shorten, validation_sentences
+from .sentences import did_you_mean, shorten
+from .taken_for import record_of
 
 
 def read_scatter(table: object, problems: list[str]) -> Scatter | None:
@@ -33,20 +32,18 @@ def read_scatter(table: object, problems: list[str]) -> Scatter | None:
     tables: list[tuple[str, dict[str, Any], type[Scatter] | type[RowScatter]]] = [("scatter", table, Scatter)]
     if isinstance(rows, list):
         tables += [("scatter.rows", row, RowScatter) for row in rows if isinstance(row, dict)]
-    wrong = [
+    unknown = [
         f"{where}: {shorten(key)} is not a known key{did_you_mean(key, tuple(model.model_fields))}"
         for where, entry, model in tables
         for key in entry
         if key not in model.model_fields
     ]
-    problems += wrong
-    if wrong:
+    problems += unknown
+    if unknown:
         return None
-    try:
-        return Scatter.model_validate(table)
-    except ValidationError as error:
-        problems += [f"scatter: {sentence}" for sentence in validation_sentences(error, table)]
-        return None
+    scatter, wrong = record_of(Scatter.model_validate, table)
+    problems += [f"scatter: {sentence}" for sentence in wrong]
+    return scatter
 
 
 def scatter_lines(scatter: Scatter | None) -> list[str]:

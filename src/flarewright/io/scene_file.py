@@ -10,8 +10,6 @@ import os
 from pathlib import Path
 from typing import Any
 
-from pydantic import ValidationError
-
 from ..errors import FlarewrightError, ProjectError
 from ..model import light as spectra
 from ..model import project as choices
@@ -29,6 +27,7 @@ from .project_file import (
 )
 from .project_text import ABOUT
 from .sentences import shorten, summary
+from .taken_for import record_of
 from .text_file import check_version, read_toml
 
 _NEWEST = 1
@@ -137,11 +136,9 @@ def scene_from_data(data: dict[str, Any], *, folder: Path, where: str) -> Scene:
         out["cameras"] = [_camera(one, f"cameras[{k}]", folder, problems) for k, one in enumerate(out["cameras"])]
     if isinstance(out.get("lights"), list):
         out["lights"] = [_light(one, f"lights[{k}]", folder, problems) for k, one in enumerate(out["lights"])]
-    try:
-        scene = Scene.model_validate(out)
-    except ValidationError as error:
-        problems += explain(error, out, _SECTIONS)
-    if problems:
+    scene, wrong = record_of(Scene.model_validate, out, lambda error: explain(error, out, _SECTIONS))
+    problems += wrong
+    if scene is None or problems:
         raise ProjectFileError(summary(where, problems), tuple(problems))
     return scene
 

@@ -72,7 +72,7 @@ def validation_sentences(
         if finding["type"] == "too_short" and finding.get("ctx", {}).get("actual_length") != len(finding["input"]):
             continue  # Its items were refused one by one, which is told already.
         keys = list(finding["loc"]) if data is None else _written_keys(finding["loc"], data, finding["type"])
-        where = _place(keys)
+        where = place(keys)
         match finding["type"]:
             case "missing":
                 found.setdefault((f"{where} is missing", ""), [])
@@ -151,7 +151,8 @@ def _written_keys(loc: tuple[int | str, ...], data: Any, kind: str) -> Keys:
     return keys
 
 
-def _place(keys: Keys) -> str:
+def place(keys: Keys) -> str:
+    """Write a place in a file: "lights[0].field_deg"."""
     text = ""
     for key in keys:
         text += f"[{key}]" if isinstance(key, int) else f".{key}" if text else key

@@ -37,6 +37,8 @@ def read_bytes(path: str | Path, what: str, largest: int = LARGEST) -> bytes:
     try:
         if file.is_dir():
             raise ValueError(f"{file} is a folder, not {what}: give the path of a file")
+        if file.is_symlink() and not file.exists():
+            raise ValueError(f"{file} is a link that leads nowhere: give the path of the file itself")
         if not file.exists():
             raise ValueError(f"{file} does not exist: check the path and the spelling")
         if not file.is_file():
