@@ -28,7 +28,7 @@ from flarewright.design.objective import algorithm_2
 from flarewright.design.prescription import structure_of
 from flarewright.design.solvers import Limits, chosen
 from flarewright.errors import ProjectError
-from flarewright.model import Design, GhostWish, Light, Project
+from flarewright.model import Design, GhostWish, Light, Preset, Project
 from flarewright.model.design import Bounds
 from flarewright.optics.coatings import stack_reflectance
 from flarewright.optics.paths import ghost_path
@@ -62,7 +62,9 @@ def test_colours_are_those_of_the_coated_lens(kind):
     if kind == "film":
         values = np.stack([random.uniform(1.4, 1.9, count), random.uniform(30.0, 700.0, count)], axis=1)
     problem = problem_for(values, kind)
-    assert np.allclose(own_colors(coated(LENS, STRUCTURE, kind, values), STRUCTURE), problem.targets, rtol=1e-9)
+    assert np.allclose(
+        own_colors(coated(LENS, mirrors_of(STRUCTURE), kind, values), STRUCTURE), problem.targets, rtol=1e-9
+    )
 
 
 def test_a_path_is_passed_as_often_as_it_goes():
@@ -117,7 +119,7 @@ def test_several_films_meet_what_one_cannot():
         n, d = found.values[:, ::2], found.values[:, 1::2]
         assert np.all((n >= 1.38) & (n <= 1.9) & (d <= 750.0) & ((d >= 25.0) | (d == 0.0)))
         # the lens that is written has these films, in their order
-        lens = coated(LENS, STRUCTURE, "film", found.values)
+        lens = coated(LENS, mirrors_of(STRUCTURE), "film", found.values)
         assert np.allclose(own_colors(lens, STRUCTURE), found.colors, rtol=1e-9)
         missed[layers], films[layers] = found.cost, (d > 0.0).sum(axis=1)
     assert missed[2] < 0.5 * missed[1]
@@ -192,6 +194,32 @@ def test_a_wish_turns_a_ghost_red():
     assert problem.targets[g].sum() == pytest.approx(before[g].sum())
     after = solve_colors(problem, starts=3).colors
     assert after[g, 0] / after[g].sum() > before[g, 0] / before[g].sum() + 0.1
+
+
+def test_cemented_rows_stay_bare_unless_the_file_coats_them():
+    """No film can be evaporated between two glasses that are cemented."""
+    wish = GhostWish(ghost="4-1", color=(1.0, 0.2, 0.2))
+    problem, lens = color_problem(project(wish), "quarter-wave")
+    assert problem.kept == (1, 7)
+    assert problem.rows.tolist() == [0, 2, 3, 4, 6, 8]
+    found = solve_colors(problem, starts=3)
+    worn = coated(lens, problem.rows, "quarter-wave", found.values)
+    assert [k for k, row in enumerate(worn.rows) if getattr(row, "coating", None) is None] == [1, 5, 7]
+    # what is told of the colours is what the lens has, the bare rows with it
+    assert np.allclose(own_colors(worn, problem.structure), found.colors, rtol=1e-9)
+    genes = ColorGenes(problem)
+    assert genes.count == 6
+    at = (found.values - 380.0).ravel() / (750.0 - 380.0)
+    assert genes.fitness(at[None])[0] == pytest.approx(found.cost, rel=1e-6)
+    # the thesis coats every row
+    thesis = project(wish).replace(coating=Preset(name="thesis"))
+    assert color_problem(thesis, "quarter-wave")[0].kept == ()
+
+
+def test_a_lens_without_a_surface_in_air_cannot_be_coated():
+    problem, _ = color_problem(project(), "film")
+    with pytest.raises(ProjectError, match="nothing to coat"):
+        solve_colors(replace(problem, kept=tuple(mirrors_of(STRUCTURE))))
 
 
 @pytest.mark.parametrize("wish", [GhostWish(ghost="7-1"), GhostWish(place_mm=1.0, radius_mm=1.0)])

@@ -53,7 +53,7 @@ def colors(
     threads: Annotated[int | None, typer.Option(min=1, help="All cores when left out.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
-    """Choose a coating for every surface so that the ghosts have the wished colours, and the others their own."""
+    """Choose coatings, of surfaces in air, so that ghosts have the wished colours, and the others their own."""
     kind, layers = check_films(films)
     if judge not in ("linear", "oklab"):
         raise ProjectError(f"--judge {judge!r} is unknown; choose linear or oklab")
@@ -81,8 +81,11 @@ def colors(
             choice, problem, limits=Limits(time_s, None, None, asked), starts=starts, seed=seed, measure=measure,
             threads=threads,
         )  # fmt: skip
-    write_lens(coated(lens, problem.structure, kind, found.values), output)
+    write_lens(coated(lens, problem.rows, kind, found.values), output)
     remarks = [f"wrote {output}"]
+    if problem.kept:
+        rows = ", ".join(str(k) for k in problem.kept)
+        remarks.append(f"rows left bare, for no film can be put between cemented glasses: {rows}")
     if pair_map is not None:
         remarks.append(_draw_map(output, problem, pair_map))
     if curves is not None:
@@ -96,7 +99,7 @@ def colors(
 
 def _data(problem: ColorProblem, found: Coatings, names: list[str]) -> dict[str, object]:
     """Return what was found, ready for JSON."""
-    from ..design.colors import mirrors_of, perceived_differences
+    from ..design.colors import perceived_differences
     from ..design.objective import algorithm_2
 
     differences = perceived_differences(problem, found.colors)
@@ -104,8 +107,7 @@ def _data(problem: ColorProblem, found: Coatings, names: list[str]) -> dict[str,
         "cost": found.cost,
         "fitness_algorithm2": float(algorithm_2(problem.targets, found.colors)),
         "rows": {
-            str(k): _row_data(problem, value)
-            for k, value in zip(mirrors_of(problem.structure).tolist(), found.values, strict=True)
+            str(k): _row_data(problem, value) for k, value in zip(problem.rows.tolist(), found.values, strict=True)
         },
         "ghosts": [
             {"ghost": name, "wanted": wanted, "found": got, "oklab_difference": seen}

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .color_search import ColorStep, solve_colors
-from .colors import Coatings, ColorProblem, color_residuals, colors_of, log_colors, log_reflectances, mirrors_of
+from .colors import Coatings, ColorProblem, color_residuals, colors_of, log_colors, log_reflectances
 from .hunt import Hunt, Limits
 from .objective import algorithm_2
 from .solvers import Choice, evolve_with
@@ -39,7 +39,7 @@ class ColorGenes:
     @property
     def count(self) -> int:
         """Number of genes: one or two for each film of each mirror."""
-        return len(mirrors_of(self.problem.structure)) * len(self.problem.limits()[0])
+        return len(self.problem.rows) * len(self.problem.limits()[0])
 
     def values(self, genes: Floats) -> Floats:
         """Turn many, shape (B, D), into values of coatings, shape (B, M, P)."""
@@ -98,7 +98,7 @@ def colors_with(
     Raises
     ------
     ProjectError
-        When no ghost's colour is asked for.
+        When no ghost's colour is asked for, or no surface can be coated.
     """
     limits = limits.from_now()
     if not choice.evolves:

@@ -26,9 +26,7 @@ from .colors import (
     log_both,
     log_colors,
     log_reflectances,
-    mirrors_of,
     reflectances,
-    uses,
 )
 from .problem import Over, never
 
@@ -87,11 +85,11 @@ def solve_colors(
     Raises
     ------
     ProjectError
-        When no ghost's colour is asked for.
+        When no ghost's colour is asked for, or no surface can be coated.
     """
     problem.check()
     begun, workers = time.perf_counter(), threads or os.cpu_count() or 1
-    tables = [_table(problem, int(k)) for k in mirrors_of(problem.structure)]
+    tables = [_table(problem, int(k)) for k in problem.rows]
 
     def over() -> bool:
         late = time_limit is not None and time.perf_counter() - begun >= time_limit
@@ -191,7 +189,7 @@ def _descend(
     problem: ColorProblem, tables: list[_Table], values: Floats, random: np.random.Generator, over: Over
 ) -> Floats:
     """Choose one coating after the other until none gets better."""
-    reflections, passes = uses(problem.structure)
+    reflections, passes = problem.uses()
     values, mirrors = values.copy(), log_reflectances(problem, values)
     logs = log_colors(problem, mirrors)
     best = float((color_residuals(problem, logs[:, None]) ** 2).sum())
@@ -262,7 +260,7 @@ def _costs(problem: ColorProblem, values: Floats) -> tuple[float, Floats, Floats
 def _jacobian(problem: ColorProblem, values: Floats, residuals: Floats, logs: Floats) -> Floats:
     """Differentiate the residuals by all values, part by part; each touches one surface's R only."""
     low, high = problem.limits()
-    reflections, passes = uses(problem.structure)
+    reflections, passes = problem.uses()
     base, columns = log_colors(problem, logs), []
     for part in range(values.shape[1]):
         step = 1e-4 * (high[part] - low[part])

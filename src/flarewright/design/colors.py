@@ -53,6 +53,10 @@ class ColorProblem:
         Differences are judged in Oklab instead of by parts of red, green and blue.
     layers : int
         Free films on a surface at most.
+    kept : tuple of int
+        Mirrors that stay as they are.
+    kept_logs : ndarray, shape (G, 3)
+        What those do to the logarithms of the ghosts' colours.
     """
 
     structure: Structure
@@ -64,6 +68,20 @@ class ColorProblem:
     bounds: Bounds
     perceptual: bool = False
     layers: int = 1
+    kept: tuple[int, ...] = ()
+    kept_logs: Floats | float = 0.0
+
+    @property
+    def rows(self) -> NDArray[np.int64]:
+        """Rows whose coatings are chosen, shape (M,)."""
+        mirrors = mirrors_of(self.structure)
+        return mirrors[~np.isin(mirrors, self.kept)]
+
+    def uses(self) -> tuple[Floats, Floats]:
+        """Count how often each ghost is reflected by each of `rows` and passes it, both of shape (G, M)."""
+        chosen = ~np.isin(mirrors_of(self.structure), self.kept)
+        reflections, passes = uses(self.structure)
+        return reflections[:, chosen], passes[:, chosen]
 
     def check(self) -> None:
         """Refuse what no solver can begin with.
@@ -71,10 +89,12 @@ class ColorProblem:
         Raises
         ------
         ProjectError
-            When no ghost's colour is asked for.
+            When no ghost's colour is asked for, or no surface can be coated.
         """
         if not self.weights.any():
             raise ProjectError("no ghost's colour counts; give one a weight above 0")
+        if not len(self.rows):
+            raise ProjectError("no surface of this lens lies between glass and air, so there is nothing to coat")
 
     def limits(self) -> tuple[Floats, Floats]:
         """Least and largest of a coating's values, each of shape (P,)."""
@@ -92,8 +112,8 @@ class Coatings:
     ----------
     cost : float
     values : ndarray, shape (M, P)
-        Of each mirror in order: the centre wavelength in nm, or index and thickness in nm of each film, from the side
-        of the lower index; a film of no thickness is not there.
+        Of each of the problem's `rows`: the centre wavelength in nm, or index and thickness in nm of each film, from
+        the side of the lower index; a film of no thickness is not there.
     colors : ndarray, shape (G, 3)
     """
 
@@ -103,7 +123,7 @@ class Coatings:
 
 
 def mirrors_of(structure: Structure) -> NDArray[np.int64]:
-    """Return the rows that carry coatings."""
+    """Return the rows that reflect: those where the index changes."""
     return np.flatnonzero(structure.mirrors)
 
 
@@ -181,17 +201,32 @@ def own_colors(lens: Lens, structure: Structure) -> Floats:
     -------
     ndarray, shape (G, 3)
     """
+    return np.asarray(np.exp(_own_logs(lens, structure, mirrors_of(structure))), dtype=np.float64)
+
+
+def _own_logs(lens: Lens, structure: Structure, rows: NDArray[np.int64]) -> Floats:
+    """Return what mirrors with the coatings that they have do to the logarithms of the colours, shape (G, 3)."""
     n_d = indices_of(lens)
     waves = np.array(WAVELENGTHS_NM)
     table = []
-    for k in mirrors_of(structure):
+    for k in rows:
         row = lens.rows[k]
         assert isinstance(row, Surface)
         films = film_stack(row.coating, float(n_d[k]), float(n_d[k + 1]))
         table.append(stack_reflectance(float(n_d[k]), float(n_d[k + 1]), *films, waves, 1.0))
-    R = np.maximum(np.array(table), 1e-12)
-    reflections, passes = uses(structure)
-    return np.asarray(np.exp(reflections @ np.log(R) + passes @ np.log1p(-R)), dtype=np.float64)
+    R = np.maximum(np.array(table).reshape(-1, len(waves)), 1e-12)
+    chosen = np.isin(mirrors_of(structure), rows)
+    reflections, passes = (each[:, chosen] for each in uses(structure))
+    return np.asarray(reflections @ np.log(R) + passes @ np.log1p(-R), dtype=np.float64)
+
+
+def cemented(lens: Lens, structure: Structure) -> tuple[int, ...]:
+    """Return the bare mirrors between two glasses: cement holds them, and no film can be put there."""
+    n_d = indices_of(lens)
+    rows = ((int(k), lens.rows[k]) for k in mirrors_of(structure))
+    return tuple(
+        k for k, row in rows if isinstance(row, Surface) and row.coating is None and min(n_d[k], n_d[k + 1]) > 1.0
+    )
 
 
 def indices_of(lens: Lens) -> Floats:
@@ -230,8 +265,8 @@ def perceived_differences(problem: ColorProblem, colors: Floats) -> Floats:
 
 
 def log_reflectances(problem: ColorProblem, values: Floats) -> Floats:
-    """Logarithms of R and T of every mirror, shape (2, ..., M, 3), for values of shape (..., M, P)."""
-    rows = mirrors_of(problem.structure)
+    """Logarithms of R and T of `rows`, shape (2, ..., M, 3), for values of shape (..., M, P)."""
+    rows = problem.rows
     R = reflectances(problem.kind, problem.n_d[rows], problem.n_d[rows + 1], values)
     return log_both(R)
 
@@ -244,17 +279,18 @@ def log_both(R: Floats) -> Floats:
 
 def log_colors(problem: ColorProblem, logs: Floats) -> Floats:
     """Logarithms of every ghost's colour, shape (..., G, 3), from those of the mirrors, shape (2, ..., M, 3)."""
-    reflections, passes = uses(problem.structure)
-    return np.asarray(reflections @ logs[0] + passes @ logs[1], dtype=np.float64)
+    reflections, passes = problem.uses()
+    return np.asarray(reflections @ logs[0] + passes @ logs[1] + problem.kept_logs, dtype=np.float64)
 
 
-def coated(lens: Lens, structure: Structure, kind: Kind, values: Floats) -> Lens:
+def coated(lens: Lens, coated_rows: NDArray[np.int64], kind: Kind, values: Floats) -> Lens:
     """Put coatings on a lens.
 
     Parameters
     ----------
     lens : Lens
-    structure : Structure
+    coated_rows : ndarray, shape (M,)
+        `ColorProblem.rows`.
     kind : {"quarter-wave", "film"}
     values : ndarray, shape (M, P)
         As in `Coatings`.
@@ -264,7 +300,7 @@ def coated(lens: Lens, structure: Structure, kind: Kind, values: Floats) -> Lens
     Lens
     """
     rows = list(lens.rows)
-    for k, value in zip(mirrors_of(structure), values, strict=True):
+    for k, value in zip(coated_rows, values, strict=True):
         rows[k] = rows[k].replace(coating=coating_of(kind, value))
     out: Lens = lens.replace(rows=tuple(rows))
     return out
@@ -303,6 +339,8 @@ def color_problem(
     project: Project, kind: Kind, *, perceptual: bool = False, layers: int = 1
 ) -> tuple[ColorProblem, Lens]:
     """Read a project as a problem of colours: the lens' own, and those that its wishes change.
+
+    Cemented surfaces stay bare where the project has them bare.
 
     Parameters
     ----------
@@ -350,7 +388,9 @@ def color_problem(
             # black in a channel is asked for as a thousandth, for no coating reflects nothing
             hue = np.maximum(np.array(wish.color) / max(wish.color), 1e-3)
             targets[g], hue_only[g] = hue * targets[g].sum() / hue.sum(), True
+    kept = cemented(lens, structure)
     found = ColorProblem(
-        structure, indices_of(lens), targets, weights, hue_only, kind, design.bounds, perceptual, layers
-    )
+        structure, indices_of(lens), targets, weights, hue_only, kind, design.bounds, perceptual, layers, kept,
+        _own_logs(lens, structure, np.array(kept, dtype=np.int64)),
+    )  # fmt: skip
     return found, lens
