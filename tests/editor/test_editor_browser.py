@@ -1,5 +1,6 @@
 """The editor driven as a person does, in a real browser: `pytest -m browser`."""
 
+import io
 import json
 from itertools import pairwise
 
@@ -124,6 +125,13 @@ def test_drafts_do_not_jump_in_brightness(tab):
     # a hand that holds still sees what it would when letting go
     tab.until("flarewright.view.shownGrade === 'final'")
     held = level()
+    # a picture of a place that the hand has left comes too late, though nothing is under way any more
+    tab.js(
+        "flarewright.view.shownGrade = '', flarewright.state.picture.lights[0][0] += 1e-4, flarewright.view.refresh()"
+    )
+    assert tab.js("flarewright.view.shownGrade") == ""
+    tab.js("flarewright.state.picture.lights[0][0] = flarewright.view.mover.lights[0][0], flarewright.view.refresh()")
+    assert tab.js("flarewright.view.shownGrade") == "final"
     # what is said of the light is the hand's, not the project's
     numbers = tab.js("flarewright.view.mover.lights[0]")
     assert numbers != tab.state()["lights"][0]["field_deg"]
@@ -824,6 +832,16 @@ def test_an_iris_is_drawn_and_a_matte_hides_the_light(tab, tmp_path):
     tab.until("(flarewright.state.iris.mask ?? '').endsWith('drawn.png')")
     mask = np.asarray(Image.open(tab.state()["iris"]["mask"]).convert("L"))
     assert mask.mean() / 255.0 == pytest.approx(0.88 * 0.12, rel=0.02)
+    assert tab.page.get_by_text("drawn.png, instead of blades").count() == 1
+    # the sheet begins with it, so that it can be gone on with
+    tab.page.click("#mask-draw")
+    tab.until("document.querySelector('.sheet')?.dataset.begun")
+    tab.page.click("#mask-use")
+    tab.page.wait_for_timeout(300)
+    again = np.asarray(Image.open(tab.state()["iris"]["mask"]).convert("L")).astype(float)
+    assert np.abs(again - mask).max() <= 1.0
+    # it is the same picture, so nothing was done
+    assert tab.state()["undo"] == "Change the iris"
     tab.page.locator("#view").focus()
     tab.page.keyboard.press("Control+z")
     tab.until("flarewright.state.iris.mask === null")
@@ -863,3 +881,301 @@ def test_the_lights_handle_stays_on_its_image_where_a_lens_bends_lines(tab):
     assert np.hypot(place[0] - x, place[1] - y) < 1.0
     # its rays by f tan would be beside the picture's edge
     assert place[0] < left + 0.9 * width
+
+
+def type_into(tab, name, text):
+    tab.page.fill(f"input[name={name}]", text)
+    tab.page.press(f"input[name={name}]", "Enter")
+
+
+def value_of(tab, name):
+    return tab.page.locator(f"input[name={name}]").input_value()
+
+
+def test_a_number_that_is_not_taken_as_typed_is_told(tab):
+    type_into(tab, "light_x", "100")
+    tab.until(told("100° right became 80°"))
+    tab.until("document.querySelector('input[name=light_x]').value === '80'")
+    type_into(tab, "f_number", "1")
+    tab.until(told("F/1 became f/3.5"))
+    tab.until("document.querySelector('input[name=f_number]').value === '3.5'")
+    type_into(tab, "intensity", "much")
+    tab.until(told("Intensity: “much” is no number, so it stays 1."))
+    assert value_of(tab, "intensity") == "1"
+    type_into(tab, "light_y", "")
+    tab.until(told("Up: needs an angle, so it stays 4.4."))
+    assert value_of(tab, "light_y") == "4.4"
+    type_into(tab, "path_time", "-2")
+    tab.until(told("-2 s became 0 s"))
+    tab.until("document.querySelector('input[name=path_time]').value === '0.00'")
+    tab.tab("iris")
+    type_into(tab, "blades", "2")
+    tab.until(told("2 blades became a round opening"))
+    tab.until("document.querySelector('input[name=blades]').value === '0'")
+    type_into(tab, "scratch_um", "0")
+    tab.until(told("Scratch width must be more than 0"))
+    tab.until("document.querySelector('input[name=scratch_um]').value !== '0'")
+    type_into(tab, "dust_um_0", "x")
+    tab.until(told("Dust: “x” is no number"))
+    assert value_of(tab, "dust_um_0") != "x"
+    tab.tab("target")
+    type_into(tab, "seconds", "0")
+    tab.until(told("0 s became 1 s"))
+    assert value_of(tab, "seconds") == "1"
+    # a slider that passes over numbers says nothing
+    tab.tab("iris")
+    tab.js("document.getElementById('toasts').replaceChildren()")
+    tab.page.focus(".row:has(input[name=blades]) input[type=range]")
+    tab.page.keyboard.press("ArrowRight")
+    tab.until("flarewright.state.iris.blades === 3")
+    assert tab.page.locator(".toast").count() == 0
+
+
+def test_what_never_reached_the_editor_does_not_stay(tab, tmp_path):
+    tab.page.wait_for_timeout(300)
+    tab.editor.kill()
+    gone = told("does not answer")
+    tab.until(gone)
+    before = {name: value_of(tab, name) for name in ("intensity", "light_x", "exposure", "f_number")}
+    for name, value in before.items():
+        type_into(tab, name, "7")
+        tab.until(f"document.querySelector('input[name={name}]').value === {json.dumps(value)}")
+    tab.tab("lens")
+    box = tab.page.locator("input[data-row='0'][data-column='radius']")
+    radius = box.input_value()
+    box.fill("44")
+    box.press("Enter")
+    tab.until(f"document.querySelector(\"input[data-row='0'][data-column='radius']\").value === {json.dumps(radius)}")
+    tab.until(gone)
+    tab.editor.start()
+    tab.until(told("is back"))
+    tab.rest()
+    assert tab.state()["steps"]["at"] == 0
+    tab.said.clear()
+
+
+def test_what_was_refused_goes_when_it_is_done(tab, tmp_path):
+    path = tmp_path / "shot.toml"
+    tab.page.keyboard.press("Control+s")
+    tab.page.fill("dialog input[name=path]", str(path))
+    tab.page.keyboard.press("Enter")
+    tab.until("flarewright.state.clean")
+    path.write_text(path.read_text() + "\n# by somebody else")
+    tab.tab("iris")
+    type_into(tab, "blades", "99")
+    tab.until(told("Blades must be at most 24"))
+    type_into(tab, "blades", "9")
+    tab.until("flarewright.state.iris.blades === 9")
+    tab.until(f"!{told('Blades must be at most 24')}")
+    tab.page.keyboard.press("Control+s")
+    tab.until(told("save again to overwrite"))
+    tab.page.keyboard.press("Control+s")
+    tab.until(told("Saved"))
+    assert tab.js(f"!{told('save again to overwrite')}")
+
+
+def test_every_cell_of_the_table_shows_its_number(tab):
+    tab.tab("lens")
+    tab.page.locator("input[data-row='0'][data-column='thickness']").fill("123.456")
+    tab.page.keyboard.press("Tab")
+    tab.until("flarewright.state.lens.rows[0].thickness === '123.456'")
+    for column, text in (("v_d", "59.4617"), ("n_d", "1.52346"), ("radius", "-1234.56"), ("semi_diameter", "12.345")):
+        tab.page.locator(f"input[data-row='0'][data-column='{column}']").fill(text)
+        tab.page.keyboard.press("Tab")
+        tab.until(f"flarewright.state.lens.rows[0].{column} === {json.dumps(text)}")
+    cut = (
+        "[...document.querySelectorAll('.rows input:not([data-column=coating])')].filter(e =>"
+        "e.scrollWidth > e.clientWidth).map(e => [e.ariaLabel, e.value])"
+    )
+    tab.page.wait_for_timeout(200)
+    assert tab.js(cut) == []
+    for lens in ("canon-28-80", "fisheye-nikkor-10.5"):
+        tab.js(f"flarewright.deed('choose_lens', {{lens: {json.dumps(lens)}}})")
+        tab.until(f"flarewright.state.lens.shipped === {json.dumps(lens)}")
+        tab.page.wait_for_timeout(200)
+        # a quarter wave is read as well
+        assert tab.js(cut.replace(":not([data-column=coating])", "")) == []
+
+
+def test_a_light_that_is_added_is_chosen(tab):
+    for k in (1, 2):
+        tab.page.click("#light-add")
+        tab.until(f"flarewright.state.lights.length === {k + 1} && flarewright.light === {k}")
+    names = "[...document.querySelectorAll('.buttons button')].map(e => [e.textContent, e.className])"
+    shown = [each for each in tab.js(names) if each[0].startswith("Light")]
+    assert shown == [["Light 1", ""], ["Light 2", ""], ["Light 3", "on"]]
+    # and it is this one that is moved
+    type_into(tab, "light_x", "2")
+    tab.until("flarewright.state.lights[2].field_deg[0] === 2")
+
+
+def test_the_time_of_a_path_begins_anew_with_another_project(tab, tmp_path):
+    tab.page.click("#path-key")
+    tab.until("flarewright.state.lights[0].keys.length === 1")
+    type_into(tab, "path_time", "3")
+    tab.until("flarewright.player.at === 3")
+    tab.page.keyboard.press("Control+s")
+    tab.page.fill("dialog input[name=path]", str(tmp_path / "one"))
+    tab.page.keyboard.press("Enter")
+    tab.until("flarewright.state.clean")
+    assert value_of(tab, "path_time") == "3.00"
+    tab.page.click("#open")
+    tab.page.fill("dialog input[name=path]", "nothing of the kind")
+    tab.page.keyboard.press("Enter")
+    tab.until("document.querySelector('dialog .wrong').textContent.includes('the panel Library shows every lens')")
+    tab.page.fill("dialog input[name=path]", "tessar-brendel")
+    tab.page.keyboard.press("Enter")
+    tab.until("flarewright.state.lens.shipped === 'tessar-brendel'")
+    tab.until("document.querySelector('input[name=path_time]').value === '0.00'")
+
+
+def test_from_scratch_can_be_taken_back(tab):
+    tab.tab("target")
+    tab.page.click("#wish-add")
+    tab.until("flarewright.state.design?.wishes.length === 1")
+    tab.page.select_option("select[name=structure]", "lens")
+    tab.until("flarewright.state.design.structure === 'lens'")
+    scratch, structure = tab.page.locator("input[name=scratch]"), tab.page.locator("select[name=structure]")
+    scratch.check()
+    tab.until("flarewright.state.design.structure === 'any' && !flarewright.state.design.own_ghosts")
+    # also where the page has been loaded anew meanwhile, and something else was changed
+    type_into(tab, "wish_move", "3")
+    tab.until("flarewright.state.design.wishes[0].place_mm === 3")
+    tab.page.reload()
+    tab.rest()
+    tab.tab("target")
+    scratch.uncheck()
+    tab.until("flarewright.state.design.own_ghosts")
+    assert tab.state()["design"]["structure"] == "lens"
+    assert structure.input_value() == "lens"
+
+
+def test_the_target_is_shown_as_the_picture_is(tab):
+    """It kept the look, the exposure and the background of the moment in which it was switched on."""
+    from PIL import Image
+
+    tab.tab("target")
+    tab.page.click("[data-compare=wipe]")
+    tab.until("flarewright.view.target")
+    # without wishes it is the same picture by matrices, so the two are alike in all that they are shown with
+    middle = (
+        "(() => { const t = flarewright.view.target, c = new OffscreenCanvas(t.width, t.height);"
+        "const p = c.getContext('2d'), sum = [0, 0, 0]; p.drawImage(t, 0, 0);"
+        "const d = p.getImageData(0, 0, t.width, t.height).data;"
+        "for (let k = 0; k < d.length; k += 4) for (let i = 0; i < 3; i++) sum[i] += d[k + i];"
+        "return sum.map((each) => Math.round(4 * each / d.length)); })()"
+    )
+
+    def alike():
+        tab.rest()
+        tab.page.wait_for_timeout(600)
+        found, wanted = np.array(tab.js(middle), float), tab.shown().reshape(-1, 3).mean(axis=0)
+        return np.abs(found - wanted).max() < 12.0
+
+    assert alike()
+    before = tab.js(middle)
+    tab.page.select_option("#look", "false-colour")
+    tab.until(f"JSON.stringify({middle}) !== {json.dumps(json.dumps(before, separators=(',', ':')))}")
+    assert alike()
+    tab.page.select_option("#look", "srgb")
+    tab.until(f"JSON.stringify({middle}) === {json.dumps(json.dumps(before, separators=(',', ':')))}")
+    type_into(tab, "exposure", "13")
+    tab.until(f"{middle}[0] > {before[0]} + 20")
+    assert alike()
+    buffer = io.BytesIO()
+    Image.new("RGB", (64, 36), (0, 200, 0)).save(buffer, format="PNG")
+    drop(tab, "plate.png", buffer.getvalue())
+    tab.until(f"{middle}[1] > 170")
+    assert alike()
+
+
+def test_keys_move_every_slider_by_its_step(tab):
+    """Where a slider's bar is bent, the browser's steps of the bar were less than one of the value and led nowhere."""
+
+    def keyed(name, *keys):
+        tab.page.focus(f".row:has(input[name={name}]) input[type=range]")
+        for key in keys:
+            tab.page.keyboard.press(key)
+        return float(value_of(tab, name))
+
+    assert keyed("intensity", "ArrowRight", "ArrowRight") == 1.02
+    assert keyed("intensity", "PageUp", "Shift+ArrowLeft", "ArrowDown") == 1.01
+    assert keyed("f_number", "ArrowRight") == 16.1
+    assert keyed("f_number", "Home") == 0.7
+    # as far as the lens opens
+    tab.until("document.querySelector('input[name=f_number]').value === '3.5'")
+    tab.until("flarewright.state.lights[0].intensity === 1.01 && flarewright.state.lens.f_number === 3.5")
+    tab.tab("iris")
+    assert keyed("blades", "Home") == 0
+    assert keyed("blades", "ArrowRight", "ArrowRight") == 4
+    tab.until("flarewright.state.iris.blades === 4")
+    assert keyed("blades", "ArrowLeft", "ArrowLeft") == 0
+    tab.until("flarewright.state.iris.blades === 0")
+    assert keyed("dust", "ArrowRight") == 0.05
+    tab.until("flarewright.state.dirt.dust_per_mm2 === 0.05")
+
+
+def test_false_colours_have_a_legend(tab):
+    tab.js(
+        "(() => { const kind = CanvasRenderingContext2D.prototype, plain = kind.fillText; window.written = [];"
+        "kind.fillText = function (text, x, y) { written.push(text); plain.apply(this, arguments); }; })()"
+    )
+    tab.js("flarewright.view.redraw()")
+    tab.page.wait_for_timeout(200)
+    assert "stops from middle grey" not in tab.js("written")
+    tab.page.select_option("#look", "false-colour")
+    tab.until("written.includes('stops from middle grey')")
+    assert {"−8", "−0.5", "+0.5", "+3.5"} <= set(tab.js("written"))
+
+
+def test_a_hand_that_takes_the_light_ends_the_play(tab):
+    tab.page.click("#path-key")
+    tab.until("flarewright.state.lights[0].keys.length === 1")
+    type_into(tab, "path_time", "9")
+    tab.rest()
+    tab.drag(tab.light(), tab.at(0.3, 0.3))
+    tab.rest()
+    tab.page.click("#path-key")
+    tab.until("flarewright.state.lights[0].keys.length === 2")
+    tab.page.click("#path-play")
+    tab.until("flarewright.player.at > 0.3 && flarewright.player.playing")
+    x, y = tab.at(0.7, 0.7)
+    tab.drag((x, y), (x + 40, y - 20))
+    assert not tab.js("flarewright.player.playing")
+    tab.rest()
+    place = tab.state()["lights"][0]["field_deg"]
+    tab.page.wait_for_timeout(400)
+    assert tab.state()["lights"][0]["field_deg"] == place
+    tab.page.click("#path-play")
+    tab.page.locator("#view").focus()
+    tab.page.keyboard.press("ArrowLeft")
+    tab.until("!flarewright.player.playing")
+
+
+def test_the_command_is_shown_where_the_clipboard_is_kept_from_the_page(tab, tmp_path):
+    tab.page.keyboard.press("Control+s")
+    tab.page.fill("dialog input[name=path]", str(tmp_path / "one"))
+    tab.page.keyboard.press("Enter")
+    tab.until("flarewright.state.clean")
+    # as it is for pages of other machines
+    tab.js("Object.defineProperty(navigator, 'clipboard', {value: undefined, configurable: true})")
+    tab.page.click("#export")
+    tab.page.click("[role=menuitem]:has-text('Copy as command line')")
+    tab.until("document.querySelector('dialog textarea')")
+    assert tab.page.locator("dialog textarea").input_value().startswith("flarewright render --project ")
+    assert tab.js("getSelection().toString() || document.querySelector('textarea').selectionEnd > 20")
+    assert tab.page.locator(".toast.error").count() == 0
+
+
+def test_the_page_says_that_the_target_is_drawn_by_matrices(tab):
+    tab.tab("target")
+    words = tab.page.locator("#target-drawn")
+    assert words.is_hidden()
+    tab.page.click("[data-compare=side]")
+    tab.until("flarewright.view.target")
+    assert "drawn by matrices" in words.inner_text()
+    assert "the light stands 9° off it" in words.inner_text()
+    tab.js("flarewright.deed('move_light', {light: 0, x: 24, y: 0})")
+    tab.until("document.getElementById('target-drawn').textContent.includes('24° off')")
+    tab.page.click("[data-compare=physical]")
+    assert words.is_hidden()

@@ -210,6 +210,24 @@ def test_backgrounds_of_all_kinds(tmp_path):
     Image.fromarray(split).save(tmp_path / "tall.png")
     np.testing.assert_allclose(plate(tmp_path / "tall.png"), 1.0, atol=1e-6)
 
+    # a photograph that the camera took on its side stands as it was seen: the sky, which is its left border, is up
+    lying = np.zeros((8, 8, 3), np.uint8)
+    lying[:, :4] = 255
+    photo = Image.fromarray(lying)
+    exif = photo.getexif()
+    exif[0x0112] = 6
+    photo.save(tmp_path / "phone.jpg", exif=exif, quality=95)
+    found = plate(tmp_path / "phone.jpg", (8, 8))
+    assert found[:3].min() > 0.9
+    assert found[5:].max() < 0.1
+    # what is clear has no light, whatever colour is kept there
+    clear = np.full((8, 8, 4), 255, np.uint8)
+    clear[:, 4:, 3] = 0
+    Image.fromarray(clear).save(tmp_path / "cut-out.png")
+    found = plate(tmp_path / "cut-out.png", (8, 8))
+    assert found[:, :4].min() == 1.0
+    assert found[:, 4:].max() == 0.0
+
     def exr(name, channels, window=((0, 0), (7, 3))):
         head = {"type": OpenEXR.scanlineimage, "displayWindow": window}
         OpenEXR.File(head, channels).write(str(tmp_path / name))
@@ -550,4 +568,27 @@ def test_a_black_picture_sets_no_exposure(project):
     session.do("move_light", {"light": 0, "x": 6.0, "y": 3.0})
     assert screen.wait(60.0)
     assert screen.exposure_stops == studio.exposure_of(screen.picture) != found
+    session.keeper.close()
+
+
+def test_undo_leads_back_to_the_exposure_of_the_lens_before(project):
+    """It was found anew for where the light stands now, so brightness could not be compared."""
+    session, _ = begin(None)
+    screen = Screen(session)
+    screen.start()
+    assert screen.wait(60.0)
+    session.do("move_light", {"light": 0, "x": 1.0, "y": 0.5})
+    assert screen.wait(60.0)
+    held = screen.exposure_stops
+    assert held != studio.exposure_of(screen.picture)
+    session.do("choose_lens", {"lens": "tessar-brendel"})
+    assert screen.wait(60.0)
+    other = screen.exposure_stops
+    assert other == studio.exposure_of(screen.picture)
+    session.undo()
+    assert screen.wait(60.0)
+    assert (screen.exposure_stops, session.view.found_stops) == (held, held)
+    session.redo()
+    assert screen.wait(60.0)
+    assert screen.exposure_stops == other
     session.keeper.close()

@@ -85,7 +85,8 @@ def test_the_page_and_every_question_it_asks(desk):
     assert len(told(desk, "/api/library")[1]["lenses"]) >= 12
     assert told(desk, "/api/ghosts")[1]["ghosts"][0]["share"] == 1.0
     spoken = {path.split("?")[0] for path in asked} | {"/api/state", "/api/pick", "/api/places", "/api/glasses"}
-    spoken |= {"/api/library", "/api/ghosts", "/api/command", "/api/section"}
+    spoken |= {"/api/library", "/api/ghosts", "/api/command", "/api/section", "/api/mask"}
+    assert told(desk, "/api/mask") == (400, {"error": "the iris has no mask; load or draw one"})
     missing = {path for path in _GET if "{" not in path} - spoken
     assert not missing
 
@@ -221,8 +222,37 @@ def test_strangers_are_kept_out(desk):
     assert not guard._welcome(scope())
     assert not guard._welcome(scope(b"token=wrong"))
     assert guard._welcome(scope(b"token=a-secret-token"))
-    assert guard._welcome(scope(cookie="x=1; flarewright_token=a-secret-token"))
+    assert guard._welcome(scope(cookie="x=1; flarewright_token_1=a-secret-token"))
+    # another editor's, on another port of the same machine
+    assert not guard._welcome(scope(cookie="flarewright_token_2=a-secret-token"))
     assert not guard._welcome(scope(b"token=a-secret-token", origin="http://other:1"))
+
+
+@pytest.mark.parametrize("token", ["a-secret-token", "Grüße; und=mehr, & so"])
+def test_a_token_that_came_with_the_address_is_remembered(token):
+    """Whatever signs it has: the page's own scripts are asked for with the cookie alone."""
+    import asyncio
+    from urllib.parse import quote
+
+    sent = []
+
+    async def page(scope, receive, send):
+        await send({"type": "http.response.start", "status": 200, "headers": []})
+
+    async def send(message):
+        sent.append(message)
+
+    def scope(query="", **headers):
+        pairs = [(key.encode(), value.encode()) for key, value in {"host": "box:8640", **headers}.items()]
+        return {"type": "http", "headers": pairs, "query_string": query.encode()}
+
+    guard = Guard(page, token)
+    asyncio.run(guard(scope(f"token={quote(token, safe='')}"), None, send))
+    cookie = dict(sent[-1]["headers"])[b"set-cookie"].decode("ascii")
+    asyncio.run(guard(scope(cookie=cookie.partition(";")[0]), None, send))
+    assert [message["status"] for message in sent if message["type"] == "http.response.start"] == [200, 200]
+    asyncio.run(guard(scope(cookie=cookie.partition(";")[0] + "x"), None, send))
+    assert sent[-2]["status"] == 403
 
 
 def test_the_command_line_keeps_to_itself(capsys):

@@ -7,10 +7,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from flarewright.design.colors import color_problem, own_colors, perceived_differences
 from flarewright.editor import solving
 from flarewright.editor.solving import Solver
 from flarewright.errors import ProjectError
-from flarewright.model import AsLens, Design, Everywhere, GhostWish, Light, Preset, QuarterWave
+from flarewright.model import AsLens, Design, Everywhere, GhostWish, Light, Preset, QuarterWave, Surface
 from flarewright.optics.pack import resolve_coatings
 from flarewright.render.prepare import as_lens
 
@@ -123,7 +124,7 @@ def test_a_colour_for_a_new_ghost_is_refused_in_the_pages_words(project):
     wishes = (GhostWish(ghost="8-6", color=(1.0, 0.2, 0.1)), GhostWish(place_mm=1.0, radius_mm=1.0))
     solver = Solver(_Session(project.replace(design=Design(wishes=wishes))))
     with pytest.raises(ProjectError, match=r"^added ghost 1 is for a new ghost; colours are chosen for"):
-        solver.start_colors("quarter-wave")
+        solver.start_colors("quarter-wave", 30.0)
 
 
 def test_colours_that_are_found_keep_the_shot_as_it_is(project):
@@ -132,7 +133,7 @@ def test_colours_that_are_found_keep_the_shot_as_it_is(project):
     session = _Session(project.replace(design=Design(wishes=(GhostWish(ghost="8-6", color=(1.0, 0.2, 0.1)),))))
     session.put = lambda found, label: puts.append(found)
     solver = Solver(session)
-    solver.start_colors("quarter-wave")
+    solver.start_colors("quarter-wave", 30.0)
     solver._thread.join(60.0)
     assert len(solver.progress.found) == 1
     session.project = session.project.replace(lights=(Light(field_deg=(5.0, 0.0)),))
@@ -141,3 +142,45 @@ def test_colours_that_are_found_keep_the_shot_as_it_is(project):
     assert found.coating.kind == "per-row"
     assert found.design is None
     assert found == session.project.replace(coating=found.coating, design=None)
+
+
+def test_how_near_colours_come_is_told_and_cemented_rows_stay_bare(project):
+    wishes = (GhostWish(ghost="8-6", color=(1.0, 0.2, 0.1)),)
+    session = _Session(project.replace(coating=AsLens(), design=Design(wishes=wishes)))
+    solver = Solver(session)
+    solver.start_colors("quarter-wave", 30.0)
+    solver._thread.join(60.0)
+    assert solver.progress.words == "Coatings were found"
+    (found,) = solver.progress.found
+    worn = found.changes["coating"].coatings
+    # rows 1 and 7 are cemented, row 5 is the stop
+    assert [k for k, coating in enumerate(worn) if coating is None] == [1, 5, 7]
+    said = found.words.split("; ")
+    problem, lens = color_problem(session.project, "quarter-wave")
+    rows = tuple(
+        row.replace(coating=coating) if isinstance(row, Surface) else row
+        for row, coating in zip(lens.rows, worn, strict=True)
+    )
+    colors = own_colors(lens.replace(rows=rows), problem.structure)
+    off = perceived_differences(problem, colors)
+    wished = problem.structure.pairs.index((8, 6))
+    assert said[0].startswith("Wished colours: ")
+    assert ("met" in said[0].split()) == (off[wished] < 0.02)
+    others = np.delete(off, wished)
+    assert said[1].startswith("the other ghosts: changed, ghost ")
+    assert said[1].endswith(f" is farthest off, by {others.max():.2g}")
+    assert said[-1] == "the cemented rows (1, 7) stay bare, for no film can be put there"
+
+
+def test_a_search_for_colours_is_stopped_at_once(project):
+    """With many rows it takes minutes, and Stop had waited for them."""
+    wishes = (GhostWish(ghost="1-0", color=(1.0, 0.2, 0.1)),)
+    shot = project.replace(lens="canon-28-80", coating=AsLens(), design=Design(wishes=wishes))
+    solver = Solver(_Session(shot))
+    solver.start_colors("film", 600.0)
+    assert solver.progress.running
+    begun = time.perf_counter()
+    solver.stop()
+    assert time.perf_counter() - begun < 15.0
+    assert not solver._thread.is_alive()
+    assert len(solver.progress.found) == 1

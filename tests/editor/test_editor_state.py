@@ -11,10 +11,12 @@ from flarewright.editor.deeds import DEEDS, done
 from flarewright.editor.edit_ghosts import Hand, hand, soloed
 from flarewright.editor.edit_lens import own_lens, prescription, table_of
 from flarewright.editor.edit_wishes import direction, new_discs, target_project, wish_names
+from flarewright.editor.imports import take_in
 from flarewright.editor.jobs import Gate, Lane
 from flarewright.editor.session import begin
 from flarewright.editor.view import View
 from flarewright.errors import FlarewrightError
+from flarewright.io.library import lens_path
 from flarewright.io.project_file import read_project
 from flarewright.model import Light, PerRow, QuarterWave, Stop, Surface
 from flarewright.render.prepare import as_lens, first_order, settle
@@ -165,6 +167,96 @@ def test_undo_of_open_leads_back_to_the_file(tmp_path):
     again.keeper.close()
 
 
+def test_what_is_undone_back_to_what_was_saved_is_saved(tmp_path):
+    session, _ = begin("tessar-brendel")
+    assert not session.clean
+    path = session.save(str(tmp_path / "shot"))
+    assert session.clean
+    session.do("move_light", {"light": 0, "x": 4.0, "y": 2.0})
+    assert not session.clean
+    session.undo()
+    assert session.clean
+    session.redo()
+    assert not session.clean
+    session.save(str(path))
+    session.undo()
+    assert not session.clean
+    session.keeper.close()
+    # also in the next session, for the file says what it holds
+    again, _ = begin(None)
+    assert again.project == session.project
+    assert not again.clean
+    again.redo()
+    assert again.clean
+    # unless somebody else has changed it meanwhile
+    again.undo()
+    again.keeper.close()
+    path.write_text(path.read_text() + "\n# a remark")
+    third, _ = begin(None)
+    third.redo()
+    assert third.project == read_project(path)
+    assert not third.clean
+    third.keeper.close()
+
+
+def test_another_project_is_told_from_a_change(tmp_path):
+    session, _ = begin(None)
+    session.do("move_light", {"light": 0, "x": 4.0, "y": 2.0})
+    path = session.save(str(tmp_path / "shot"))
+    assert session.opened == 0
+    session.open("tessar-brendel")
+    assert session.opened == 1
+    session.do("move_light", {"light": 0, "x": 4.0, "y": 2.0})
+    assert session.opened == 1
+    session.undo()
+    session.undo()
+    assert (session.file, session.opened) == (str(path), 2)
+    take_in(session, "shot.toml", path.read_bytes())
+    take_in(session, "canon.toml", lens_path("canon-28-80").read_bytes())
+    assert session.opened == 2
+    session.open(str(path))
+    take_in(session, "other.toml", path.read_bytes().replace(b"4.0", b"5.0"))
+    assert session.opened == 4
+    session.keeper.close()
+    again, _ = begin(None)
+    again.undo()
+    assert again.opened == 1
+    again.keeper.close()
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("tesar", "there is no file and no lens 'tesar': did you mean tessar-brendel?"),
+        ("qqqq", "there is no file and no lens 'qqqq': the panel Library shows every lens; a file is found by its"),
+        ("shots/one.toml", "there is no file and no lens 'shots/one.toml': the panel Library shows every lens; a file"),
+    ],
+)
+def test_what_cannot_be_opened_is_told_in_the_pages_words(text, said):
+    session, _ = begin(None)
+    with pytest.raises(FlarewrightError) as told:
+        session.open(text)
+    assert str(told.value).startswith(said)
+    session.keeper.close()
+
+
+def test_a_project_whose_lens_is_gone_is_told_without_a_command(tmp_path):
+    text = 'schema_version = 1\nlens = "my-lens.toml"\n[[lights]]\nfield_deg = [3, 2]\n'
+    (tmp_path / "shot.toml").write_text(text)
+    session, _ = begin(None)
+    with pytest.raises(FlarewrightError, match=r"choose a shipped lens of the panel Library$"):
+        session.open(str(tmp_path / "shot.toml"))
+    with pytest.raises(FlarewrightError, match="of the panel Library; a dropped file comes alone"):
+        take_in(session, "shot.toml", text.encode())
+    # nor do its pictures come with it: a project without them would show none
+    before = session.project
+    for more in ('[iris]\nmask = "m.png"', '[dirt]\nimage = "m.png"', '[holdout]\nimage = "m.png"'):
+        with pytest.raises(FlarewrightError, match=r"^shot\.toml: m\.png does not exist; a dropped file comes alone"):
+            take_in(session, "shot.toml", text.replace("my-lens.toml", "tessar-brendel").encode() + more.encode())
+    assert session.project is before
+    session.keeper.close()
+
+
 def test_without_a_name_the_last_file_is_opened_again(tmp_path):
     session, _ = begin(None)
     session.do("move_light", {"light": 0, "x": 4.0, "y": 2.0})
@@ -217,6 +309,46 @@ def test_what_is_refused_is_said_in_words(project, name, values, said):
     with pytest.raises(FlarewrightError) as told:
         done(project, name, values)
     assert str(told.value).startswith(said)
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "said"),
+    [
+        ("move_light", {"light": 0, "x": 100.0, "y": 3.0}, "100° right became 80°: a light goes out to 80° at most"),
+        ("move_light", {"light": 0, "x": 10.0, "y": -90.0}, "-90° up became -80°: a light goes out to 80° at most"),
+        ("move_light", {"light": 0, "x": 10.0, "y": 3.0}, ""),
+        ("set_iris", {"values": {"blades": 2}}, "2 blades became a round opening: an iris has 3 blades at least"),
+        ("set_iris", {"values": {"blades": 5}}, ""),
+        ("set_iris", {"values": {"rounding": 0.5}}, ""),
+        ("set_fields", {"values": {"f_number": 1}}, "f/1 became f/3.5: this lens opens no wider"),
+        ("set_fields", {"values": {"f_number": 5.6}}, ""),
+        ("set_key", {"light": 0, "at_s": -1.0}, "-1 s became 0 s: a path begins there"),
+        ("set_key", {"light": 0, "at_s": 0.123}, "0.123 s became 0.12 s: keys stand at hundredths"),
+        ("set_key", {"light": 0, "at_s": 0.07}, ""),
+    ],
+)
+def test_a_number_that_was_typed_and_corrected_is_told(name, values, said):
+    session, _ = begin(None)
+    told = session.do(name, values)
+    assert told.startswith(said)
+    assert bool(told) == bool(said)
+    # a hand that slides sees what becomes of it
+    assert session.do(name, values, "stroke") == ""
+    session.keeper.close()
+
+
+def test_a_round_iris_gets_three_blades_where_one_is_typed():
+    session, _ = begin(None)
+    session.do("set_iris", {"values": {"blades": 0}})
+    assert session.do("set_iris", {"values": {"blades": 1}}).startswith("1 blades became 3: an iris has 3 blades")
+    session.keeper.close()
+
+
+def test_lights_that_are_added_have_names_of_their_own(project):
+    three = do(do(project, "add_light"), "add_light")
+    assert [light.name for light in three.lights] == ["light", "light 2", "light 3"]
+    two = do(three, "remove_light", light=1)
+    assert [light.name for light in do(two, "add_light").lights] == ["light", "light 3", "light 4"]
 
 
 def test_a_deed_on_a_row_is_none_on_a_row_of_another_lens():

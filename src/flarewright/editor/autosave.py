@@ -6,7 +6,7 @@ import hashlib
 import json
 import os
 import sys
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -86,7 +86,10 @@ def write_autosave(path: Path, saved: Saved) -> None:
         "stamps": saved.stamps,
         "view": saved.view.model_dump(mode="json"),
         "moments": [
-            {"label": m.label, "group": m.group, "file": m.file, "project": m.project.model_dump(mode="json")}
+            {
+                "label": m.label, "group": m.group, "file": m.file, "begins": m.begins,
+                "project": m.project.model_dump(mode="json"),
+            }
             for m in moments
         ],
     }  # fmt: skip
@@ -105,6 +108,9 @@ def read_autosave(path: Path) -> Saved | None:
             # what was written before steps knew their file has one for all
             Moment(Project.model_validate(m["project"]), str(m["label"]), str(m["group"]), m.get("file", data["file"]))
             for m in data["moments"]
+        )
+        moments = tuple(
+            replace(one, begins=bool(m.get("begins"))) for one, m in zip(moments, data["moments"], strict=True)
         )
         at = int(data["at"])
         if not 0 <= at < len(moments):

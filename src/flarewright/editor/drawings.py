@@ -15,6 +15,7 @@ from ..errors import FlarewrightError, OutputError, ProjectError
 from ..io.atomic import write_atomically
 from ..io.coating_text import format_coating
 from ..io.library import lens_path, shipped
+from ..io.mask_image import read_mask
 from ..model import Coating, Project, Surface
 from ..model.design import Bounds
 from ..optics.coating_response import WAVELENGTHS_NM, coating_response
@@ -34,6 +35,28 @@ from .view import View
 THUMB_SCALE = 0.25
 # thumbnails are drawn one at a time: they are many, and the picture in the viewport comes first
 _THUMBS = Gate()
+
+
+def mask_png(project: Project) -> bytes:
+    """Return the mask of a project's iris as PNG, to be drawn on.
+
+    Parameters
+    ----------
+    project : Project
+
+    Returns
+    -------
+    bytes
+
+    Raises
+    ------
+    ProjectError
+        It has none, or one that cannot be read.
+    """
+    iris = project.iris
+    if iris is None or iris.mask is None:
+        raise ProjectError("the iris has no mask; load or draw one")
+    return png(np.round(255.0 * read_mask(iris.mask)).astype(np.uint8))
 
 
 @dataclass(frozen=True)

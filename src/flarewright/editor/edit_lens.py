@@ -468,8 +468,13 @@ def _row(k: int, row: Row, coat: Any, told: dict[str, str]) -> dict[str, Any]:
         "radius": "flat" if row.curvature == 0.0 else _text(1.0 / row.curvature),
         "thickness": _text(row.thickness),
         "glass": "" if medium is None else medium.glass or "",
-        "n_d": "" if medium is None else f"{medium.n_d:.5g}",
-        "v_d": "" if medium is None or medium.v_d is None else f"{medium.v_d:.4g}",
+        # what was typed stands there; a glass has the digits of its catalogue
+        "n_d": "" if medium is None else f"{medium.n_d:.5g}" if medium.glass else _text(medium.n_d),
+        "v_d": ""
+        if medium is None or medium.v_d is None
+        else f"{medium.v_d:.4g}"
+        if medium.glass
+        else _text(medium.v_d),
         "semi_diameter": "" if row.semi_diameter is None else _text(row.semi_diameter),
         "estimated": row.semi_diameter_estimated,
         "coating": "" if coat is None else format_coating(coat),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import count
 from typing import Any
 
 from ..errors import ProjectError
@@ -36,9 +37,10 @@ def set_light(project: Project, light: int, values: dict[str, Any]) -> Project:
 
 def add_light(project: Project) -> Project:
     """Add a light on the other side of the picture."""
-    last = project.lights[-1]
-    x, y = last.field_deg
-    new = Light(name=f"light {len(project.lights) + 1}", field_deg=(-x, y), spectrum=BlackBody(temperature_k=3200.0))
+    x, y = project.lights[-1].field_deg
+    taken = {light.name for light in project.lights}
+    name = next(name for k in count(len(project.lights) + 1) if (name := f"light {k}") not in taken)
+    new = Light(name=name, field_deg=(-x, y), spectrum=BlackBody(temperature_k=3200.0))
     return _with(project, lights=(*project.lights, new))
 
 
@@ -60,10 +62,12 @@ def set_quality(project: Project, values: dict[str, Any]) -> Project:
 
 
 def set_fields(project: Project, values: dict[str, Any]) -> Project:
-    """Change fields of the project itself: f_number, zoom."""
+    """Change fields of the project itself: f_number, as far as the lens opens, and zoom."""
     known = {"f_number", "zoom"}
     if unknown := set(values) - known:
         raise ProjectError(f"{', '.join(sorted(unknown))} cannot be set here; known are {', '.join(sorted(known))}")
+    if (f_number := values.get("f_number")) is not None:
+        values = {**values, "f_number": max(f_number, as_lens(project.lens).f_number)}
     changed = _with(project, **values)
     settle(changed)
     return changed

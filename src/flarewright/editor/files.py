@@ -17,7 +17,7 @@ from ..errors import FlarewrightError, LensError, OutputError, ProjectError
 from ..io.atomic import write_atomically
 from ..io.exr import write_exr
 from ..io.lens_writer import format_lens
-from ..io.library import lens_path, shipped
+from ..io.library import lens_path, near_names, shipped
 from ..io.project_file import project_from_data, project_text, read_project
 from ..io.project_text import LENS_SUFFIXES
 from ..io.text_file import read_toml
@@ -86,6 +86,42 @@ def open_any(text: str) -> tuple[Project, str | None]:
     return project_for_lens(name), None
 
 
+def opened(text: str) -> tuple[Project, str | None]:
+    """Open what a person asks the page for: as `open_any`, but what does not exist is told in the page's words.
+
+    Parameters
+    ----------
+    text : str
+
+    Returns
+    -------
+    project : Project
+    file : str or None
+
+    Raises
+    ------
+    FlarewrightError
+        When it is neither a project, a lens file nor a shipped lens.
+    """
+    text = text.strip()
+    path = Path(text).expanduser()
+    try:
+        return open_any(text)
+    except LensError as error:
+        if path.exists():
+            raise LensError(_without_commands(str(error))) from None
+    near = () if path.suffix or path.parent != Path() else near_names(text)
+    hint = f"did you mean {' or '.join(near)}?" if near else "the panel Library shows every lens"
+    raise LensError(
+        f"there is no file and no lens {text!r}: {hint}{'' if near else '; a file is found by its whole path'}"
+    )
+
+
+def _without_commands(words: str) -> str:
+    """Leave out what only helps in a terminal: the page shows every lens by itself."""
+    return words.replace(" (flarewright lenses lists them)", " of the panel Library")
+
+
 def read_toml_of(path: Path) -> dict[str, object]:
     """Read TOML; a file that is none is told in one sentence."""
     try:
@@ -149,15 +185,26 @@ def imported(name: str, data: bytes, folder: Path) -> Imported:
             if _is_project(table):
                 found = project_from_data(table, folder=folder, where=plain)
                 settle(found)
+                for image in _images(found):
+                    if Path(image).parent == folder and not Path(image).is_file():
+                        raise ProjectError(f"{image} does not exist")
                 return Imported(project=found)
         lens = load_lens(path, remarks=remarks)
     except FlarewrightError as error:
         # the folder is ours, and means nothing to a person
-        words = str(error).replace(str(path), plain)
+        words = _without_commands(str(error)).replace(str(path), plain)
         if str(folder) in words:
             words = f"{plain}: {words.replace(f'{folder}/', '')}; a dropped file comes alone, so use Open for this one"
         raise type(error)(words) from None
     return Imported(lens=lens.replace(name=lens.name or plain), remarks=tuple(remarks))
+
+
+def _images(project: Project) -> tuple[str, ...]:
+    """Return the paths of all pictures that a project reads."""
+    iris = None if project.iris is None else project.iris.mask
+    holdouts = (project.holdout, *(light.holdout for light in project.lights))
+    hiding = (path for holdout in holdouts if holdout is not None for path in (holdout.image, holdout.depth))
+    return tuple(path for path in (iris, project.dirt.image, *hiding) if path is not None)
 
 
 def _write_bytes(path: Path, data: bytes) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hmac
 from collections.abc import Awaitable, Callable, MutableMapping
 from typing import Any
-from urllib.parse import parse_qs, urlsplit
+from urllib.parse import parse_qs, quote, unquote, urlsplit
 
 Scope = MutableMapping[str, Any]
 Receive = Callable[[], Awaitable[MutableMapping[str, Any]]]
@@ -45,7 +45,7 @@ class Guard:
             await send({"type": "http.response.body", "body": body})
 
     def _welcome(self, scope: Scope) -> bool:
-        headers = {key.decode().lower(): value.decode("latin-1") for key, value in scope["headers"]}
+        headers = _headers(scope)
         host = headers.get("host", "")
         origin = headers.get("origin")
         # another site's page may not send requests here, with or without the token
@@ -60,20 +60,32 @@ class Guard:
         token = self._token
         if token is None or scope["type"] != "http" or "token" not in parse_qs(scope["query_string"].decode()):
             return send
+        name = _cookie_of(_headers(scope))
 
         async def remember(message: MutableMapping[str, Any]) -> None:
             if message["type"] == "http.response.start":
-                cookie = f"{COOKIE}={token}; HttpOnly; SameSite=Strict; Path=/"
+                # whatever signs the token has, they must come back as they are
+                cookie = f"{name}={quote(token, safe='')}; HttpOnly; SameSite=Strict; Path=/"
                 message["headers"] = [*message.get("headers", []), (b"set-cookie", cookie.encode())]
             await send(message)
 
         return remember
 
 
+def _headers(scope: Scope) -> dict[str, str]:
+    return {key.decode().lower(): value.decode("latin-1") for key, value in scope["headers"]}
+
+
+def _cookie_of(headers: dict[str, str]) -> str:
+    """Return the name of the cookie: one a port, for browsers share cookies between the ports of a machine."""
+    port = headers.get("host", "").rpartition(":")[2]
+    return f"{COOKIE}_{port}" if port.isdigit() else COOKIE
+
+
 def _given(scope: Scope, headers: dict[str, str]) -> list[str]:
     found = list(parse_qs(scope["query_string"].decode()).get("token", []))
     for part in headers.get("cookie", "").split(";"):
         name, _, value = part.strip().partition("=")
-        if name == COOKIE:
-            found.append(value)
+        if name == _cookie_of(headers):
+            found.append(unquote(value))
     return found

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from ..model import Project
+from ..model import Design, Project
 
 MOST = 200
 
@@ -22,12 +22,15 @@ class Moment:
         Changes of one group follow each other as one step: all positions of a slider while it is held.
     file : str or None
         The project file that it belongs to.
+    begins : bool
+        Whether it is another project than the one before: opened, not edited.
     """
 
     project: Project
     label: str
     group: str = ""
     file: str | None = None
+    begins: bool = False
 
 
 @dataclass(frozen=True)
@@ -63,7 +66,9 @@ def begun(project: Project, label: str = "Open", file: str | None = None) -> His
     return History((Moment(project, label, file=file),))
 
 
-def committed(history: History, project: Project, label: str, group: str = "", *, file: str | None = None) -> History:
+def committed(
+    history: History, project: Project, label: str, group: str = "", *, file: str | None = None, begins: bool = False
+) -> History:
     """Add a project; what was undone before is forgotten.
 
     Parameters
@@ -75,6 +80,8 @@ def committed(history: History, project: Project, label: str, group: str = "", *
         When it is that of the present moment, which is the last, the new project takes its place.
     file : str or None
         The project file that it belongs to.
+    begins : bool
+        As `Moment.begins`.
 
     Returns
     -------
@@ -87,8 +94,23 @@ def committed(history: History, project: Project, label: str, group: str = "", *
     kept = history.moments[: history.at + 1]
     if group and group == last.group and history.at > 0 and history.at + 1 == len(history.moments):
         kept = kept[:-1]
-    moments = (*kept, Moment(project, label, group, file))[-MOST:]
+    moments = (*kept, Moment(project, label, group, file, begins))[-MOST:]
     return History(moments, len(moments) - 1)
+
+
+def design_before_scratch(history: History) -> Design | None:
+    """Return the design as it was before it left the lens' own ghosts out; None where it does not, or always did."""
+    before = history.present.design
+    for moment in reversed(history.moments[: history.at + 1]):
+        before = moment.project.design
+        if before is None or before.own_ghosts:
+            break
+    return None if before is None or not before.own_ghosts or before is history.present.design else before
+
+
+def beginning(history: History) -> Moment | None:
+    """Return the moment in which the present project was opened; None where that is no step of the history."""
+    return next((moment for moment in reversed(history.moments[: history.at + 1]) if moment.begins), None)
 
 
 def filed(history: History, file: str | None) -> History:

@@ -53,7 +53,7 @@ def take_in(session: Session, name: str, data: bytes, use: str = "", light: int 
     elif use:
         raise ProjectError(f"{name} is no picture; give a PNG, JPEG or EXR file")
     elif found.project is not None:
-        session.put(found.project, f"Import {name}")
+        session.put(found.project, f"Import {name}", begins=True)
     elif found.lens is not None:
         session.put(choose_lens(session.project, found.lens), f"Import {name}")
     return found.remarks

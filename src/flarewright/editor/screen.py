@@ -26,6 +26,8 @@ from .view import View
 
 # of a picture that rests
 QUALITY = 92
+# exposures of lenses that were shown before
+MOST_EXPOSURES = 30
 # a hand that has not moved for so long is looking, and sees no draft any more
 HOLD_S = 0.15
 
@@ -43,6 +45,8 @@ class Screen:
         self.picture: Picture | None = None
         self.seen: Seen | None = None
         self.match = Match()
+        # what lenses were shown with when others took their place: whoever leads back to one sees it as it was
+        self.exposures: list[tuple[Project, float]] = []
         # False while the lens has shown no ghost that its exposure could be found for
         self.exposed = True
         self.problem = ""
@@ -125,6 +129,15 @@ class Screen:
         """What the picture is shown with."""
         own = self.session.view.exposure_stops
         return self.match.exposure_stops if own is None else own
+
+    def leave(self, project: Project) -> None:
+        """Keep the exposure of a lens that another one takes the place of."""
+        kept = [each for each in self.exposures if each[0] != project][1 - MOST_EXPOSURES :]
+        self.exposures = [*kept, (project, self.match.exposure_stops)]
+
+    def known_exposure(self, project: Project) -> float | None:
+        """Return what a project was shown with when another lens took the place of its own; None where none did."""
+        return next((stops for each, stops in self.exposures if each == project), None)
 
     def expose(self) -> None:
         """Find the exposure anew, by what is shown now.

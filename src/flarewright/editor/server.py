@@ -75,8 +75,10 @@ def _state(desk: Desk, _request: Request, _body: Any) -> Any:
 def _do(desk: Desk, _request: Request, body: Any) -> Any:
     table = body.get("table")
     group = str(body.get("group", ""))
-    desk.session.do(str(body["name"]), dict(body.get("values", {})), group, None if table is None else str(table))
-    return desk.state()
+    became = desk.session.do(
+        str(body["name"]), dict(body.get("values", {})), group, None if table is None else str(table)
+    )
+    return desk.state() | {"became": became}
 
 
 def _view(desk: Desk, _request: Request, body: Any) -> Any:
@@ -198,6 +200,10 @@ def _colour_map(desk: Desk, request: Request, _body: Any) -> Any:
     return Response(data, media_type="image/png", headers=_FRESH)
 
 
+def _mask(desk: Desk, _request: Request, _body: Any) -> Any:
+    return Response(drawings.mask_png(desk.session.project), media_type="image/png", headers=_FRESH)
+
+
 def _places(desk: Desk, _request: Request, _body: Any) -> Any:
     return {"places": drawings.places(desk.session.project)}
 
@@ -289,14 +295,17 @@ def _plain(stem: str) -> str:
     return "".join(c if c.isascii() and (c.isalnum() or c in "-_.") else "_" for c in stem) or "flare"
 
 
+def _seconds(body: Any) -> float:
+    return min(max(float(body.get("seconds", 30.0)), 1.0), MOST_SECONDS)
+
+
 def _solve(desk: Desk, _request: Request, body: Any) -> Any:
-    seconds = min(max(float(body.get("seconds", 30.0)), 1.0), MOST_SECONDS)
-    desk.solver.start(seconds)
+    desk.solver.start(_seconds(body))
     return desk.state()
 
 
 def _colors(desk: Desk, _request: Request, body: Any) -> Any:
-    desk.solver.start_colors(str(body.get("kind", "quarter-wave")))
+    desk.solver.start_colors(str(body.get("kind", "quarter-wave")), _seconds(body))
     return desk.state()
 
 
@@ -327,7 +336,8 @@ def _jpeg(data: bytes, more: dict[str, str] | None = None) -> Response:
 _GET = {
     "/api/state": _state, "/api/picture": _picture, "/api/moving": _moving, "/api/target": _target,
     "/api/pick": _pick, "/api/outline": _outline, "/api/ghosts": _ghosts, "/api/section": _section,
-    "/api/coating": _coating, "/api/map": _colour_map, "/api/places": _places, "/api/library": _library,
+    "/api/coating": _coating, "/api/map": _colour_map, "/api/mask": _mask,
+    "/api/places": _places, "/api/library": _library,
     "/api/thumbnail/{name}": _thumbnail, "/api/glasses": _glasses, "/api/command": _command,
     "/api/export/{kind}": _export, "/api/candidate/{k}": _candidate,
 }  # fmt: skip

@@ -10,13 +10,14 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from ..errors import ProjectError
+from ..errors import FlarewrightError, ProjectError
 from ..model import Project
 from . import history as past
 from .autosave import Saved, autosave_path, read_autosave
+from .corrections import correction
 from .deeds import done
 from .edit_lens import table_of
-from .files import open_any, project_path, sample_project, save_project, stamp_of
+from .files import open_any, opened, project_path, sample_project, save_project, stamp_of
 from .keeper import Keeper, claim, claim_last
 from .view import View
 from .words import sentence
@@ -37,8 +38,9 @@ class Session:
     def __init__(self, saved: Saved, keeper: Keeper) -> None:
         self.lock = threading.RLock()
         self.history, self.view = past.filed(saved.history, saved.file), saved.view
-        self.clean = saved.clean
         self.revision = 0
+        # counts up where another project takes the place of the one before
+        self.opened = 0
         self.listeners: list[Listener] = []
         self.keeper = keeper
         # what project files held when they were opened or saved here last, and what was found there instead
@@ -46,6 +48,15 @@ class Session:
         if self.file is not None and self.file not in self._stamps:
             self._stamp(self.file, stamp_of(self.file))
         self._refused: tuple[Path, str] | None = None
+        # what project files hold, as far as it was read or written here
+        self._held: dict[str, Project] = {}
+        if self.file is not None:
+            self._hold(self.file, self.project if saved.clean else _held_by(self.file, self._stamps))
+
+    @property
+    def clean(self) -> bool:
+        """Whether the project file holds the present project."""
+        return self.file is not None and self._held.get(self.file) == self.project
 
     @property
     def file(self) -> str | None:
@@ -62,10 +73,11 @@ class Session:
         for listener in tuple(self.listeners):
             listener(event)
 
-    def do(self, name: str, values: dict[str, Any], group: str = "", table: str | None = None) -> None:
+    def do(self, name: str, values: dict[str, Any], group: str = "", table: str | None = None) -> str:
         """Do something to the project (`deeds.DEEDS`), or refuse it and leave everything as it was.
 
-        `table` is the prescription that a deed on one of its rows was meant for (`edit_lens.table_of`).
+        `table` is the prescription that a deed on one of its rows was meant for (`edit_lens.table_of`). Returned is
+        what became of a number that was not taken as it was typed; a hand that slides, in a group, sees it.
         """
         with self.lock:
             if table is not None and table != table_of(self.project):
@@ -75,11 +87,12 @@ class Session:
                 )
             project, label = done(self.project, name, values)
             self._move(past.committed(self.history, project, label, group, file=self.file))
+            return "" if group else correction(name, values, project)
 
-    def put(self, project: Project, label: str) -> None:
-        """Take a whole project as the next moment."""
+    def put(self, project: Project, label: str, *, begins: bool = False) -> None:
+        """Take a whole project as the next moment; `begins` tells that it is another one."""
         with self.lock:
-            self._move(past.committed(self.history, project, label, file=self.file))
+            self._move(past.committed(self.history, project, label, file=self.file, begins=begins))
 
     def undo(self) -> None:
         """Go back a moment."""
@@ -118,7 +131,8 @@ class Session:
         with self.lock:
             self._spare(project_path(text))
             path = save_project(self.project, text)
-            self.history, self.clean = past.filed(self.history, str(path)), True
+            self.history = past.filed(self.history, str(path))
+            self._hold(str(path), self.project)
             self._stamp(str(path), stamp_of(path))
             self._refused = None
             self._changed()
@@ -141,16 +155,21 @@ class Session:
         """Open another project or lens; undo leads back."""
         with self.lock:
             before = stamp_of(Path(text).expanduser())
-            project, file = open_any(text)
-            self.history = past.committed(self.history, project, f"Open {Path(text).name}", file=file)
-            self.clean = file is not None
+            project, file = opened(text)
             if file is not None:
+                self._hold(file, project)
                 self._stamp(file, before)
-            self._changed()
+            label = f"Open {Path(text).name}"
+            self._move(past.committed(self.history, project, label, file=file, begins=True))
+
+    def _hold(self, file: str, project: Project | None) -> None:
+        if project is not None:
+            self._held[file] = project
 
     def _move(self, history: past.History) -> None:
         if history is not self.history and history != self.history:
-            self.history, self.clean = history, False
+            self.opened += past.beginning(history) is not past.beginning(self.history)
+            self.history = history
             self._changed()
 
     def _changed(self) -> None:
@@ -162,6 +181,14 @@ class Session:
         saved = Saved(self.history, self.view, self.file, self.clean, dict(self._stamps))
         warning = {"type": "message", "kind": "warning"}
         self.keeper.keep(saved, lambda why: self.tell(warning | {"text": f"The autosave failed: {why}"}))
+
+
+def _held_by(file: str, stamps: dict[str, str]) -> Project | None:
+    """Return what a project file holds, where nobody has changed it since; None where that cannot be known."""
+    try:
+        return open_any(file)[0] if stamp_of(file) == stamps.get(file) else None
+    except FlarewrightError:
+        return None
 
 
 def begin(what: str | None) -> tuple[Session, str]:

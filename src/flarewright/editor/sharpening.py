@@ -44,8 +44,9 @@ def sharpen(screen: Screen, project: Project, view: View, check: Check) -> None:
     # another lens has an exposure of its own; while one is worked on it is held, so that brightness can be compared
     if shown is None and view.found_stops is not None:
         screen.match = Match(exposure_stops=view.found_stops)
-    fresh = view.found_stops is None if shown is None else studio.lens_name(shown.project) != studio.lens_name(project)
-    fresh = fresh or not screen.exposed
+    other = shown is not None and studio.lens_name(shown.project) != studio.lens_name(project)
+    known = screen.known_exposure(studio.pictured(project)) if other else None
+    fresh = known is None and (other or not screen.exposed or (shown is None and view.found_stops is None))
     changed = shown is None or not studio.same_scene(shown.project, project)
     working = view.grey or view.unclipped
     followed = screen.moved is not None and studio.same_scene(screen.moved, project)
@@ -53,7 +54,13 @@ def sharpen(screen: Screen, project: Project, view: View, check: Check) -> None:
     if changed or working or (screen.final_s > SOON_S and not followed):
         draft = studio.take(project, "draft", view, levels=() if changed else screen.match.levels)
         check()
-        if fresh:
+        if other and shown is not None and screen.exposed:
+            screen.leave(studio.pictured(shown.project))
+        if known is not None:
+            # where undo leads back to another lens, it is shown as it was
+            screen.exposed, screen.match = True, Match(exposure_stops=known)
+            screen.session.remember(known)
+        elif fresh:
             # a grey picture tells nothing of the exposure
             plain = studio.take(project, "draft", View()) if draft.grey else draft
             screen.match = Match(exposure_stops=_exposure(screen, plain))

@@ -167,7 +167,7 @@ def plate_for(look: View, size_px: tuple[int, int]) -> Floats | None:
 
 
 def _read_image(path: Path) -> Floats:
-    from PIL import Image, UnidentifiedImageError
+    from PIL import Image, ImageOps, UnidentifiedImageError
 
     try:
         with Image.open(path) as image:
@@ -175,7 +175,13 @@ def _read_image(path: Path) -> Floats:
             if image.mode.startswith("I"):
                 grey = np.asarray(image, dtype=np.float32) / 65535.0
                 return _linear(np.repeat(grey[..., None], 3, axis=2))
-            return _linear(np.asarray(image.convert("RGB"), dtype=np.float32) / 255.0)
+            # as the camera was held
+            upright = ImageOps.exif_transpose(image)
+            if not upright.has_transparency_data:
+                return _linear(np.asarray(upright.convert("RGB"), dtype=np.float32) / 255.0)
+            # what is clear has no light, whatever colour is kept there
+            pixels = np.asarray(upright.convert("RGBA"), dtype=np.float32) / 255.0
+            return np.asarray(_linear(pixels[..., :3]) * pixels[..., 3:])
     except (OSError, UnidentifiedImageError, ValueError):
         raise ProjectError(f"{path.name} is no picture that can be read; give an EXR, PNG or JPEG file") from None
 

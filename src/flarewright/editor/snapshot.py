@@ -13,8 +13,9 @@ from .edit_lens import prescription, table_of
 from .edit_path import length_s
 from .edit_shot import coating_text
 from .edit_wishes import direction, wish_names
+from .history import History, design_before_scratch
 from .screen import Screen
-from .shown import aces_available
+from .shown import FALSE_COLOURS, aces_available
 from .solving import Solver
 from .studio import pictured, view_size
 
@@ -39,6 +40,7 @@ def state_of(screen: Screen, solver: Solver) -> dict[str, Any]:
     return {
         "revision": session.revision,
         "file": session.file,
+        "opened": session.opened,
         "clean": session.clean,
         "undo": history.undo_label,
         "redo": history.redo_label,
@@ -57,7 +59,7 @@ def state_of(screen: Screen, solver: Solver) -> dict[str, Any]:
         "pass_gain": dict(project.art.gain),
         "solo": list(soloed(project.art)),
         "by_hand": len(project.art.rules) + len(project.art.gain),
-        "design": _design(project),
+        "design": _design(project, history),
         "view": session.view.model_dump(mode="json") | {"stops": round(screen.exposure_stops, 2)},
         "frame": {"size": list(view_size(project)), "sensor": list(project.camera.sensor)},
         "direction": list(direction(project)),
@@ -65,6 +67,7 @@ def state_of(screen: Screen, solver: Solver) -> dict[str, Any]:
         "remarks": list(shown.remarks) if shown is not None else [],
         "solve": solve_of(solver),
         "aces": aces_available(),
+        "false_colours": [[stops, "#{:02x}{:02x}{:02x}".format(*colour)] for stops, colour in FALSE_COLOURS],
     }
 
 
@@ -77,6 +80,8 @@ def _picture(screen: Screen) -> dict[str, Any]:
         "problem": screen.problem,
         # whether it shows the project as it stands
         "current": shown is not None and pictured(shown.project) == pictured(screen.session.project),
+        # where its lights are: a hand may have moved on while it was packed
+        "lights": [] if shown is None else [light.field_deg for light in shown.project.lights],
     }
 
 
@@ -131,11 +136,16 @@ def _iris(project: Project) -> dict[str, Any]:
     return iris.model_dump(mode="json")
 
 
-def _design(project: Project) -> dict[str, Any] | None:
+def _design(project: Project, history: History) -> dict[str, Any] | None:
     design = project.design
     if design is None:
         return None
-    return design.model_dump(mode="json", exclude={"bounds"}) | {"names": list(wish_names(design))}
+    # what is searched among again where nothing begins from scratch any more
+    before = design_before_scratch(history)
+    kept = None if before is None else before.model_dump(mode="json", include={"structure", "fixed_rows"})
+    return design.model_dump(mode="json", exclude={"bounds"}) | {
+        "names": list(wish_names(design)), "before_scratch": kept,
+    }  # fmt: skip
 
 
 def ghosts_of(screen: Screen) -> dict[str, Any]:

@@ -11,10 +11,11 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..design.candidate import Outcome, outcomes
 from ..design.color_search import solve_colors
-from ..design.colors import coated, color_problem
+from ..design.colors import ColorProblem, Floats, coated, color_problem, colors_of, perceived_differences
 from ..design.hunt import until
 from ..design.impossible import obstacles
 from ..design.polish import compile_kernels
@@ -38,6 +39,8 @@ LOOK_EVERY_S = 1.0
 THUMB_SCALE = 0.4
 # of a ghost's place or size
 UNSEEN_MM = 1e-3
+# of a colour, by Oklab; up to so much is not seen side by side, or is still the same hue
+UNSEEN_COLOR, NEAR_COLOR = 0.02, 0.1
 
 GETTING_READY = "Getting ready; the first search of a machine takes a minute more"
 HOW_WELL = {"met": "met", "nearly": "nearly met"}
@@ -120,7 +123,7 @@ class Solver:
         problem, settled = _in_words(problem_of, project)
         self._begin(partial(self._search, project, problem, settled.lens.name, seconds))
 
-    def start_colors(self, kind: str) -> None:
+    def start_colors(self, kind: str, seconds: float) -> None:
         """Begin to search coatings for the wished colours."""
         project = self.session.project
         wishes = () if project.design is None else project.design.wishes
@@ -130,17 +133,22 @@ class Solver:
         films: Any = "film" if kind == "film" else "quarter-wave"
         problem, lens = _in_words(partial(color_problem, kind=films), project)
 
-        def work(_: threading.Event, ready: threading.Event) -> None:
+        def work(stop: threading.Event, ready: threading.Event) -> None:
             ready.set()
-            found = solve_colors(problem)
+            begun = time.perf_counter()
+            found = solve_colors(
+                problem, time_limit=seconds, cancelled=stop.is_set,
+                note=lambda step: self._tell(True, "Searching coatings", step.seconds, ()),
+            )  # fmt: skip
+            took = time.perf_counter() - begun
             # nobody sees, or evaporates, a hundredth of a nanometre
             values = np.round(found.values, 2) if films == "quarter-wave" else found.values
-            new = coated(lens, problem.structure, films, values)
+            new = coated(lens, problem.rows, films, values)
             # the glass stays as it was, and so do opening and zoom
             worn = tuple(row.coating if isinstance(row, Surface) else None for row in new.rows)
-            words = "This lens, with coatings for the wished colours"
+            words = coloured(problem, values)
             changes = {"lens": project.lens, "coating": PerRow(coatings=worn)}
-            self._tell(False, words, 0.0, (_found(project, changes, words),))
+            self._tell(False, "Coatings were found", took, (_found(project, changes, words),))
 
         self._begin(work)
 
@@ -262,6 +270,42 @@ def described(lens: Lens) -> str:
     """Say in a few words what a lens is."""
     surfaces = sum(isinstance(row, Surface) for row in lens.rows)
     return f"{surfaces} surfaces, {first_order(lens).efl:.3g} mm f/{lens.f_number:.3g}"
+
+
+def coloured(problem: ColorProblem, values: Floats) -> str:
+    """Say how near coatings come to the wished colours, and how well the other ghosts keep theirs.
+
+    Parameters
+    ----------
+    problem : ColorProblem
+    values : ndarray, shape (M, P)
+        As in `Coatings`.
+
+    Returns
+    -------
+    str
+    """
+    off = perceived_differences(problem, colors_of(problem, values))
+    names = [f"{j}-{i}" for j, i in problem.structure.pairs]
+
+    def said(what: str, chosen: NDArray[np.bool_], words: tuple[str, str, str]) -> str:
+        worst = int(np.argmax(np.where(chosen, off, -1.0)))
+        how = words[int(np.searchsorted((UNSEEN_COLOR, NEAR_COLOR), off[worst]))]
+        farthest = "" if how == words[0] else f", ghost {names[worst]} is farthest off, by {off[worst]:.2g}"
+        return f"{what}: {how}{farthest}"
+
+    counted = problem.weights > 0.0
+    told = []
+    if (wished := problem.hue_only & counted).any():
+        told.append(said("Wished colours", wished, ("met", "nearly met", "not met")))
+    if (others := ~problem.hue_only & counted).any():
+        told.append(said("the other ghosts", others, ("kept", "nearly kept", "changed")))
+    if any("farthest" in words for words in told):
+        told.append(f"{UNSEEN_COLOR:g} is just seen side by side")
+    if problem.kept:
+        rows = ", ".join(str(k) for k in problem.kept)
+        told.append(f"the cemented rows ({rows}) stay bare, for no film can be put there")
+    return "; ".join(told)
 
 
 def judged(one: Outcome, problem: Problem) -> str:

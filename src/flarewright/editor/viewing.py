@@ -8,7 +8,7 @@ from . import studio
 from .edit_wishes import new_discs, target_project
 from .screen import QUALITY, Screen
 from .seen import alone, is_there, outline, under
-from .shown import jpeg, pixels_of, png
+from .shown import jpeg, pixels_of, plate_for, png
 
 OUTLINE = (240, 176, 84)
 # ghosts under the pointer that are looked at closely before one is believed
@@ -29,7 +29,8 @@ def target_jpeg(screen: Screen) -> bytes:
     for x, y, radius in new_discs(project):
         away = np.hypot(columns - width / 2 - x * across, rows - height / 2 + y * across)
         light[away < radius * across] += np.float32(level)
-    return jpeg(pixels_of(light, screen.exposure_stops, view), QUALITY)
+    plate = plate_for(view, (width, height))
+    return jpeg(pixels_of(light, screen.exposure_stops, view, plate), QUALITY)
 
 
 def picked(screen: Screen, u: float, v: float) -> tuple[str, ...]:

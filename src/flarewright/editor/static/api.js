@@ -39,21 +39,23 @@ export function inWords(error) {
   const lost = error instanceof TypeError && /fetch/i.test(error.message);
   return lost ? 'The editor does not answer. Start flarewright edit again; nothing is lost.' : sentence(error.message);
 }
-export const complain = (error) => toast(inWords(error), 'error');
+export const complain = (error, about = '') => toast(inWords(error), 'error', 9000, about);
 
-// Only the newest call counts: while one is under way, the last of the others waits.
+// Only the newest call counts: while one is under way, the last of the others waits. What is returned waits for all.
 export function latest(work) {
-  let busy = false;
+  let running = null;
   let next = null;
-  return async function call(...values) {
-    next = values;
-    if (busy) return;
-    busy = true;
+  async function run() {
     while (next) {
       const now = next;
       next = null;
       try { await work(...now); } catch (error) { complain(error); }
     }
-    busy = false;
+    running = null;
+  }
+  return function call(...values) {
+    next = values;
+    running ??= run();
+    return running;
   };
 }

@@ -1,7 +1,7 @@
 // The page: one state from the server, drawn by panels; every change is a deed that the server does or refuses.
 import { complain, get, inWords, latest, post, sentence, under } from './api.js';
 import { fitted } from './section.js';
-import { button, dialog, h, menu, stroke, tips, toast, slider } from './ui.js';
+import { button, dialog, h, hush, menu, stroke, tips, toast, slider } from './ui.js';
 import { viewport } from './viewport.js';
 import { coatingPanel } from './panel_coating.js';
 import { ghostPanel } from './panel_ghosts.js';
@@ -22,34 +22,52 @@ const $ = (id) => document.getElementById(id);
 // What is drawn depends on, as it was told last: hands write into the state before it is told.
 const ghostsOf = (s) => JSON.stringify([s.lens.name, s.lens.rows.map((row) => row.stop)]);
 const placesOf = (s) => JSON.stringify([s.lights, s.lens, s.camera, s.iris, s.view.grey, s.view.unclipped]);
+// what the target is shown with, as the picture is
+const seenOf = (s) => JSON.stringify([s.view.look, s.view.stops, s.view.plate, s.view.plate_stops, s.view.grey, s.view.unclipped]);
 const shotOf = (s) => JSON.stringify([s.lights, s.lens, s.camera, s.iris, s.dirt, s.coating, s.pass_gain, s.by_hand, s.view.grey, s.view.unclipped]);
 let known = {};
+// as the server told it: hands write into the page's own
+let plain = null;
+let plainGhosts = null;
 function take(state) {
   if (app.state && state.revision < app.state.revision) return;
   const old = app.state;
   // what is told of the picture on its own may come before an answer that is older
   if (old && old.picture.number > state.picture.number) state.picture = old.picture;
+  plain = structuredClone(state);
   Object.assign(state.view, asked);
   app.state = state;
   app.light = Math.min(app.light, state.lights.length - 1);
   const before = known;
-  known = { ghosts: ghostsOf(state), places: placesOf(state), shot: shotOf(state), design: JSON.stringify(state.design) };
+  known = { ghosts: ghostsOf(state), places: placesOf(state), shot: shotOf(state), design: JSON.stringify(state.design), seen: seenOf(state) };
   // another lens has other ghosts, and so has one whose rows have other numbers
   if (old && before.ghosts !== known.ghosts) { Object.assign(app, { ghost: null, wish: null }); app.hint(); }
   // nor is there a new ghost any more whose wish was undone
   if (app.wish !== null && state.design?.wishes[app.wish]?.ghost !== null) app.wish = null;
   if (before.places !== known.places) app.view.forget();
+  // the path of another project begins anew
+  if (old && old.opened !== state.opened) app.player.reset();
   const moved = !old || before.shot !== known.shot;
   if (moved) {
     app.view.outline = null;
     // where a hand waits for its picture, that comes first
     if (app.view.released) app.view.afterwards = drawSection; else drawSection();
   }
-  if (moved || before.design !== known.design) { app.places(); app.view.refreshTarget(); }
+  if (moved || before.design !== known.design) app.places();
+  if (moved || before.design !== known.design || before.seen !== known.seen) app.view.refreshTarget();
   update();
   if (state.picture.number !== app.view.shownNumber) app.view.refresh(Boolean(old));
 }
 app.take = take;
+// What was refused, or never reached the server, stands nowhere on the page any more.
+app.back = () => {
+  if (!plain) return;
+  const { picture, solve } = app.state ?? plain;
+  app.state = Object.assign(structuredClone(plain), { picture, solve });
+  Object.assign(app.state.view, asked);
+  if (plainGhosts) app.ghosts = structuredClone(plainGhosts);
+  update();
+};
 export const reload = latest(async () => take(await get('/api/state')));
 
 function update() {
@@ -73,11 +91,15 @@ const fileName = (state) => (state.file ? state.file.split(/[\\/]/).pop() : stat
 // In the order in which they were asked for, so that the last word of a hand is the last.
 let line = Promise.resolve();
 app.deed = (name, values, group = '', table = null) => {
-  line = line.then(() => post('/api/do', { name, values, group, table: typeof table === 'function' ? table() : table })).then(take);
+  const about = `deed ${name}`;
+  line = line.then(() => post('/api/do', { name, values, group, table: typeof table === 'function' ? table() : table })).then((state) => {
+    hush(about);
+    take(state);
+    if (state.became) toast(sentence(state.became), 'info', 9000, about);
+  });
   const answer = line;
   line = line.catch(() => {});
-  // what was refused stands nowhere on the page any more
-  return answer.catch((error) => { complain(error); reload(); loadGhosts(); throw error; });
+  return answer.catch((error) => { complain(error, about); app.back(); reload(); loadGhosts(); throw error; });
 };
 // the rows that the page shows: a deed on one of them is none on a row of another lens
 app.table = () => app.state.lens.table;
@@ -85,7 +107,7 @@ const slow = new Map();
 // A slider may ask faster than the server answers: only its newest value is sent.
 app.lively = (name, values, group, key = name, table = null) => {
   if (!slow.has(key)) slow.set(key, latest((...asked) => app.deed(...asked).catch(() => {})));
-  slow.get(key)(name, values, group, table);
+  return slow.get(key)(name, values, group, table);
 };
 // Keys come faster than answers: the page knows at once what was asked for, and nothing that was asked is dropped.
 let asked = {};
@@ -93,7 +115,7 @@ const sendView = latest(async () => {
   const values = asked;
   asked = {};
   if (!Object.keys(values).length) return;
-  try { take(await post('/api/view', values)); } catch (error) { complain(error); reload(); }
+  try { take(await post('/api/view', values)); hush('view'); } catch (error) { complain(error, 'view'); app.back(); reload(); }
 });
 app.setView = (values) => {
   Object.assign(asked, values);
@@ -101,7 +123,14 @@ app.setView = (values) => {
   if (Number.isFinite(values.exposure_stops)) app.state.view.stops = values.exposure_stops;
   return sendView();
 };
-app.ask = async (path, body) => { try { const state = await post(path, body); take(state); return state; } catch (error) { complain(error); return null; } };
+app.ask = async (path, body) => {
+  try {
+    const state = await post(path, body);
+    hush(path);
+    take(state);
+    return state;
+  } catch (error) { complain(error, path); return null; }
+};
 
 // ------------------------------------------------------------------------------------------------------------- ghosts
 app.choose = (name, walking = false) => {
@@ -147,6 +176,7 @@ app.places = latest(async () => {
 });
 const loadGhosts = latest(async () => {
   app.ghosts = await get('/api/ghosts');
+  plainGhosts = structuredClone(app.ghosts);
   if (!app.state) return;
   app.refreshPanel();
   if (app.ghost) app.view.refreshOutline();
@@ -239,8 +269,15 @@ async function download(kind) {
 async function copyCommand() {
   try {
     const { text } = await get('/api/command');
-    await navigator.clipboard.writeText(text).catch(() => {});
-    toast(text, 'good');
+    try {
+      await navigator.clipboard.writeText(text);
+      toast(`Copied: ${text}`, 'good', 9000);
+    } catch {
+      // browsers keep the clipboard from pages of other machines
+      const box = h('textarea', { readonly: true, rows: 3, name: 'command', 'aria-label': 'Command line' }, text);
+      dialog('Command line', h('p', { class: 'quietly' }, 'It renders the saved project. Copy it with Ctrl+C.'), box);
+      box.select();
+    }
   } catch (error) { complain(error); }
 }
 // A file's name: what is refused is said beside it, so that it can be mended, or asked for once more.
@@ -265,7 +302,7 @@ function asking(title, words, value, path, done = () => {}) {
   });
   box.focus(); box.select();
 }
-const saved = (state) => toast(state.told, 'good');
+const saved = (state) => toast(state.told, 'good', 4500, '/api/save');
 function openFile() { asking('Open', 'A project file, a lens file, or a lens’ name. Files can also be dropped on the page.', '', '/api/open'); }
 function saveAs() { asking('Save', 'Where the project file shall lie, like shot.toml.', app.state.file ?? 'flare.toml', '/api/save', saved); }
 async function save() {
@@ -360,6 +397,7 @@ let nudging = null;
 function nudge(dx, dy, big) {
   const light = app.state.lights[app.light];
   nudging ??= stroke();
+  app.player.halt();
   const [x, y] = light.field_deg;
   const by = big ? 1 : 0.1;
   light.field_deg = [x + dx * by, y + dy * by];
@@ -440,9 +478,12 @@ function hear(event) {
   if (event.type === 'picture') {
     state.picture = event;
     state.view.stops = event.stops;
+    plain.view.stops = event.stops;
     working('', 1);
     if (event.number !== app.view.shownNumber) app.view.refresh(true);
     update();
+    // its ghosts are as bright as those of the last final picture
+    if (['final', 'working'].includes(event.grade)) app.view.refreshTarget();
     if (event.grade === 'final') app.remarks();
   }
   if (event.type === 'solve') { state.solve = event; panels.target.update?.(state); }

@@ -1,5 +1,5 @@
 // The timeline of a light's path.
-import { button, h, number } from './ui.js';
+import { button, h, number, toast } from './ui.js';
 
 export function pathGroup(app) {
   const { player } = app;
@@ -18,7 +18,12 @@ export function pathGroup(app) {
   loop.addEventListener('change', () => player.setLoop(loop.checked));
   bar.addEventListener('input', () => player.scrub(Number(bar.value)));
   bar.addEventListener('change', () => player.rest());
-  box.addEventListener('change', () => { const value = number(box.value); box.classList.toggle('bad', value === null); if (value !== null) player.go(value); });
+  box.addEventListener('change', () => {
+    const value = number(box.value);
+    if (value === null) toast(`Time: “${box.value}” is no number, so it stays ${player.at.toFixed(2)} s.`, 'error', 9000, 'path time');
+    else if (value < 0) toast(`${value} s became 0 s: a path begins there.`, 'info', 9000, 'path time');
+    if (value === null) box.value = player.at.toFixed(2); else player.go(value);
+  });
   box.addEventListener('keydown', (event) => { if (event.key === 'Enter') box.blur(); });
   let drawn = '';
 
@@ -44,14 +49,22 @@ export function pathGroup(app) {
   }
   function line(each, k) {
     const cell = (value, name, set) => {
-      const field = h('input', { type: 'text', value: String(Number(value.toFixed(3))), 'aria-label': `${name} of key ${k + 1}`, name: `key_${name}_${k}` });
-      field.addEventListener('change', () => { field.defaultValue = field.value; const found = number(field.value); field.classList.toggle('bad', found === null); if (found !== null) set(found); });
-      field.addEventListener('keydown', (event) => { if (event.key === 'Enter') field.blur(); if (event.key === 'Escape') { field.value = String(value); field.blur(); event.stopPropagation(); } });
+      const kept = String(Number(value.toFixed(3)));
+      const field = h('input', { type: 'text', value: kept, 'aria-label': `${name} of key ${k + 1}`, name: `key_${name}_${k}` });
+      const back = () => { drawn = ''; field.value = kept; field.defaultValue = kept; };
+      field.addEventListener('change', () => {
+        const found = number(field.value);
+        field.defaultValue = field.value;
+        if (found !== null) { set(found).catch(back); return; }
+        toast(`“${field.value}” is no number, so it stays ${kept}.`, 'error', 9000, `key ${name}`);
+        back();
+      });
+      field.addEventListener('keydown', (event) => { if (event.key === 'Enter') field.blur(); if (event.key === 'Escape') { back(); field.blur(); event.stopPropagation(); } });
       return h('td', {}, field);
     };
     const [x, y] = each.field_deg;
-    const place = (field_deg) => app.deed('set_key', { light: app.light, at_s: each.at_s, field_deg }).catch(() => { drawn = ''; });
-    return h('tr', {}, cell(each.at_s, 'seconds', (at_s) => app.deed('move_key', { light: app.light, number: k, at_s }).catch(() => { drawn = ''; })),
+    const place = (field_deg) => app.deed('set_key', { light: app.light, at_s: each.at_s, field_deg });
+    return h('tr', {}, cell(each.at_s, 'seconds', (at_s) => app.deed('move_key', { light: app.light, number: k, at_s })),
       cell(x, 'right', (value) => place([value, y])), cell(y, 'up', (value) => place([x, value])),
       h('td', {}, button('×', () => app.deed('remove_key', { light: app.light, number: k }).catch(() => {}), { kind: 'quiet', 'aria-label': `Remove key ${k + 1}` })));
   }
@@ -61,7 +74,7 @@ export function pathGroup(app) {
     loop.checked = player.loop;
     bar.max = span();
     if (!bar.matches(':active')) bar.value = player.at;
-    if (document.activeElement !== box) { box.value = player.at.toFixed(2); box.classList.remove('bad'); }
+    if (document.activeElement !== box) box.value = player.at.toFixed(2);
   }
   player.heard = tick;
   const element = h('div', { class: 'group path' }, h('h3', {}, 'Path of the light'),

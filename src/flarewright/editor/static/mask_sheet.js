@@ -9,7 +9,8 @@ const SHAPES = {
   Slit: (pen) => pen.rect(SIDE * 0.06, SIDE * 0.44, SIDE * 0.88, SIDE * 0.12),
 };
 
-export function drawMask(use) {
+// `begin` is the address of the mask so far, to go on with; null: none.
+export function drawMask(use, begin = null) {
   const canvas = h('canvas', { width: SIDE, height: SIDE, class: 'sheet', tabindex: 0, role: 'img', 'aria-label': 'The opening: draw with the pointer' });
   const pen = canvas.getContext('2d');
   let light = true;
@@ -17,6 +18,12 @@ export function drawMask(use) {
   const clear = (colour) => { pen.fillStyle = colour; pen.fillRect(0, 0, SIDE, SIDE); };
   const stamp = (shape) => { pen.fillStyle = light ? '#fff' : '#000'; pen.beginPath(); shape(pen); pen.fill(); };
   clear('#000');
+  if (begin) {
+    const before = new Image();
+    // a mask of any shape spans the opening
+    before.onload = () => { pen.drawImage(before, 0, 0, SIDE, SIDE); canvas.dataset.begun = 'yes'; };
+    before.src = begin;
+  }
   let last = null;
   const place = (event) => { const box = canvas.getBoundingClientRect(); return [(event.clientX - box.left) * SIDE / box.width, (event.clientY - box.top) * SIDE / box.height]; };
   function draw(event) {

@@ -1,5 +1,5 @@
 // The prescription: every cell can be written; what is to be said stands beside it.
-import { get, latest, post, sentence } from './api.js';
+import { complain, get, latest, post, sentence } from './api.js';
 import { button, entry, group, h } from './ui.js';
 
 const COLUMNS = [
@@ -11,7 +11,8 @@ const COLUMNS = [
   ['semi_diameter', 'Semi', 'Half the clear diameter, mm: rims cut ghosts. In italics: estimated.'],
   ['coating', 'Coating', 'none, quarter-wave:550, film:1.38:96, early-multicoat… What is coated well makes faint ghosts.'],
 ];
-const WIDTHS = ['22px', '57px', '50px', '58px', '46px', '38px', '44px', ''];
+// as many digits as are shown, and a usual coating
+const WIDTHS = ['22px', '56px', '52px', '51px', '52px', '52px', '45px', ''];
 const NAMES = ['glass', 'coating'];
 
 export function lensPanel(app) {
@@ -35,7 +36,14 @@ export function lensPanel(app) {
     drawn = '';
     written = { row, table };
     try { await app.deed_quiet('set_cell', { row, column, text }, table); wrong.textContent = ''; } catch (error) {
-      app.take(await get('/api/state'));
+      const state = await get('/api/state').catch(() => null);
+      if (!state) {
+        // the editor is gone, and nothing was written
+        complain(error);
+        draw(app.state);
+        return;
+      }
+      app.take(state);
       if (app.table() !== table) {
         // there is no such cell any more
         draw(app.state);
@@ -110,8 +118,8 @@ export function lensPanel(app) {
   const remove = button('Remove', rowDeed('remove_row'), { id: 'remove-row', tip: 'Take the chosen row out; the gap in front of it takes its room.' });
   const stop = button('Stop here', rowDeed('move_stop'), { id: 'move-stop', tip: 'The iris moves into the air in front of the chosen row, or behind it where in front is glass. The lens stays as sharp; which rays pass, and so the size of its ghosts, changes.' });
   const own = group('Lens', [
-    entry({ label: 'Name', tip: 'Of the lens.', words: true, name: 'lens_name', get: (s) => s.lens.name, set: (name) => name && app.deed('set_lens_facts', { values: { name } }).catch(() => {}) }),
-    entry({ label: 'Wide open', tip: 'The smallest f-number: sets how far the stop opens.', name: 'open', get: (s) => s.lens.open, set: (f_number) => f_number && app.deed('set_lens_facts', { values: { f_number } }).catch(() => {}) }),
+    entry({ label: 'Name', tip: 'Of the lens.', words: true, needed: 'a lens needs a name', name: 'lens_name', get: (s) => s.lens.name, set: (name) => app.deed('set_lens_facts', { values: { name } }).catch(() => {}) }),
+    entry({ label: 'Wide open', tip: 'The smallest f-number: sets how far the stop opens.', name: 'open', needed: 'needs a number', get: (s) => s.lens.open, set: (f_number) => app.deed('set_lens_facts', { values: { f_number } }).catch(() => {}) }),
   ]);
   app.deed_quiet = async (name, values, table) => {
     app.take(await post('/api/do', { name, values, table }));

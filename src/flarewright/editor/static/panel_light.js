@@ -20,8 +20,8 @@ const fitted = (key, size) => cropped(pair(key), size).map((mm) => Number(mm.toF
 export function lightPanel(app) {
   const one = (state) => state.lights[app.light];
   const set = (values, held = '') => app.lively('set_light', { light: app.light, values }, held, `light${app.light}${Object.keys(values)}`);
-  const across = entry({ label: 'Right', tip: 'Field angle: the direct image lies focal length × tan(angle) to the right of the middle.', unit: '°', name: 'light_x', digits: 3, get: (s) => one(s).field_deg[0], set: (x) => x !== null && app.deed('move_light', { light: app.light, x, y: one(app.state).field_deg[1] }).catch(() => {}) });
-  const up = entry({ label: 'Up', tip: 'Field angle upwards. A light out of the frame has no direct image, but its ghosts may still come in.', unit: '°', name: 'light_y', digits: 3, get: (s) => one(s).field_deg[1], set: (y) => y !== null && app.deed('move_light', { light: app.light, x: one(app.state).field_deg[0], y }).catch(() => {}) });
+  const across = entry({ label: 'Right', tip: 'Field angle: the direct image lies focal length × tan(angle) to the right of the middle.', unit: '°', name: 'light_x', digits: 3, needed: 'needs an angle', get: (s) => one(s).field_deg[0], set: (x) => app.deed('move_light', { light: app.light, x, y: one(app.state).field_deg[1] }).catch(() => {}) });
+  const up = entry({ label: 'Up', tip: 'Field angle upwards. A light out of the frame has no direct image, but its ghosts may still come in.', unit: '°', name: 'light_y', digits: 3, needed: 'needs an angle', get: (s) => one(s).field_deg[1], set: (y) => app.deed('move_light', { light: app.light, x: one(app.state).field_deg[0], y }).catch(() => {}) });
   const choose = h('div', { class: 'buttons' });
   const lights = group('Lights', [
     choose, across, up,
@@ -45,7 +45,7 @@ export function lightPanel(app) {
   ]);
   const camera = (values, held = '') => app.lively('set_camera', { values }, held, `camera${Object.keys(values)}`);
   const shot = group('Camera', [
-    slider({ label: 'f-number', tip: 'Closing the iris makes the ghosts that it bounds smaller, each with the same brightness; the starburst grows.', min: 0.7, max: 32, step: 0.1, digits: 1, curve: 2, name: 'f_number', get: (s) => s.lens.f_number ?? s.lens.open, set: (value, held) => app.lively('set_fields', { values: { f_number: Math.max(value, app.state.lens.open ?? value) } }, held) }),
+    slider({ label: 'f-number', tip: 'Closing the iris makes the ghosts that it bounds smaller, each with the same brightness; the starburst grows.', min: 0.7, max: 32, step: 0.1, digits: 1, curve: 2, name: 'f_number', get: (s) => s.lens.f_number ?? s.lens.open, set: (value, held) => app.lively('set_fields', { values: { f_number: value } }, held) }),
     choice({ label: 'Zoom position', tip: 'The positions that the lens file knows: gaps between its groups change.', options: (s) => [['', 'as its rows stand'], ...(s.lens.positions ?? []).map((name) => [name, name])], get: (s) => s.lens.zoom ?? '', set: (zoom) => app.deed('set_fields', { values: { zoom: zoom || null } }).catch(() => {}) }),
     choice({ label: 'Picture', tip: 'Pixels of the rendered file; the viewport shows its shape.', name: 'size', options: SIZES, get: (s) => s.camera.size_px.join('x'), set: (text) => { const size = pair(text).map(Math.round); const key = sensorOf(app.state.camera); camera({ size_px: size, ...(SENSORS.some(([known]) => known && known === key) ? { sensor_mm: fitted(key, size) } : {}) }); } }),
     choice({ label: 'Sensor', tip: 'A smaller sensor sees a smaller part of the same flare. As much of it is used as has the shape of the picture.', name: 'sensor', options: SENSORS, get: (s) => sensorOf(s.camera), set: (key) => camera({ sensor_mm: key ? fitted(key, app.state.camera.size_px) : null }) }),
@@ -62,8 +62,8 @@ export function lightPanel(app) {
   return {
     element: h('div', {}, lights.element, path.element, shot.element, seeing.element, hiding.element, work.element),
     update(state) {
-      refill(choose, [...state.lights.map((light, k) => button(light.name === 'light' ? `Light ${k + 1}` : light.name, () => { app.chooseLight(k); app.panels.light.update(app.state); app.view.redraw(); }, { kind: k === app.light ? 'on' : '', tip: 'The light that the controls below, the arrow keys and a drag of the picture move.' })),
-        button('+', () => app.deed('add_light', {}).catch(() => {}), { kind: 'quiet', tip: 'Add a light.' }),
+      refill(choose, [...state.lights.map((light, k) => button(light.name === 'light' ? `Light ${k + 1}` : light.name.charAt(0).toUpperCase() + light.name.slice(1), () => { app.chooseLight(k); app.panels.light.update(app.state); app.view.redraw(); }, { kind: k === app.light ? 'on' : '', tip: 'The light that the controls below, the arrow keys and a drag of the picture move.' })),
+        button('+', () => app.deed('add_light', {}).then(() => { app.chooseLight(app.state.lights.length - 1); app.view.redraw(); }).catch(() => {}), { id: 'light-add', kind: 'quiet', tip: 'Add a light.' }),
         button('Remove', () => app.deed('remove_light', { light: app.light }).catch(() => {}), { kind: 'quiet', disabled: state.lights.length < 2, tip: 'Take the chosen light away; one always stays.' })]);
       for (const part of [lights, path, shot, seeing, hiding, work]) part.update(state);
     },

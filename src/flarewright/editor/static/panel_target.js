@@ -1,10 +1,15 @@
 // Annotate and solve: what the ghosts shall be, and the lenses that make them so.
-import { button, choice, entry, group, h, refill, row, slider, tick } from './ui.js';
+import { button, choice, entry, group, h, refill, row, slider, tick, toast } from './ui.js';
 
 const COMPARE = [
-  ['physical', 'Physical', 'What the lens does (W walks through these four).'], ['target', 'Target', 'The picture as it is wished for: no lens makes it yet.'],
-  ['wipe', 'Wipe', 'Target to the right of a line that can be dragged.'], ['side', 'Side by side', 'Both at once.'],
+  ['physical', 'Physical', 'What the lens does (W walks through these four).'], ['target', 'Target', 'The picture as it is wished for, drawn by matrices: no lens makes it yet.'],
+  ['wipe', 'Wipe', 'Target to the right of a line that can be dragged.'], ['side', 'Side by side', 'Both at once: the physical one by traced rays, the target by matrices.'],
 ];
+
+// as the server has it
+const MOST_SECONDS = 3600;
+const offAxis = ({ lights }) => Math.max(...lights.map(({ field_deg }) => Math.atan(Math.hypot(...field_deg.map((deg) => Math.tan(deg * Math.PI / 180)))) * 180 / Math.PI));
+const matrices = (state) => `The target is drawn by matrices, which are true near the axis; the light stands ${offAxis(state).toFixed(0)}° off it. The farther, the more the physical ghosts differ from it in place, shape and brightness, also those of which nothing is wished.`;
 
 export function targetPanel(app) {
   const wishes = () => app.state.design?.wishes ?? [];
@@ -17,6 +22,7 @@ export function targetPanel(app) {
   const looks = COMPARE.map(([key, words, tip]) => button(words, () => see(key), { 'data-compare': key, tip }));
   compare.append(...looks);
   const see = (key) => { app.view.compare = key; app.view.refreshTarget(); self.update(app.state); app.view.redraw(); };
+  const drawn = h('p', { class: 'quietly', id: 'target-drawn' });
   const list = h('div', { class: 'buttons' });
   const told = h('p', { class: 'quietly' });
   const colour = h('input', { type: 'color', value: '#ffffff' });
@@ -33,14 +39,18 @@ export function targetPanel(app) {
   const design = (values) => app.deed('set_design', { values }).catch(() => {});
   const how = group('Solve', [
     choice({ label: 'Search among', tip: 'Lenses built like this one keep glass, air and stop where they are; any structure may put them elsewhere.', name: 'structure', options: [['lens', 'lenses built like this one'], ['any', 'any structure']], get: (s) => s.design?.structure ?? 'lens', set: (structure) => design({ structure }) }),
-    tick({ label: 'From scratch', tip: 'Only the ghosts that were added count; the lens’ own are left out (thesis section 5.7).', name: 'scratch', off: (s) => (s.design?.wishes.some((wish) => !wish.ghost) ? '' : 'add a ghost first, for it to aim at'), get: (s) => s.design?.own_ghosts === false, set: (scratch) => design(scratch ? { own_ghosts: false, structure: 'any' } : { own_ghosts: true }) }),
+    tick({ label: 'From scratch', tip: 'Only the ghosts that were added count; the lens’ own are left out (thesis section 5.7).', name: 'scratch', off: (s) => (s.design?.wishes.some((wish) => !wish.ghost) ? '' : 'add a ghost first, for it to aim at'), get: (s) => s.design?.own_ghosts === false, set: (scratch) => design(scratch ? { own_ghosts: false, structure: 'any' } : { own_ghosts: true, ...app.state.design.before_scratch }) }),
     entry({ label: 'Surfaces', tip: 'Of the new lens; empty: as many as this one, or as the ghosts need.', placeholder: 'as needed', digits: 0, get: (s) => s.design?.surfaces, set: (surfaces) => design({ surfaces, ...(surfaces ? { structure: 'any' } : {}) }) }),
   ]);
   let seconds = 20;
-  const time = entry({ label: 'Seconds', tip: 'Stop it any time; the best lenses so far are kept.', digits: 0, name: 'seconds', get: () => seconds, set: (value) => { if (value > 0) seconds = value; } });
+  const time = entry({ label: 'Seconds', tip: 'Stop it any time; the best lenses so far are kept.', digits: 0, name: 'seconds', needed: 'needs a number', get: () => seconds, set: (value) => {
+    seconds = Math.max(1, Math.min(MOST_SECONDS, Math.round(value)));
+    if (seconds !== value) toast(`${value} s became ${seconds} s: a search takes whole seconds from 1 to ${MOST_SECONDS}.`, 'info', 9000, 'seconds');
+    time.update(app.state);
+  } });
   const solve = button('Solve', () => app.ask('/api/solve', { seconds }), { kind: 'main', id: 'solve', tip: 'Search lenses whose ghosts are where they are wished to be; the best so far are shown below.' });
-  const colors = button('Solve colours', () => app.ask('/api/colors', { kind: 'quarter-wave' }), { tip: 'Quarter-wave coatings for all rows, so that ghosts get the wished colours and the others keep theirs.', id: 'solve-colors' });
-  const films = button('…with free films', () => app.ask('/api/colors', { kind: 'film' }), { tip: 'Films of any index and thickness: more colours, less like real lenses.' });
+  const colors = button('Solve colours', () => app.ask('/api/colors', { kind: 'quarter-wave', seconds }), { tip: 'Quarter-wave coatings for all rows, so that ghosts get the wished colours and the others keep theirs.', id: 'solve-colors' });
+  const films = button('…with free films', () => app.ask('/api/colors', { kind: 'film', seconds }), { tip: 'Films of any index and thickness: more colours, less like real lenses.' });
   const stop = button('Stop', () => app.ask('/api/stop'), { id: 'stop', tip: 'End the search and keep the best.' });
   const clear = button('Take all back', () => app.deed('clear_wishes', {}).catch(() => {}), { kind: 'quiet', tip: 'Forget all wishes; the lens stays.' });
   const add = button('Add a ghost', () => app.deed('add_ghost', { place_mm: 5 - 4 * (wishes().filter((wish) => !wish.ghost).length % 5), radius_mm: 1.5 }).then(() => app.chooseWish(wishes().length - 1)).catch(() => {}), { tip: 'One that the lens has not; drag it along the line.', id: 'wish-add' });
@@ -50,11 +60,13 @@ export function targetPanel(app) {
   const found = h('div', { class: 'candidates' });
 
   const self = {
-    element: h('div', {}, h('div', { class: 'group' }, h('h3', {}, 'Target'), compare, told, list, h('div', { class: 'buttons' }, add, clear)), fields.element, how.element, h('div', { class: 'group' }, time.element, h('div', { class: 'buttons' }, solve, stop, colors, films), needed, progress, found)),
+    element: h('div', {}, h('div', { class: 'group' }, h('h3', {}, 'Target'), compare, drawn, told, list, h('div', { class: 'buttons' }, add, clear)), fields.element, how.element, h('div', { class: 'group' }, time.element, h('div', { class: 'buttons' }, solve, stop, colors, films), needed, progress, found)),
     shown() { if (app.state) app.places?.(); },
     next() { const keys = COMPARE.map(([key]) => key); see(keys[(keys.indexOf(app.view.compare) + 1) % keys.length]); },
     update(state) {
       for (const look of looks) look.classList.toggle('on', look.dataset.compare === app.view.compare);
+      drawn.hidden = app.view.compare === 'physical';
+      drawn.textContent = matrices(state);
       const chosen = app.wish !== null || Boolean(own());
       told.textContent = app.ghost && !own() && app.wish === null ? `Ghost ${app.ghost} reflects on both sides of the stop; design moves those that reflect twice on one side.`
         : chosen ? 'Drag it along the line, or its rim to resize it.' : 'Click a ghost to say what it shall become.';

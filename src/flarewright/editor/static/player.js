@@ -36,6 +36,9 @@ export function player(app) {
     self.heard();
     return self.rest();
   };
+  // where a hand takes the light, or another project comes, nothing plays on
+  self.halt = () => { if (self.playing) { self.playing = false; self.heard(); } };
+  self.reset = () => { self.halt(); self.at = 0; self.heard(); };
   self.toggle = () => (self.playing ? self.stop() : self.play());
   // by hand: a draft at once, and the final picture when the hand rests
   self.scrub = (at) => {

@@ -22,14 +22,20 @@ export function refill(parent, children) {
 let strokes = 0;
 export const stroke = () => `s${Date.now().toString(36)}${strokes++}`;
 
-export function toast(text, kind = 'info', lasting = kind === 'error' ? 9000 : 4500) {
-  const box = h('div', { class: `toast ${kind}`, onclick: () => box.remove() }, text);
+// `about` is what it is said of: what was said of it before is outdated, and goes.
+export function toast(text, kind = 'info', lasting = kind === 'error' ? 9000 : 4500, about = '') {
+  const box = h('div', { class: `toast ${kind}`, 'data-about': about, onclick: () => box.remove() }, text);
   const shelf = document.getElementById('toasts');
   // what is said again stands there once, and no more than can be read
-  for (const each of [...shelf.children]) if (each.textContent === box.textContent) each.remove();
+  for (const each of [...shelf.children]) if (each.textContent === box.textContent || (about && each.dataset.about === about)) each.remove();
   shelf.append(box);
   while (shelf.children.length > 3) shelf.firstChild.remove();
   setTimeout(() => box.remove(), lasting);
+}
+
+// What was refused before has been done by now.
+export function hush(about) {
+  for (const each of [...document.getElementById('toasts').children]) if (each.dataset.about === about && each.classList.contains('error')) each.remove();
 }
 
 export function number(text) {
@@ -38,6 +44,13 @@ export function number(text) {
 }
 
 const shown = (value, digits) => (value === null || value === undefined ? '' : String(Number(Number(value).toFixed(digits))));
+
+// What cannot be read goes back to what it was, and this is said.
+function unread(box, label, kept, needed = '') {
+  const why = box.value.trim() === '' ? needed || 'needs a number' : `“${box.value.trim()}” is no number`;
+  box.value = kept;
+  toast(`${label}: ${why}${kept === '' ? '' : `, so it stays ${kept}`}.`, 'error', 9000, `number ${label}`);
+}
 
 // A control is {element, update(state)}.
 export function group(title, controls, extra = []) {
@@ -53,58 +66,79 @@ export function row(label, tip, fields, update) {
   return { element, update };
 }
 
-// Slider and box. `set` is called with the value and a group, so that one stroke is one step of the history.
-export function slider({ label, tip, get, set, min, max, step = 0.01, digits = 2, unit = '', curve = 1, name }) {
+// By how many steps a key moves a slider; to an end with Home and End.
+const KEY_STEPS = { ArrowRight: 1, ArrowUp: 1, ArrowLeft: -1, ArrowDown: -1, PageUp: 10, PageDown: -10, Home: -Infinity, End: Infinity };
+
+// Slider and box. `set` is called with the value and a group, so that one stroke is one step of the history; `skip` leads
+// a value that a key has reached on to one that there is.
+export function slider({ label, tip, get, set, min, max, step = 0.01, digits = 2, unit = '', curve = 1, name, skip = (value) => value }) {
   const to = (value) => Math.pow(Math.max(0, (value - min) / (max - min)), 1 / curve);
   const from = (part) => min + (max - min) * Math.pow(part, curve);
   const bar = h('input', { type: 'range', min: 0, max: 1, step: curve === 1 ? step / (max - min) : 0.001, 'aria-label': label });
   const box = h('input', { class: 'number small', type: 'text', inputmode: 'decimal', 'aria-label': label, name });
   let held = null;
   let kept = null;
+  let told = null;
+  // until the server has answered, it stays as the hand left it
+  let asked = 0;
+  const ask = (value, group) => {
+    asked += 1;
+    Promise.resolve(set(value, group)).finally(() => { asked -= 1; show(); });
+  };
   const rounded = (value) => Number((Math.round(value / step) * step).toFixed(6));
   bar.addEventListener('pointerdown', () => { held = stroke(); });
-  bar.addEventListener('keydown', () => { held ??= stroke(); });
+  bar.addEventListener('keydown', (event) => {
+    const by = KEY_STEPS[event.key] * (event.shiftKey ? 10 : 1);
+    if (!by) return;
+    // the browser's own steps are of the bar: where it is bent they are less than one of the value, and lead nowhere
+    event.preventDefault();
+    held ??= stroke();
+    kept = skip(Math.max(min, Math.min(max, rounded((kept ?? min) + by * step))), by);
+    bar.value = to(kept);
+    box.value = shown(kept, digits);
+    ask(kept, held);
+  });
   bar.addEventListener('keyup', () => { held = null; });
   bar.addEventListener('input', () => {
     const value = rounded(from(Number(bar.value)));
     box.value = shown(value, digits);
-    set(value, held ?? '');
+    ask(value, held ?? '');
   });
   bar.addEventListener('change', () => { held = null; });
   box.addEventListener('change', () => {
     const value = number(box.value);
-    box.classList.toggle('bad', value === null);
-    if (value !== null) set(value, '');
+    if (value === null) unread(box, label, shown(kept, digits)); else ask(value, '');
   });
   escapes(box, () => shown(kept, digits));
-  return row(label, tip, [bar, box, h('span', { class: 'unit' }, unit)], (state) => {
-    kept = get(state);
+  function show() {
+    if (asked || !told) return;
+    kept = get(told);
     if (!bar.matches(':active')) bar.value = to(kept ?? min);
-    if (document.activeElement !== box) { box.value = shown(kept, digits); box.classList.remove('bad'); }
-  });
+    if (document.activeElement !== box) box.value = shown(kept, digits);
+  }
+  return row(label, tip, [bar, box, h('span', { class: 'unit' }, unit)], (state) => { told = state; show(); });
 }
 
-export function entry({ label, tip, get, set, digits = 4, unit = '', placeholder = '', words = false, name, list }) {
+// `needed` says what an empty box lacks; without it, empty is a value too.
+export function entry({ label, tip, get, set, digits = 4, unit = '', placeholder = '', words = false, needed = '', name, list }) {
   const box = h('input', { class: words ? '' : 'number', type: 'text', placeholder, name, list, spellcheck: 'false' });
   let kept = '';
   box.addEventListener('change', () => {
     const text = box.value.trim();
     const value = words ? text : text === '' ? null : number(text);
-    const bad = !words && text !== '' && value === null;
-    box.classList.toggle('bad', bad);
-    if (!bad) set(value);
+    if (text === '' ? needed : value === null) unread(box, label, kept, needed); else set(value);
   });
   escapes(box, () => kept);
   return row(label, tip, [box, h('span', { class: 'unit' }, unit)], (state) => {
     const value = get(state);
     kept = words ? value ?? '' : shown(value, digits);
-    if (document.activeElement !== box) { box.value = kept; box.classList.remove('bad'); }
+    if (document.activeElement !== box) box.value = kept;
   });
 }
 
 function escapes(box, text) {
   box.addEventListener('keydown', (event) => {
-    if (event.key === 'Escape') { box.value = text(); box.classList.remove('bad'); box.blur(); event.stopPropagation(); }
+    if (event.key === 'Escape') { box.value = text(); box.blur(); event.stopPropagation(); }
     if (event.key === 'Enter') box.blur();
   });
 }

@@ -10,6 +10,7 @@ const STEEPEST = 80;
 const DISTORTION_STEP = 2;
 const STEPS = [0, -21, 21, -42, 42];
 const INK = 'rgba(240,176,84,.95)';
+const TARGET = 'target, by matrices';
 
 export function viewport(canvas, app) {
   const hint = document.getElementById('hint');
@@ -100,7 +101,7 @@ export function viewport(canvas, app) {
     if (self.spot && self.spotFrame !== JSON.stringify(f)) self.forget();
     pen.imageSmoothingEnabled = self.zoom < 3;
     pen.imageSmoothingQuality = self.mover.live ? 'low' : 'high';
-    if (doubled()) within(f.shift, w, () => { pen.translate(f.shift, 0); wishedPicture(f, 0); border(f); label('target', f.x + 8, f.y + 16, 'left'); });
+    if (doubled()) within(f.shift, w, () => { pen.translate(f.shift, 0); wishedPicture(f, 0); border(f); label(TARGET, f.x + 8, f.y + 16, 'left'); });
     within(0, half(), () => {
       picture(f, now);
       border(f);
@@ -109,6 +110,7 @@ export function viewport(canvas, app) {
       paths(f);
       lights();
     });
+    if (app.state.view.look === 'false-colour') legend(w);
     if (self.measure) { self.measure(now); }
   }
   // Nothing of one half spills over into the other.
@@ -147,10 +149,10 @@ export function viewport(canvas, app) {
       pen.arc(f.x + f.w * self.wipe, f.y + f.h - 18, 7, 0, 7);
       pen.fill();
       label('physical', f.x + f.w * self.wipe - 10, f.y + f.h - 14, 'right');
-      label('target', f.x + f.w * self.wipe + 10, f.y + f.h - 14, 'left');
+      label(TARGET, f.x + f.w * self.wipe + 10, f.y + f.h - 14, 'left');
     }
     if (self.compare === 'side') label('physical', f.x + 8, f.y + 16, 'left');
-    if (self.compare === 'target') label('target', f.x + 8, f.y + 16, 'left');
+    if (self.compare === 'target') label(TARGET, f.x + 8, f.y + 16, 'left');
   }
   // Words step up or down where others stand already, those of the page among them.
   function label(text, x, y, align) {
@@ -166,6 +168,23 @@ export function viewport(canvas, app) {
     pen.fillText(text, x + 1, low + 1);
     pen.fillStyle = '#ddd';
     pen.fillText(text, x, low);
+  }
+  // what the false colours mean: stops from middle grey, written where one ends
+  function legend(w) {
+    const all = app.state.false_colours;
+    const wide = 30;
+    const left = w - 14 - all.length * wide;
+    pen.font = '10px system-ui, sans-serif';
+    pen.textAlign = 'center';
+    pen.fillStyle = '#000a';
+    pen.fillRect(left - 10, 8, all.length * wide + 20, 40);
+    all.forEach(([stops, colour], k) => {
+      pen.fillStyle = colour;
+      pen.fillRect(left + k * wide, 12, wide, 8);
+      pen.fillStyle = '#ddd';
+      if (k + 1 < all.length) pen.fillText(stops > 0 ? `+${stops}` : `${stops}`.replace('-', '−'), left + (k + 1) * wide, 31);
+    });
+    pen.fillText('stops from middle grey', left + all.length * wide / 2, 43);
   }
   function border(f) {
     pen.strokeStyle = '#3c3c3c';
@@ -252,11 +271,11 @@ export function viewport(canvas, app) {
   self.refresh = latest(async (fade) => {
     const asked = self.mover.asked();
     // what comes meanwhile is asked for anew
-    const { number, grade, current } = app.state.picture;
+    const { number, grade, current, lights: drawn } = app.state.picture;
     // what a hand holds still gets sharper, until it moves on; neither then nor when it has let go elsewhere does a
     // picture of another place take that place's
     const late = () => (self.mover.live
-      ? self.mover.busy() || self.mover.asked() !== asked || current
+      ? self.mover.busy() || self.mover.asked() !== asked || current || String(drawn) !== String(self.mover.lights)
       : self.shownGrade === 'moving' && !current);
     if (late()) return;
     const answer = await fetch(`/api/picture?n=${number}`);
@@ -449,7 +468,7 @@ export function viewport(canvas, app) {
     if (drag.kind === 'pan') { self.panX = drag.x + px - drag.px; self.panY = drag.y + py - drag.py; redraw(); return; }
     if (drag.kind === 'wipe') { const f = frame(); self.wipe = Math.max(0, Math.min(1, (px - f.x) / f.w)); redraw(); return; }
     if (drag.kind === 'ghost' || drag.kind === 'rim') { pull(px, py); return; }
-    if (drag.kind === 'maybe' && Math.hypot(px - drag.px, py - drag.py) >= CLICK_PX) { drag.kind = 'light'; self.hover = null; self.mover.lights = null; }
+    if (drag.kind === 'maybe' && Math.hypot(px - drag.px, py - drag.py) >= CLICK_PX) { drag.kind = 'light'; self.hover = null; self.mover.lights = null; app.player.halt(); }
     if (drag.kind === 'light') moveLight(px, py, performance.now());
   });
   async function letGo(event) {
