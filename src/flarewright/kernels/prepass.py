@@ -103,10 +103,10 @@ def find_box(
     -----
     Hullin 2011, section 4.2, "Ray Bounding". A cell is kept unless one of its limits is exceeded at every corner by
     more than half its variation over the cell. Where few cells are kept, cells whose limits change fast are searched
-    with a finer grid. The gaps between neighbours of which one ends, or both at different surfaces, are halved again
-    and again: one surface takes the rays on one side, another those on the other, and a sliver in between may pass
-    both. Shortly before they are reflected totally, rays run so differently from their neighbours that a ring of them
-    may pass around all that passes besides.
+    with a finer grid, and where every ray ends those at which rays come farthest. The gaps between neighbours of which
+    one ends, or both at different surfaces, are halved again and again: one surface takes the rays on one side, another
+    those on the other, and a sliver in between may pass both. Shortly before they are reflected totally, rays run so
+    differently from their neighbours that a ring of them may pass around all that passes besides.
     """
     width = ny + 1
     count = (nx + 1) * width
@@ -147,9 +147,10 @@ def find_box(
         # a spot smaller than a cell may hide between the samples
         corners = np.empty((nx * ny, 2))
         n_doubtful = 0
+        farthest = _farthest(data)
         for cell in range(nx * ny):
             _cell_corners(cell // ny, cell % ny, width, nodes)
-            if kept[cell] == 0 and _doubtful(data, nodes, nx, ny, crossings, iris_radius):
+            if kept[cell] == 0 and _doubtful(data, nodes, nx, ny, crossings, iris_radius, farthest):
                 corners[n_doubtful, 0] = box[0] + (cell // ny) * hx
                 corners[n_doubtful, 1] = box[2] + (cell % ny) * hy
                 n_doubtful += 1
@@ -196,8 +197,20 @@ def _cell_corners(a, b, width, nodes):
 
 
 @borrowing
-def _doubtful(data, nodes, nx, ny, crossings, iris_radius):
-    """Tell whether a rejected cell may still hold a spot: limits change so fast around it that they may dip below 1."""
+def _farthest(data):
+    """Return how many surfaces the rays passed that came farthest, or infinity where one came through."""
+    farthest = 0.0
+    for k in range(data.shape[0]):
+        farthest = max(farthest, np.inf if data[k, ALIVE] > 0.0 else data[k, X])
+    return farthest
+
+
+@borrowing
+def _doubtful(data, nodes, nx, ny, crossings, iris_radius, farthest):
+    """Tell whether a rejected cell may still hold a spot: limits change so fast around it that they may dip below 1.
+
+    Where no ray comes through, that is where the farthest ones have neighbours that end sooner.
+    """
     low, change, alive = np.inf, 0.0, 0
     width = ny + 1
     for k in nodes:
@@ -213,7 +226,12 @@ def _doubtful(data, nodes, nx, ny, crossings, iris_radius):
                 # beside a ray that ends, anything may happen
                 step = abs(data[i * width + j, REL] - data[k, REL]) if data[i * width + j, ALIVE] > 0.0 else np.inf
                 change = max(change, step)
-    if alive == 0 or low - 1.5 * change > 1.0:
+    if alive == 0:
+        soonest, last = np.inf, 0.0
+        for k in nodes:
+            soonest, last = min(soonest, data[k, X]), max(last, data[k, X])
+        return last == farthest and soonest < last
+    if low - 1.5 * change > 1.0:
         return False
     if alive < nodes.size:
         return True
