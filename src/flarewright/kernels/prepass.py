@@ -12,6 +12,8 @@ from .trace import ALIVE, REL, STOP, STOP_X, WEIGHT, X, Y, trace_lanes
 # paths seen by fewer cells of the pre-pass than this are searched for spots between its samples, at most so many a side
 FEW_CELLS = 12
 PROBES = 8
+# where every ray ends, so many cells are searched
+LATE_CELLS = 32
 # how often the gap between two rays is halved of which one ends, or both at different surfaces
 HALVINGS = 5
 # where much is kept, light is looked for in gaps of which one ray has met a rim no farther out, of its radius
@@ -103,7 +105,7 @@ def find_box(
     -----
     Hullin 2011, section 4.2, "Ray Bounding". A cell is kept unless one of its limits is exceeded at every corner by
     more than half its variation over the cell. Where few cells are kept, cells whose limits change fast are searched
-    with a finer grid, and where every ray ends those at which rays come farthest. The gaps between neighbours of which
+    with a finer grid, and where every ray ends those at which rays end latest. The gaps between neighbours of which
     one ends, or both at different surfaces, are halved again and again: one surface takes the rays on one side, another
     those on the other, and a sliver in between may pass both. Shortly before they are reflected totally, rays run so
     differently from their neighbours that a ring of them may pass around all that passes besides.
@@ -147,10 +149,10 @@ def find_box(
         # a spot smaller than a cell may hide between the samples
         corners = np.empty((nx * ny, 2))
         n_doubtful = 0
-        farthest = _farthest(data)
+        late = _late(data, nx, ny)
         for cell in range(nx * ny):
             _cell_corners(cell // ny, cell % ny, width, nodes)
-            if kept[cell] == 0 and _doubtful(data, nodes, nx, ny, crossings, iris_radius, farthest):
+            if kept[cell] == 0 and _doubtful(data, nodes, nx, ny, crossings, iris_radius, late):
                 corners[n_doubtful, 0] = box[0] + (cell // ny) * hx
                 corners[n_doubtful, 1] = box[2] + (cell % ny) * hy
                 n_doubtful += 1
@@ -196,20 +198,46 @@ def _cell_corners(a, b, width, nodes):
     nodes[2], nodes[3] = nodes[0] + width, nodes[1] + width
 
 
-@borrowing
-def _farthest(data):
-    """Return how many surfaces the rays passed that came farthest, or infinity where one came through."""
-    farthest = 0.0
+@inner
+def _late(data, nx, ny):
+    """Return how many surfaces rays have to pass before they end for the cells around them to be looked into.
+
+    Of cells in which some rays end later than others, those of the latest rays, LATE_CELLS of them or a little fewer;
+    infinity where a ray came through.
+    """
+    last = 0
     for k in range(data.shape[0]):
-        farthest = max(farthest, np.inf if data[k, ALIVE] > 0.0 else data[k, X])
-    return farthest
+        if data[k, ALIVE] > 0.0:
+            return np.inf
+        last = max(last, int(data[k, X]))
+    counts = np.zeros(last + 1, dtype=np.int64)
+    nodes = np.empty(4, dtype=np.int64)
+    for cell in range(nx * ny):
+        _cell_corners(cell // ny, cell % ny, ny + 1, nodes)
+        soonest, latest = _ends(data, nodes)
+        if soonest < latest:
+            counts[int(latest)] += 1
+    late, cells = last, counts[last]
+    while late > 0 and cells + counts[late - 1] <= LATE_CELLS:
+        late -= 1
+        cells += counts[late]
+    return float(late)
 
 
 @borrowing
-def _doubtful(data, nodes, nx, ny, crossings, iris_radius, farthest):
+def _ends(data, nodes):
+    """Return how many surfaces those rays passed that end first and last, of a cell of which all end."""
+    soonest, latest = np.inf, 0.0
+    for k in nodes:
+        soonest, latest = min(soonest, data[k, X]), max(latest, data[k, X])
+    return soonest, latest
+
+
+@borrowing
+def _doubtful(data, nodes, nx, ny, crossings, iris_radius, late):
     """Tell whether a rejected cell may still hold a spot: limits change so fast around it that they may dip below 1.
 
-    Where no ray comes through, that is where the farthest ones have neighbours that end sooner.
+    Where no ray comes through, that is where rays end late, `late` or more surfaces on, and their neighbours sooner.
     """
     low, change, alive = np.inf, 0.0, 0
     width = ny + 1
@@ -227,10 +255,8 @@ def _doubtful(data, nodes, nx, ny, crossings, iris_radius, farthest):
                 step = abs(data[i * width + j, REL] - data[k, REL]) if data[i * width + j, ALIVE] > 0.0 else np.inf
                 change = max(change, step)
     if alive == 0:
-        soonest, last = np.inf, 0.0
-        for k in nodes:
-            soonest, last = min(soonest, data[k, X]), max(last, data[k, X])
-        return last == farthest and soonest < last
+        soonest, latest = _ends(data, nodes)
+        return latest >= late and soonest < latest
     if low - 1.5 * change > 1.0:
         return False
     if alive < nodes.size:
