@@ -79,7 +79,7 @@ def main() -> None:
         print(json.dumps(rows[-1]), flush=True)
     with tempfile.TemporaryDirectory() as made:
         for lens in () if given.isolated else given.lens:
-            folder = (given.keep or Path(made)) / f"{lens}-{given.width}-{given.f_number:g}"
+            folder = (given.keep or Path(made)) / f"{Path(lens).stem}-{given.width}-{given.f_number:g}"
             rows.append(prove(lens, folder, given))
             print(json.dumps(rows[-1], indent=1), flush=True)
     if given.json is not None:
