@@ -43,6 +43,8 @@ class Candidate:
         Sum of the views' votes.
     blades : Blades or None
         Of its rim; None: a circle.
+    bend : float
+        Pixels: by how much the place at field 1 leaves proportion.
     """
 
     speed: float
@@ -51,6 +53,7 @@ class Candidate:
     last: int
     score: float
     blades: Blades | None = None
+    bend: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -20,6 +20,7 @@ from .grow import Growth, grow
 from .journal import Journal
 from .numbers import NUMBERS, with_blades
 from .settle import touch_up
+from .specks import specks
 from .views import Pixels, View
 
 # votes below which a candidate is chance
@@ -41,7 +42,7 @@ _FIRST = Growth(order=1, discs=1, error=0.05, soft=False, alike=False)
 def beginning(candidate: Candidate, views: Sequence[View], pixels: Sequence[Pixels]) -> Shape:
     """Return a candidate as a shape: an even disc as bright as the views say."""
     numbers = np.zeros(NUMBERS)
-    numbers[0], numbers[FIRST_G] = candidate.speed, candidate.radius
+    numbers[0], numbers[3], numbers[FIRST_G] = candidate.speed, candidate.bend, candidate.radius
     numbers[FIRST_I] = candidate.radius**2
     numbers = with_blades(numbers, candidate.blades)
     shape = Shape(numbers)
@@ -157,8 +158,10 @@ def _candidates(
     iris: Blades | None,
     pool: ThreadPoolExecutor | None,
 ) -> list[Candidate]:
-    slopes = slopes_of(_doubted(views, rest), rest, masks, pool=pool)
-    return candidates(slopes, views[0].size_px[0], most=most, iris=iris, pool=pool)
+    doubted = _doubted(views, rest)
+    rims = candidates(slopes_of(doubted, rest, masks, pool=pool), views[0].size_px[0], most=most, iris=iris, pool=pool)
+    small = specks(doubted, rest, masks, most=most, pool=pool)
+    return sorted([*rims, *small], key=lambda each: -each.score)
 
 
 def _doubted(views: Sequence[View], rest: Sequence[Pixels]) -> list[View]:

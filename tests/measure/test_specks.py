@@ -1,0 +1,48 @@
+"""Ghosts too small to show a rim: found by how bright they are, wherever they run."""
+
+import numpy as np
+import pytest
+from planted_run import GHOSTS, shape, views
+
+from flarewright.measure.pursuit import SCORE, pursue
+from flarewright.measure.specks import specks
+
+SPECK = shape(70.0, 1.1, 6.0, bend=-5.0)
+
+
+def everywhere(shown):
+    return [np.ones(view.pixels.shape[:2], bool) for view in shown]
+
+
+def looked_at(shown):
+    return specks(shown, [view.pixels[..., 1] for view in shown], everywhere(shown))
+
+
+@pytest.mark.parametrize("roll_deg", [0.0, 130.0])
+def test_a_speck_among_large_ghosts(roll_deg):
+    best = looked_at(views((*GHOSTS, SPECK), roll_deg=roll_deg))[0]
+    assert best.speed == pytest.approx(70.0, abs=1.5)
+    assert best.bend == pytest.approx(-5.0, abs=2.0)
+    assert best.last - best.first > 18
+
+
+@pytest.mark.parametrize("ghosts", [GHOSTS, ()])
+def test_neither_rims_nor_noise_are_specks(ghosts):
+    assert all(one.score < 3.0 * SCORE for one in looked_at(views(ghosts)))
+
+
+def test_where_nothing_was_measured_there_is_none():
+    shown = views((SPECK,))
+    hidden = [np.zeros(view.pixels.shape[:2], bool) for view in shown]
+    assert specks(shown, [view.pixels[..., 1] for view in shown], hidden) == []
+
+
+def test_a_speck_is_fitted_as_it_is():
+    shown = views((*GHOSTS, SPECK))
+    found = pursue(shown, everywhere(shown), most=8)
+    best = min(found, key=lambda ghost: abs(ghost.shapes[1].numbers[0] - 70.0))
+    numbers = best.shapes[1].numbers
+    assert numbers[0] == pytest.approx(70.0, abs=0.3)
+    assert numbers[3] == pytest.approx(-5.0, abs=0.5)
+    assert numbers[10] == pytest.approx(1.1, abs=0.2)
+    assert (best.first, best.last) == (0, len(shown) - 1)
