@@ -10,8 +10,9 @@ import pytest
 from flarewright.editor import studio
 from flarewright.editor.drawings import section
 from flarewright.editor.edit_shot import move_light
-from flarewright.editor.files import project_for_lens
+from flarewright.editor.files import project_for_lens, save_project
 from flarewright.editor.hand import Hand
+from flarewright.editor.pictures import in_short
 from flarewright.editor.screen import Screen, packed, shown_pixels
 from flarewright.editor.seen import Seen, SeenGhost, alone, is_there, outline, see, under
 from flarewright.editor.session import begin
@@ -20,7 +21,7 @@ from flarewright.editor.snapshot import ghosts_of
 from flarewright.editor.view import View
 from flarewright.editor.viewing import outline_png, picked, target_jpeg
 from flarewright.errors import ProjectError
-from flarewright.model import Camera, Everywhere, Iris, Light, Output, Quality, QuarterWave
+from flarewright.model import Camera, Everywhere, Holdout, Iris, Light, Output, Quality, QuarterWave
 from flarewright.optics.color import luminance_weights
 from flarewright.render.render import render
 from flarewright.render.working import GREY_R, working_ghosts
@@ -305,6 +306,35 @@ def test_the_screen_keeps_the_last_good_picture(project):
     assert screen.wait(60.0)
     assert screen.problem == ""
     assert screen.picture.project == lens
+
+
+def test_a_picture_that_is_gone_is_named_as_a_person_does(project, tmp_path):
+    folder = tmp_path / "shot"
+    (folder / "masks").mkdir(parents=True)
+    session, _ = begin(None)
+    screen = Screen(session)
+    cases = {
+        folder / "masks" / "heart.png": "the iris image masks/heart.png does not exist beside shot.toml; put it there, or "
+        "choose another on the panel Iris",
+        tmp_path / "heart.png": f"the iris image heart.png does not exist in {tmp_path}; put it there, or choose another "
+        "on the panel Iris",
+    }
+    for mask, said in cases.items():
+        save_project(project.replace(iris=Iris(mask=str(mask))), str(folder / "shot.toml"))
+        session.open(str(folder / "shot.toml"))
+        assert screen.wait(60.0)
+        assert screen.problem == said
+    # one that is there and is none is named shortly too, in the words of its reader
+    (tmp_path / "heart.png").write_bytes(b"nothing")
+    session.open(str(folder / "shot.toml"))
+    assert screen.wait(60.0)
+    assert screen.problem.startswith("heart.png: this cannot be read as an image (")
+    assert str(tmp_path) not in screen.problem
+    gone = str(folder / "ridge.png")
+    matte = project.replace(holdout=Holdout(image=gone))
+    told = "the matte ridge.png does not exist beside shot.toml; put it there, or choose another on the panel Light"
+    assert in_short(f"{gone}: there is no such holdout image", matte, str(folder / "shot.toml")) == told
+    assert in_short("the lens makes no image", matte, None) == "the lens makes no image"
 
 
 def test_the_first_traced_picture_of_a_zoom_can_hardly_be_told_from_the_final_one():

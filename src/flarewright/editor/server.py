@@ -30,6 +30,7 @@ from .edit_shot import move_light
 from .guard import Application, Guard
 from .hand import Moved
 from .imports import take_in
+from .pictures import in_short
 from .screen import packed, shown_pixels
 from .snapshot import ghosts_of
 
@@ -56,7 +57,8 @@ def told(work: Work) -> Callable[[Desk], Answer]:
                     body = json.loads(raw) if raw else {}
                 result = await run_in_threadpool(work, desk, request, body)
             except FlarewrightError as error:
-                return JSONResponse({"error": str(error)}, status_code=400)
+                told = in_short(str(error), desk.session.project, desk.session.file)
+                return JSONResponse({"error": told}, status_code=400)
             except (ValueError, KeyError, TypeError) as error:
                 return JSONResponse({"error": f"the editor did not understand the page: {error}"}, status_code=400)
             if isinstance(result, Response):
@@ -144,7 +146,7 @@ async def _follow(desk: Desk, socket: WebSocket) -> None:
                 picture = found.jpeg
                 head |= {"seconds": round(found.seconds, 4), "lights": [one.field_deg for one in found.project.lights]}
         except FlarewrightError as error:
-            head["error"] = str(error)
+            head["error"] = in_short(str(error), desk.session.project, desk.session.file)
         except (ValueError, KeyError, TypeError) as error:
             head["error"] = f"the editor did not understand the page: {error}"
         # the tab may be gone by now

@@ -160,7 +160,11 @@ class Session:
                 self._hold(file, project)
                 self._stamp(file, before)
             label = f"Open {Path(text).name}"
-            self._move(past.committed(self.history, project, label, file=file, begins=True))
+            history = past.committed(self.history, project, label, file=file, begins=True)
+            if history == self.history:
+                # the file is as it was; a picture that it names may have come
+                self._changed()
+            self._move(history)
 
     def _hold(self, file: str, project: Project | None) -> None:
         if project is not None:

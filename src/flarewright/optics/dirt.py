@@ -281,7 +281,7 @@ def scattered(elements: Elements, inside: NDArray[np.bool_], inside_arcs: NDArra
 
 
 def _slit(order: Floats) -> Floats:
-    """sinc^2, far out the mean over its fringes; a step between the two would be seen, so they fade over some orders."""
+    """sinc^2, far out the mean over its fringes; a step between the two would be seen, so they fade slowly."""
     t = np.clip((order - _FADE[0]) / (_FADE[1] - _FADE[0]), 0.0, 1.0)
     left = 1.0 - t * t * (3.0 - 2.0 * t)
     far = 0.5 * (1.0 - left * np.cos(2.0 * math.pi * order)) / (math.pi * np.maximum(order, 1.0)) ** 2

@@ -75,7 +75,7 @@ function update() {
   for (const part of parts) part.update?.(state);
   app.refreshPanel();
   $('problem').hidden = !state.picture.problem;
-  $('problem').textContent = state.picture.problem ? `${sentence(state.picture.problem)} The last good picture is shown.` : '';
+  $('problem').textContent = state.picture.problem ? `${sentence(state.picture.problem)}${state.picture.grade ? ' The last good picture is shown.' : ''}` : '';
   document.title = `${state.clean ? '' : '• '}${fileName(state)} – Flarewright`;
   status();
   app.view.redraw();
@@ -329,7 +329,7 @@ const GRADES = { moving: 'moving, by matrices', draft: 'draft, by matrices', soo
 const FIRST = 'drawing the first picture; the very first on a machine takes some ten seconds';
 function gradeWords({ grade: drawn, seconds, number, current, problem }) {
   const { mover, shownGrade, shownNumber } = app.view;
-  if (!drawn) return FIRST;
+  if (!drawn) return problem ? 'no picture yet' : FIRST;
   if (problem) return 'the last good picture';
   // what a hand holds is of no project yet, but it is what is shown
   if (!mover.live && !current) return shownGrade === 'moving' ? GRADES.moving : 'the picture before, until the new one is drawn';
