@@ -1048,6 +1048,16 @@ def test_from_scratch_can_be_taken_back(tab):
     tab.until("flarewright.state.design.own_ghosts")
     assert tab.state()["design"]["structure"] == "lens"
     assert structure.input_value() == "lens"
+    # so can the ghost, and what it needed goes with it
+    tab.page.select_option("select[name=structure]", "any")
+    tab.page.locator("#page button", has_text="Take all back").click()
+    tab.until("flarewright.state.design === null")
+    tab.page.click("#wish-add")
+    tab.until("flarewright.state.design?.structure === 'any'")
+    tab.page.click("#wish-back")
+    tab.until("flarewright.state.design.wishes.length === 0")
+    assert structure.input_value() == "lens"
+    assert tab.said == []
 
 
 def test_the_target_is_shown_as_the_picture_is(tab):

@@ -108,6 +108,28 @@ def design_before_scratch(history: History) -> Design | None:
     return None if before is None or not before.own_ghosts or before is history.present.design else before
 
 
+def design_before_added(history: History) -> Design | None:
+    """Return the design as it was before its first new ghost was added; None where there is no new ghost or none knows.
+
+    Who has chosen among structures since, or the count of surfaces, has chosen: None too.
+    """
+    present = history.present.design
+    if present is None or not _has_new(present):
+        return None
+    for moment in reversed(history.moments[: history.at + 1]):
+        before = moment.project.design
+        if before is None or not _has_new(before):
+            # a wish of one of the lens' own ghosts begins so too
+            return before or Design(structure="lens")
+        if (before.structure, before.surfaces) != (present.structure, present.surfaces) or moment.begins:
+            return None
+    return None
+
+
+def _has_new(design: Design) -> bool:
+    return any(wish.ghost is None for wish in design.wishes)
+
+
 def beginning(history: History) -> Moment | None:
     """Return the moment in which the present project was opened; None where that is no step of the history."""
     return next((moment for moment in reversed(history.moments[: history.at + 1]) if moment.begins), None)
