@@ -314,13 +314,16 @@ def test_a_picture_that_is_gone_is_named_as_a_person_does(project, tmp_path):
     session, _ = begin(None)
     screen = Screen(session)
     cases = {
-        folder / "masks" / "heart.png": "the iris image masks/heart.png does not exist beside shot.toml; put it there, or "
+        folder
+        / "masks"
+        / "heart.png": "the iris image masks/heart.png does not exist beside shot.toml; put it there, or "
         "choose another on the panel Iris",
-        tmp_path / "heart.png": f"the iris image heart.png does not exist in {tmp_path}; put it there, or choose another "
+        tmp_path
+        / "heart.png": f"the iris image heart.png does not exist in {tmp_path}; put it there, or choose another "
         "on the panel Iris",
     }
     for mask, said in cases.items():
-        save_project(project.replace(iris=Iris(mask=str(mask))), str(folder / "shot.toml"))
+        save_project(project.replace(iris=Iris(mask=str(mask))), folder / "shot.toml")
         session.open(str(folder / "shot.toml"))
         assert screen.wait(60.0)
         assert screen.problem == said

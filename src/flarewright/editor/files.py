@@ -215,33 +215,42 @@ def project_path(text: str) -> Path:
 def stamp_of(path: str | Path) -> str | None:
     """Return what tells the contents of a file from others; None where none can be read."""
     try:
-        return hashlib.sha256(Path(path).read_bytes()).hexdigest()
+        return _stamp(Path(path).read_bytes())
     except OSError:
         return None
 
 
-def save_project(project: Project, text: str) -> Path:
+def _stamp(data: bytes) -> str:
+    return hashlib.sha256(data).hexdigest()
+
+
+def save_project(
+    project: Project, path: Path, *, look: Callable[[], object] | None = None, replace: bool = True
+) -> str:
     """Write a project file.
 
     Parameters
     ----------
     project : Project
-    text : str
-        Path; `.toml` is added where it is missing.
+    path : Path
+    look, replace
+        As `io.atomic.write_atomically`.
 
     Returns
     -------
-    Path
+    str
+        The stamp of what was written; the file may have been changed by others since.
 
     Raises
     ------
     OutputError
         It cannot be written.
+    FileExistsError
+        When a file lies there that may not be replaced.
     """
-    path = project_path(text)
-    written = project_text(project, folder=path.parent)
-    write_atomically(path, lambda temporary: _write_bytes(temporary, written.encode()))
-    return path
+    data = project_text(project, folder=path.parent).encode()
+    write_atomically(path, lambda temporary: _write_bytes(temporary, data), look=look, replace=replace)
+    return _stamp(data)
 
 
 def command_line(file: str, project: Project) -> str:

@@ -31,7 +31,10 @@ def pictures(project: Project) -> tuple[Named, ...]:
     iris = project.iris
     if iris is None and isinstance(project.lens, Lens):
         iris = project.lens.iris
-    found = [(None if iris is None else iris.mask, "iris image", "Iris"), (project.dirt.image, "drawing of dirt", "Iris")]
+    found = [
+        (None if iris is None else iris.mask, "iris image", "Iris"),
+        (project.dirt.image, "drawing of dirt", "Iris"),
+    ]
     for holdout in (project.holdout, *(light.holdout for light in project.lights)):
         if holdout is not None:
             found += [(holdout.image, "matte", "Light"), (holdout.depth, "depth plate", "Light")]
