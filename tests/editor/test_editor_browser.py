@@ -833,6 +833,9 @@ def test_an_iris_is_drawn_and_a_matte_hides_the_light(tab, tmp_path):
     mask = np.asarray(Image.open(tab.state()["iris"]["mask"]).convert("L"))
     assert mask.mean() / 255.0 == pytest.approx(0.88 * 0.12, rel=0.02)
     assert tab.page.get_by_text("drawn.png, instead of blades").count() == 1
+    # the sample's blades are turned; what is drawn stands as it was drawn
+    tab.until(told("The blades were turned by 10°; the image stands as it was drawn"))
+    assert tab.state()["iris"]["rotation_deg"] == 0.0
     # the sheet begins with it, so that it can be gone on with
     tab.page.click("#mask-draw")
     tab.until("document.querySelector('.sheet')?.dataset.begun")
@@ -842,6 +845,18 @@ def test_an_iris_is_drawn_and_a_matte_hides_the_light(tab, tmp_path):
     assert np.abs(again - mask).max() <= 1.0
     # it is the same picture, so nothing was done
     assert tab.state()["undo"] == "Change the iris"
+    # one that is turned by hand says so on its sheet, and blades come back as they stood
+    type_into(tab, "rotation", "25")
+    tab.until("flarewright.state.iris.rotation_deg === 25")
+    tab.page.click("#mask-draw")
+    assert tab.page.locator("#mask-turned").text_content() == "In the lens this sheet is turned by 25° (Rotation)."
+    tab.page.keyboard.press("Escape")
+    tab.page.click("#mask-none")
+    tab.until("flarewright.state.iris.mask === null && flarewright.state.iris.rotation_deg === 10")
+    for _ in range(2):
+        tab.page.locator("#view").focus()
+        tab.page.keyboard.press("Control+z")
+    tab.until("flarewright.state.iris.mask !== null && flarewright.state.iris.rotation_deg === 0")
     tab.page.locator("#view").focus()
     tab.page.keyboard.press("Control+z")
     tab.until("flarewright.state.iris.mask === null")

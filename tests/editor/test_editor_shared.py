@@ -9,6 +9,7 @@ from flarewright.editor import files
 from flarewright.editor import session as session_module
 from flarewright.editor.deeds import done
 from flarewright.editor.edit_path import length_s
+from flarewright.editor.history import before_mask
 from flarewright.editor.imports import take_in
 from flarewright.editor.session import begin
 from flarewright.editor.shown import png
@@ -97,6 +98,33 @@ def test_pictures_are_taken_for_what_they_were_chosen_for(tmp_path):
         with pytest.raises(FlarewrightError):
             take_in(session, name, data, use)
     assert session.project == before
+    session.keeper.close()
+
+
+def test_the_rotation_of_blades_turns_no_image_that_takes_their_place(tmp_path):
+    session, _ = begin(None)
+    white = png(np.full((8, 8, 3), 255, dtype=np.uint8))
+    grey = png(np.full((8, 8, 3), 128, dtype=np.uint8))
+    assert session.project.iris.rotation_deg == 10.0
+    (told,) = take_in(session, "a.png", white, "mask")
+    assert told.startswith("the blades were turned by 10°; the image stands as it was drawn")
+    assert session.project.iris.rotation_deg == 0.0
+    assert before_mask(session.history).iris.rotation_deg == 10.0
+    # one that was turned by hand is gone on with as it stands
+    session.do("set_iris", {"values": {"rotation_deg": 30.0}})
+    assert take_in(session, "b.png", grey, "mask") == ()
+    assert session.project.iris.rotation_deg == 30.0
+    assert before_mask(session.history).iris.rotation_deg == 10.0
+    for _ in range(3):
+        session.undo()
+    assert (session.project.iris.mask, session.project.iris.rotation_deg) == (None, 10.0)
+    assert before_mask(session.history) is None
+    # blades that stand upright say nothing, and a project that begins with an image had none
+    session.do("set_iris", {"values": {"rotation_deg": 0.0}})
+    assert take_in(session, "a.png", white, "mask") == ()
+    session.put(session.project, "Open", begins=True)
+    session.put(session.project.replace(f_number=11.0), "Open", begins=True)
+    assert before_mask(session.history) is None
     session.keeper.close()
 
 

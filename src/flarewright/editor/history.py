@@ -98,6 +98,22 @@ def committed(
     return History(moments, len(moments) - 1)
 
 
+def before_mask(history: History) -> Project | None:
+    """Return the project as it was before an image took the place of its blades; None where none did or nobody knows."""
+    if not _masked(history.present):
+        return None
+    for moment in reversed(history.moments[: history.at + 1]):
+        if not _masked(moment.project):
+            return moment.project
+        if moment.begins:
+            break
+    return None
+
+
+def _masked(project: Project) -> bool:
+    return project.iris is not None and project.iris.mask is not None
+
+
 def design_before_scratch(history: History) -> Design | None:
     """Return the design as it was before it left the lens' own ghosts out; None where it does not, or always did."""
     before = history.present.design
