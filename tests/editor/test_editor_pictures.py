@@ -1,11 +1,13 @@
 """Pictures of the editor: hit test, outline, matched drafts, working views, looks."""
 
+import io
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from itertools import pairwise
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from flarewright.editor import studio
 from flarewright.editor.drawings import section
@@ -393,6 +395,32 @@ def test_a_slow_picture_is_traced_for_the_screen_first():
         session.undo()
         assert screen.wait(60.0)
         assert grades == ["draft", "soon", "final"]
+
+
+def test_the_target_follows_a_hand_and_is_that_of_its_place(project):
+    def pixels(data):
+        return np.asarray(Image.open(io.BytesIO(data)).resize((96, 54), Image.Resampling.BOX), dtype=float)
+
+    session, _ = begin(None)
+    session.do("set_wish", {"ghost": "4-1", "values": {"move_mm": 3.0, "height": 0.5}})
+    session.do("add_ghost", {"place_mm": -6.0, "radius_mm": 2.0})
+    screen = Screen(session)
+    screen.start()
+    assert screen.wait(60.0)
+    hand, number, final = Hand(screen), screen.number, screen.picture
+    moved = partial(move_light, light=0, x=2.0, y=-3.0)
+    drafts = [hand.target(moved, session.revision), hand.target(moved, session.revision, held=True)]
+    # nothing that is drawn of the picture ends for it
+    assert (screen.number, screen.picture, screen.moved) == (number, final, None)
+    assert hand.target(moved, session.revision - 1) is None
+    before = target_jpeg(screen)
+    session.do("move_light", {"light": 0, "x": 2.0, "y": -3.0})
+    there = target_jpeg(screen)
+    for draft in drafts:
+        assert np.abs(pixels(draft) - pixels(there)).mean() < 1.0
+        assert np.abs(pixels(draft) - pixels(before)).mean() > 4.0
+    assert [Image.open(io.BytesIO(each)).width for each in (*drafts, there)] == [480, 960, 960]
+    assert screen.wait(60.0)
 
 
 def test_a_hand_is_followed_and_let_go(project):

@@ -99,7 +99,7 @@ def committed(
 
 
 def before_mask(history: History) -> Project | None:
-    """Return the project as it was before an image took the place of its blades; None where none did or nobody knows."""
+    """Return the project as it was before an image took the place of its blades; None where nobody knows."""
     if not _masked(history.present):
         return None
     for moment in reversed(history.moments[: history.at + 1]):

@@ -111,15 +111,17 @@ def _picture(desk: Desk, _request: Request, _body: Any) -> Any:
     return _jpeg(packed(desk.screen))
 
 
+def _move(desk: Desk, asked: Mapping[str, Any]) -> tuple[Callable[[Project], Project], int]:
+    """Return what a hand does, with a light or along the path, and the revision that it sees."""
+    revision = int(asked.get("revision", desk.session.revision))
+    if "at" in asked:
+        return partial(go_to, at_s=float(asked["at"])), revision
+    return partial(move_light, light=int(asked["light"]), x=float(asked["x"]), y=float(asked["y"])), revision
+
+
 def _moved(desk: Desk, asked: Mapping[str, Any]) -> Moved | None:
     """Draw the project with a light elsewhere, or at a time of its path."""
-    revision = int(asked.get("revision", desk.session.revision))
-    moved: Callable[[Project], Project]
-    if "at" in asked:
-        moved = partial(go_to, at_s=float(asked["at"]))
-    else:
-        moved = partial(move_light, light=int(asked["light"]), x=float(asked["x"]), y=float(asked["y"]))
-    return desk.hand.picture(moved, revision)
+    return desk.hand.picture(*_move(desk, asked))
 
 
 def _moving(desk: Desk, request: Request, _body: Any) -> Any:
@@ -168,8 +170,12 @@ async def _follow(desk: Desk, socket: WebSocket) -> None:
             await run_in_threadpool(desk.screen.rest)
 
 
-def _target(desk: Desk, _request: Request, _body: Any) -> Any:
-    return _jpeg(viewing.target_jpeg(desk.screen))
+def _target(desk: Desk, request: Request, _body: Any) -> Any:
+    asked = request.query_params
+    if not asked.keys() & {"light", "at"}:
+        return _jpeg(viewing.target_jpeg(desk.screen))
+    found = desk.hand.target(*_move(desk, asked), held="held" in asked)
+    return Response(status_code=204) if found is None else _jpeg(found)
 
 
 def _pick(desk: Desk, request: Request, _body: Any) -> Any:

@@ -475,6 +475,8 @@ function hear(event) {
   if (event.type === 'export') { working('EXR', event.part); return; }
   if (event.type === 'ghosts') { working('', 1); loadGhosts(); return; }
   if (!state) return;
+  // the target's ghosts are as bright as those of the last final picture
+  if (event.type === 'matched') app.view.refreshTarget();
   if (event.type === 'picture') {
     state.picture = event;
     state.view.stops = event.stops;
@@ -482,8 +484,7 @@ function hear(event) {
     working('', 1);
     if (event.number !== app.view.shownNumber) app.view.refresh(true);
     update();
-    // its ghosts are as bright as those of the last final picture
-    if (['final', 'working'].includes(event.grade)) app.view.refreshTarget();
+    if (event.grade === 'working') app.view.refreshTarget();
     if (event.grade === 'final') app.remarks();
   }
   if (event.type === 'solve') { state.solve = event; panels.target.update?.(state); }

@@ -21,7 +21,7 @@ export function targetPanel(app) {
   const compare = h('div', { class: 'buttons', role: 'group', 'aria-label': 'What is shown' });
   const looks = COMPARE.map(([key, words, tip]) => button(words, () => see(key), { 'data-compare': key, tip }));
   compare.append(...looks);
-  const see = (key) => { app.view.compare = key; app.view.refreshTarget(); self.update(app.state); app.view.redraw(); };
+  const see = (key) => { app.view.see(key); self.update(app.state); app.view.redraw(); };
   const drawn = h('p', { class: 'quietly', id: 'target-drawn' });
   const list = h('div', { class: 'buttons' });
   const told = h('p', { class: 'quietly' });
