@@ -1209,7 +1209,8 @@ def test_the_page_says_that_the_target_is_drawn_by_matrices(tab):
 TARGET_PIXELS = (
     "(async (url) => { const got = url ? await createImageBitmap(await (await fetch(url)).blob()) :"
     "flarewright.view.target, c = new OffscreenCanvas(96, 54), p = c.getContext('2d');"
-    "p.imageSmoothingQuality = 'high'; p.drawImage(got, 0, 0, 96, 54); return [...p.getImageData(0, 0, 96, 54).data]; })"
+    "p.imageSmoothingQuality = 'high'; p.drawImage(got, 0, 0, 96, 54);"
+    "return [...p.getImageData(0, 0, 96, 54).data]; })"
 )
 
 
