@@ -6,10 +6,10 @@ export function irisPanel(app) {
   const set = (values, held = '') => app.lively('set_iris', { values }, held, `iris${Object.keys(values)}`);
   const dirt = (values, held = '') => app.lively('set_dirt', { values }, held, `dirt${Object.keys(values)}`);
   const star = (values, held = '') => app.lively('set_starburst', { values }, held, `star${Object.keys(values)}`);
-  const mask = h('span', { class: 'quietly' });
+  const mask = h('span', { class: 'quietly below' });
   const picker = h('input', { type: 'file', accept: '.png,.exr', hidden: true });
   picker.addEventListener('change', async () => { if (picker.files[0]) await app.importFile(picker.files[0], 'mask'); picker.value = ''; });
-  const dirty = h('span', { class: 'quietly' });
+  const dirty = h('span', { class: 'quietly below' });
   const dirtPicker = h('input', { type: 'file', accept: '.png,.exr', hidden: true, name: 'dirt_image' });
   dirtPicker.addEventListener('change', async () => { if (dirtPicker.files[0]) await app.importFile(dirtPicker.files[0], 'dirt'); dirtPicker.value = ''; });
   const sizes = [0, 1].map((k) => h('input', { class: 'number', type: 'text', style: 'width:58px', name: `dust_um_${k}`, 'aria-label': k ? 'Largest speck, micrometres' : 'Least speck, micrometres' }));
