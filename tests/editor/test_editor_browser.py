@@ -833,6 +833,9 @@ def test_an_iris_is_drawn_and_a_matte_hides_the_light(tab, tmp_path):
     mask = np.asarray(Image.open(tab.state()["iris"]["mask"]).convert("L"))
     assert mask.mean() / 255.0 == pytest.approx(0.88 * 0.12, rel=0.02)
     assert tab.page.get_by_text("drawn.png, instead of blades").count() == 1
+    # the sample's blades are turned; what is drawn stands as it was drawn
+    tab.until(told("The blades were turned by 10°; the image stands as it was drawn"))
+    assert tab.state()["iris"]["rotation_deg"] == 0.0
     # the sheet begins with it, so that it can be gone on with
     tab.page.click("#mask-draw")
     tab.until("document.querySelector('.sheet')?.dataset.begun")
@@ -842,6 +845,18 @@ def test_an_iris_is_drawn_and_a_matte_hides_the_light(tab, tmp_path):
     assert np.abs(again - mask).max() <= 1.0
     # it is the same picture, so nothing was done
     assert tab.state()["undo"] == "Change the iris"
+    # one that is turned by hand says so on its sheet, and blades come back as they stood
+    type_into(tab, "rotation", "25")
+    tab.until("flarewright.state.iris.rotation_deg === 25")
+    tab.page.click("#mask-draw")
+    assert tab.page.locator("#mask-turned").text_content() == "In the lens this sheet is turned by 25° (Rotation)."
+    tab.page.keyboard.press("Escape")
+    tab.page.click("#mask-none")
+    tab.until("flarewright.state.iris.mask === null && flarewright.state.iris.rotation_deg === 10")
+    for _ in range(2):
+        tab.page.locator("#view").focus()
+        tab.page.keyboard.press("Control+z")
+    tab.until("flarewright.state.iris.mask !== null && flarewright.state.iris.rotation_deg === 0")
     tab.page.locator("#view").focus()
     tab.page.keyboard.press("Control+z")
     tab.until("flarewright.state.iris.mask === null")
@@ -1048,6 +1063,16 @@ def test_from_scratch_can_be_taken_back(tab):
     tab.until("flarewright.state.design.own_ghosts")
     assert tab.state()["design"]["structure"] == "lens"
     assert structure.input_value() == "lens"
+    # so can the ghost, and what it needed goes with it
+    tab.page.select_option("select[name=structure]", "any")
+    tab.page.locator("#page button", has_text="Take all back").click()
+    tab.until("flarewright.state.design === null")
+    tab.page.click("#wish-add")
+    tab.until("flarewright.state.design?.structure === 'any'")
+    tab.page.click("#wish-back")
+    tab.until("flarewright.state.design.wishes.length === 0")
+    assert structure.input_value() == "lens"
+    assert tab.said == []
 
 
 def test_the_target_is_shown_as_the_picture_is(tab):
@@ -1179,3 +1204,111 @@ def test_the_page_says_that_the_target_is_drawn_by_matrices(tab):
     tab.until("document.getElementById('target-drawn').textContent.includes('24° off')")
     tab.page.click("[data-compare=physical]")
     assert words.is_hidden()
+
+
+TARGET_PIXELS = (
+    "(async (url) => { const got = url ? await createImageBitmap(await (await fetch(url)).blob()) :"
+    "flarewright.view.target, c = new OffscreenCanvas(96, 54), p = c.getContext('2d');"
+    "p.imageSmoothingQuality = 'high'; p.drawImage(got, 0, 0, 96, 54);"
+    "return [...p.getImageData(0, 0, 96, 54).data]; })"
+)
+
+
+def target_off(tab, url):
+    """Return how far the shown target is from another one, in mean codes of 255."""
+    shown, other = (np.array(tab.page.evaluate(TARGET_PIXELS, each), dtype=float) for each in (None, url))
+    return float(np.abs(shown - other).mean())
+
+
+@pytest.mark.parametrize("compare", ["target", "wipe", "side"])
+def test_the_target_follows_the_hand(tab, compare):
+    tab.tab("target")
+    tab.page.click(f"[data-compare={compare}]")
+    tab.until("flarewright.view.target")
+    tab.rest()
+    mouse, (x, y) = tab.page.mouse, tab.light()
+    mouse.move(x, y)
+    mouse.down()
+    away = target_off(tab, "/api/target?light=0&x=-4&y=-3")
+    for k in range(1, 61):
+        mouse.move(x - 3 * k, y + k)
+        tab.page.wait_for_timeout(16)
+    followed, shown = tab.js("[flarewright.view.stats.targets.length, flarewright.view.stats.shown.length]")
+    assert 2 <= followed < shown
+    # what it holds is what it shows, on either side
+    off = [away]
+    for _ in range(50):
+        tab.page.wait_for_timeout(100)
+        held_x, held_y = tab.js("flarewright.view.mover.lights[0]")
+        off.append(target_off(tab, f"/api/target?light=0&x={held_x}&y={held_y}&held=1"))
+        if off[-1] < 0.1 and tab.js("flarewright.view.shownGrade") == "final":
+            break
+    assert off[-1] < 0.1
+    assert tab.js("flarewright.view.target.width") == 960
+    assert away > 2.0
+    # and where it has let go, the target of the project stands, as sharp as ever
+    mouse.move(x - 200, y + 70)
+    mouse.up()
+    tab.rest()
+    tab.until("flarewright.view.targetOld === false && flarewright.view.target.width === 960")
+    tab.page.wait_for_timeout(700)
+    assert target_off(tab, "/api/target") < 0.1
+    moved = "/api/target?light=0&x={}&y={}".format(*tab.state()["lights"][0]["field_deg"])
+    assert target_off(tab, moved) < 0.9
+
+
+def test_a_hand_that_comes_back_leaves_no_target_of_elsewhere(tab):
+    tab.tab("target")
+    tab.page.click("[data-compare=wipe]")
+    tab.until("flarewright.view.target")
+    tab.rest()
+    steps = tab.state()["steps"]["at"]
+    mouse, (x, y) = tab.page.mouse, tab.light()
+    mouse.move(x, y)
+    mouse.down()
+    mouse.move(x - 200, y + 60, steps=8)
+    tab.until("flarewright.view.stats.targets.length > 0")
+    tab.page.wait_for_timeout(600)
+    assert target_off(tab, "/api/target") > 1.0
+    # to the very place where it was taken: no deed follows from it
+    start = tab.state()["lights"][0]["field_deg"]
+    tab.js(f"flarewright.view.drag.now = {start}")
+    tab.js("flarewright.view.lightPage(0)")
+    mouse.up()
+    tab.rest()
+    tab.page.wait_for_timeout(700)
+    assert tab.state()["steps"]["at"] == steps
+    assert target_off(tab, "/api/target") < 0.1
+    # nor is one shown again that was out of sight while the light was moved
+    tab.page.click("[data-compare=physical]")
+    tab.drag(tab.light(), tab.at(0.3, 0.3))
+    tab.page.route("**/api/target*", lambda route: None)
+    tab.page.click("[data-compare=wipe]")
+    assert tab.js("flarewright.view.target") is None
+    tab.page.unroute("**/api/target*")
+
+
+def test_keys_that_move_the_light_end_the_play(tab):
+    """The picture of the place where it went on to rest had never come."""
+    tab.page.click("#path-key")
+    tab.until("flarewright.state.lights[0].keys.length === 1")
+    type_into(tab, "path_time", "9")
+    tab.rest()
+    tab.drag(tab.light(), tab.at(0.3, 0.3))
+    tab.rest()
+    tab.page.click("#path-key")
+    tab.until("flarewright.state.lights[0].keys.length === 2")
+    for end in ("ArrowRight", "open"):
+        tab.page.click("#path-play")
+        tab.until("flarewright.player.playing && flarewright.view.shownGrade === 'moving'")
+        tab.page.wait_for_timeout(400)
+        if end == "open":
+            tab.js("fetch('/api/open', {method: 'POST', body: JSON.stringify({text: 'tessar-brendel'})})")
+            tab.until("flarewright.state.lens.name.includes('Tessar')")
+        else:
+            tab.page.locator("#view").focus()
+            tab.page.keyboard.press(end)
+        tab.until("!flarewright.player.playing")
+        tab.rest()
+        assert tab.js("flarewright.view.shownGrade") == "final"
+        assert not tab.js("flarewright.view.mover.live")

@@ -1,17 +1,20 @@
 """Pictures of the editor: hit test, outline, matched drafts, working views, looks."""
 
+import io
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from itertools import pairwise
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from flarewright.editor import studio
 from flarewright.editor.drawings import section
 from flarewright.editor.edit_shot import move_light
-from flarewright.editor.files import project_for_lens
+from flarewright.editor.files import project_for_lens, save_project
 from flarewright.editor.hand import Hand
+from flarewright.editor.pictures import in_short
 from flarewright.editor.screen import Screen, packed, shown_pixels
 from flarewright.editor.seen import Seen, SeenGhost, alone, is_there, outline, see, under
 from flarewright.editor.session import begin
@@ -20,7 +23,7 @@ from flarewright.editor.snapshot import ghosts_of
 from flarewright.editor.view import View
 from flarewright.editor.viewing import outline_png, picked, target_jpeg
 from flarewright.errors import ProjectError
-from flarewright.model import Camera, Everywhere, Iris, Light, Output, Quality, QuarterWave
+from flarewright.model import Camera, Everywhere, Holdout, Iris, Light, Output, Quality, QuarterWave
 from flarewright.optics.color import luminance_weights
 from flarewright.render.render import render
 from flarewright.render.working import GREY_R, working_ghosts
@@ -307,6 +310,38 @@ def test_the_screen_keeps_the_last_good_picture(project):
     assert screen.picture.project == lens
 
 
+def test_a_picture_that_is_gone_is_named_as_a_person_does(project, tmp_path):
+    folder = tmp_path / "shot"
+    (folder / "masks").mkdir(parents=True)
+    session, _ = begin(None)
+    screen = Screen(session)
+    cases = {
+        folder
+        / "masks"
+        / "heart.png": "the iris image masks/heart.png does not exist beside shot.toml; put it there, or "
+        "choose another on the panel Iris",
+        tmp_path
+        / "heart.png": f"the iris image heart.png does not exist in {tmp_path}; put it there, or choose another "
+        "on the panel Iris",
+    }
+    for mask, said in cases.items():
+        save_project(project.replace(iris=Iris(mask=str(mask))), folder / "shot.toml")
+        session.open(str(folder / "shot.toml"))
+        assert screen.wait(60.0)
+        assert screen.problem == said
+    # one that is there and is none is named shortly too, in the words of its reader
+    (tmp_path / "heart.png").write_bytes(b"nothing")
+    session.open(str(folder / "shot.toml"))
+    assert screen.wait(60.0)
+    assert screen.problem.startswith("heart.png: this cannot be read as an image (")
+    assert str(tmp_path) not in screen.problem
+    gone = str(folder / "ridge.png")
+    matte = project.replace(holdout=Holdout(image=gone))
+    told = "the matte ridge.png does not exist beside shot.toml; put it there, or choose another on the panel Light"
+    assert in_short(f"{gone}: there is no such holdout image", matte, str(folder / "shot.toml")) == told
+    assert in_short("the lens makes no image", matte, None) == "the lens makes no image"
+
+
 def test_the_first_traced_picture_of_a_zoom_can_hardly_be_told_from_the_final_one():
     """The Canon's 351 ghosts: no jump in brightness, and hardly one in any pixel, as eight bits show them."""
     # the first one has no rings
@@ -360,6 +395,32 @@ def test_a_slow_picture_is_traced_for_the_screen_first():
         session.undo()
         assert screen.wait(60.0)
         assert grades == ["draft", "soon", "final"]
+
+
+def test_the_target_follows_a_hand_and_is_that_of_its_place(project):
+    def pixels(data):
+        return np.asarray(Image.open(io.BytesIO(data)).resize((96, 54), Image.Resampling.BOX), dtype=float)
+
+    session, _ = begin(None)
+    session.do("set_wish", {"ghost": "4-1", "values": {"move_mm": 3.0, "height": 0.5}})
+    session.do("add_ghost", {"place_mm": -6.0, "radius_mm": 2.0})
+    screen = Screen(session)
+    screen.start()
+    assert screen.wait(60.0)
+    hand, number, final = Hand(screen), screen.number, screen.picture
+    moved = partial(move_light, light=0, x=2.0, y=-3.0)
+    drafts = [hand.target(moved, session.revision), hand.target(moved, session.revision, held=True)]
+    # nothing that is drawn of the picture ends for it
+    assert (screen.number, screen.picture, screen.moved) == (number, final, None)
+    assert hand.target(moved, session.revision - 1) is None
+    before = target_jpeg(screen)
+    session.do("move_light", {"light": 0, "x": 2.0, "y": -3.0})
+    there = target_jpeg(screen)
+    for draft in drafts:
+        assert np.abs(pixels(draft) - pixels(there)).mean() < 1.0
+        assert np.abs(pixels(draft) - pixels(before)).mean() > 4.0
+    assert [Image.open(io.BytesIO(each)).width for each in (*drafts, there)] == [480, 960, 960]
+    assert screen.wait(60.0)
 
 
 def test_a_hand_is_followed_and_let_go(project):

@@ -63,8 +63,8 @@ def test_the_page_and_every_question_it_asks(desk):
     assert state["lens"]["facts"]["efl"] == pytest.approx(99.2358, abs=1e-3)
     assert state["picture"]["grade"] == "final"
     asked = {
-        "/api/picture", "/api/moving?light=0&x=3&y=1", "/api/target", "/api/outline?ghost=8-6",
-        "/api/coating?row=0", "/api/map?ghost=8-6", "/api/thumbnail/tessar-brendel",
+        "/api/picture", "/api/moving?light=0&x=3&y=1", "/api/target", "/api/target?light=0&x=3&y=1",
+        "/api/outline?ghost=8-6", "/api/coating?row=0", "/api/map?ghost=8-6", "/api/thumbnail/tessar-brendel",
         "/api/export/png",
     }  # fmt: skip
     kinds = {b"\xff\xd8": "jpeg", b"\x89P": "png", b"<s": "svg"}
@@ -84,6 +84,8 @@ def test_the_page_and_every_question_it_asks(desk):
     assert "N-BK7" in str(told(desk, "/api/glasses?q=n-bk")[1])
     assert len(told(desk, "/api/library")[1]["lenses"]) >= 12
     assert told(desk, "/api/ghosts")[1]["ghosts"][0]["share"] == 1.0
+    # a hand that has let go is shown no target any more
+    assert ask(desk, "/api/target?at=0&revision=-1") == (204, b"")
     spoken = {path.split("?")[0] for path in asked} | {"/api/state", "/api/pick", "/api/places", "/api/glasses"}
     spoken |= {"/api/library", "/api/ghosts", "/api/command", "/api/section", "/api/mask"}
     assert told(desk, "/api/mask") == (400, {"error": "the iris has no mask; load or draw one"})

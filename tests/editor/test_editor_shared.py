@@ -5,8 +5,11 @@ import os
 import numpy as np
 import pytest
 
+from flarewright.editor import files
+from flarewright.editor import session as session_module
 from flarewright.editor.deeds import done
 from flarewright.editor.edit_path import length_s
+from flarewright.editor.history import before_mask
 from flarewright.editor.imports import take_in
 from flarewright.editor.session import begin
 from flarewright.editor.shown import png
@@ -98,6 +101,33 @@ def test_pictures_are_taken_for_what_they_were_chosen_for(tmp_path):
     session.keeper.close()
 
 
+def test_the_rotation_of_blades_turns_no_image_that_takes_their_place(tmp_path):
+    session, _ = begin(None)
+    white = png(np.full((8, 8, 3), 255, dtype=np.uint8))
+    grey = png(np.full((8, 8, 3), 128, dtype=np.uint8))
+    assert session.project.iris.rotation_deg == 10.0
+    (told,) = take_in(session, "a.png", white, "mask")
+    assert told.startswith("the blades were turned by 10°; the image stands as it was drawn")
+    assert session.project.iris.rotation_deg == 0.0
+    assert before_mask(session.history).iris.rotation_deg == 10.0
+    # one that was turned by hand is gone on with as it stands
+    session.do("set_iris", {"values": {"rotation_deg": 30.0}})
+    assert take_in(session, "b.png", grey, "mask") == ()
+    assert session.project.iris.rotation_deg == 30.0
+    assert before_mask(session.history).iris.rotation_deg == 10.0
+    for _ in range(3):
+        session.undo()
+    assert (session.project.iris.mask, session.project.iris.rotation_deg) == (None, 10.0)
+    assert before_mask(session.history) is None
+    # blades that stand upright say nothing, and a project that begins with an image had none
+    session.do("set_iris", {"values": {"rotation_deg": 0.0}})
+    assert take_in(session, "a.png", white, "mask") == ()
+    session.put(session.project, "Open", begins=True)
+    session.put(session.project.replace(f_number=11.0), "Open", begins=True)
+    assert before_mask(session.history) is None
+    session.keeper.close()
+
+
 def test_two_editors_of_one_project_do_not_fight(tmp_path):
     first, told = begin("tessar-brendel")
     assert told == ""
@@ -132,6 +162,12 @@ def test_two_editors_of_one_project_do_not_fight(tmp_path):
     beside.keeper.close()
 
 
+def turned(path):
+    """Return what another program makes of a project file."""
+    text = path.read_text()
+    return text.replace("blades = ", "rotation_deg = 5.0\nblades = ", 1).replace("\nrotation_deg = 0.0", "")
+
+
 def test_what_others_saved_meanwhile_is_never_overwritten_unasked(tmp_path):
     """Neither by a session that was cut off, nor after undo of Open, nor where the clock tells no change."""
     one, two = begin("tessar-brendel")[0], begin("heliar-tronnier")[0]
@@ -142,10 +178,8 @@ def test_what_others_saved_meanwhile_is_never_overwritten_unasked(tmp_path):
     one.do("set_iris", {"values": {"blades": 7}})
     one.keeper.close()
     times = path.stat()
-    path.write_text(
-        path.read_text().replace("blades = ", "rotation_deg = 5.0\nblades = ", 1).replace("\nrotation_deg = 0.0", "")
-    )
-    changed = path.read_text()
+    changed = turned(path)
+    path.write_text(changed)
     os.utime(path, ns=(times.st_atime_ns, times.st_mtime_ns))
     again = begin("tessar-brendel")[0]
     assert (again.file, again.clean) == (str(other), False)
@@ -164,6 +198,72 @@ def test_what_others_saved_meanwhile_is_never_overwritten_unasked(tmp_path):
     again.save(str(path))
     assert read_project(path).iris.blades == 9
     again.keeper.close()
+
+
+def after(monkeypatch, module, name, call, work):
+    """Let another program do something right after the so-many-th call of a function of ours."""
+    ours, calls = getattr(module, name), []
+
+    def both(*values, **named):
+        found = ours(*values, **named)
+        calls.append(found)
+        if len(calls) == call:
+            work()
+        return found
+
+    monkeypatch.setattr(module, name, both)
+
+
+def test_what_others_save_while_this_is_written_is_not_overwritten(tmp_path, monkeypatch):
+    session = begin("tessar-brendel")[0]
+    path = session.save(str(tmp_path / "shot.toml"))
+    theirs = turned(path)
+    session.do("set_iris", {"values": {"blades": 9}})
+    # changed between the first look and the last
+    with monkeypatch.context() as patch:
+        after(patch, files, "_write_bytes", 1, lambda: path.write_text(theirs))
+        with pytest.raises(ProjectError, match=r"shot.toml was changed by another program since .* save again"):
+            session.save(str(path))
+    assert path.read_text() == theirs
+    assert not session.clean
+    session.save(str(path))
+    assert read_project(path).iris.blades == 9
+    # one that comes where none was, before the last look and right after it
+    for name, module, call, function in (("a", files, 1, "_write_bytes"), ("b", session_module, 2, "stamp_of")):
+        new = tmp_path / f"{name}.toml"
+        with monkeypatch.context() as patch:
+            after(patch, module, function, call, lambda new=new: new.write_text(theirs))
+            with pytest.raises(ProjectError, match=f"{new.name} is there already; save again to overwrite it"):
+                session.save(str(new))
+        assert new.read_text() == theirs
+    # and nothing half written is left
+    assert sorted(each.name for each in tmp_path.iterdir()) == ["a.toml", "b.toml", "shot.toml", "state"]
+    session.save(str(tmp_path / "b.toml"))
+    assert read_project(tmp_path / "b.toml").iris.blades == 9
+    session.keeper.close()
+
+
+def test_what_others_save_right_after_is_theirs(tmp_path, monkeypatch):
+    """What was written is known by its own bytes, and what was read by those that lay there before."""
+    session = begin("tessar-brendel")[0]
+    path = session.save(str(tmp_path / "shot.toml"))
+    theirs = turned(path)
+    session.do("set_iris", {"values": {"blades": 9}})
+    with monkeypatch.context() as patch:
+        after(patch, session_module, "save_project", 1, lambda: path.write_text(theirs))
+        session.save(str(path))
+    session.do("set_iris", {"values": {"blades": 7}})
+    with pytest.raises(ProjectError, match="was changed by another program"):
+        session.save(str(path))
+    session.keeper.close()
+    with monkeypatch.context() as patch:
+        after(patch, session_module, "open_any", 1, lambda: path.write_text(theirs.replace("5.0", "6.0")))
+        late = begin(str(path))[0]
+    late.do("set_iris", {"values": {"blades": 5}})
+    with pytest.raises(ProjectError, match="was changed by another program"):
+        late.save(str(path))
+    assert read_project(path).iris.rotation_deg == 6.0
+    late.keeper.close()
 
 
 def test_without_a_place_for_its_state_the_editor_works_all_the_same(tmp_path, monkeypatch):

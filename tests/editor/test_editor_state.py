@@ -539,6 +539,68 @@ def test_from_scratch_needs_a_ghost_that_was_added(project):
     assert do(added, "remove_wish", number=0).design.own_ghosts is True
 
 
+def without_the_last(session):
+    """Take the only new ghost back as the page does; return the structure that is left."""
+    design = session.project.design
+    before = past.design_before_added(session.history) or past.design_before_scratch(session.history)
+    kept = None if before is None else {"structure": before.structure, "fixed_rows": before.fixed_rows}
+    number = next(k for k, wish in enumerate(design.wishes) if wish.ghost is None)
+    session.do("remove_wish", {"number": number, "before": kept})
+    return session.project.design.structure
+
+
+def test_what_a_new_ghost_needed_goes_with_the_last_one(project):
+    session, _ = begin(None)
+    session.put(project, "Begin", begins=True)
+    add = ("add_ghost", {"place_mm": 5.0, "radius_mm": 1.0})
+
+    def search(**values):
+        session.do("set_design", {"values": values})
+
+    # as the page shows where nothing is wished
+    session.do(*add)
+    assert session.project.design.structure == "any"
+    assert without_the_last(session) == "lens"
+    # and as a person had it, with what was to stay
+    session.do("set_wish", {"ghost": "4-1", "values": {"move_mm": 2.0}})
+    search(fixed_rows=(0, 1))
+    session.do(*add)
+    session.do(*add)
+    session.do("set_new_wish", {"number": 2, "values": {"radius_mm": 2.0}})
+    session.do("remove_wish", {"number": 1, "before": None})
+    assert session.project.design.structure == "any"
+    assert without_the_last(session) == "lens"
+    assert session.project.design.fixed_rows == (0, 1)
+    # any structure was wanted before
+    search(structure="any")
+    session.do(*add)
+    assert without_the_last(session) == "any"
+    # or was chosen since, by itself or with a count of surfaces
+    search(structure="lens")
+    session.do(*add)
+    search(structure="lens")
+    search(structure="any")
+    assert without_the_last(session) == "any"
+    search(structure="lens")
+    session.do(*add)
+    search(surfaces=12, structure="any")
+    assert without_the_last(session) == "any"
+    # from scratch asked for it only as long as there was a ghost to aim at
+    search(surfaces=None, structure="lens")
+    session.do(*add)
+    search(own_ghosts=False, structure="any")
+    assert without_the_last(session) == "lens"
+    session.do(*add)
+    search(structure="lens")
+    search(own_ghosts=False, structure="any")
+    assert without_the_last(session) == "lens"
+    # nobody knows what was before a file that has such a ghost
+    session.put(do(project, *add[:1], **add[1]), "Open", begins=True)
+    assert past.design_before_added(session.history) is None
+    assert without_the_last(session) == "any"
+    session.keeper.close()
+
+
 def test_wishes_make_the_target(project):
     wished = do(project, "set_wish", ghost="4-1", values={"move_mm": 2.0, "height": 0.5})
     wished = do(wished, "set_wish", ghost="8-6", values={"action": "remove"})

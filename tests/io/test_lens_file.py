@@ -591,3 +591,28 @@ def test_nothing_half_written_is_left(tmp_path):
         write_atomically(tmp_path, fails)
     with pytest.raises(OutputError, match="nothing was written"):
         write_atomically(target, lambda path: None)
+
+
+def test_a_file_that_comes_up_to_the_last_is_left_as_it_is(tmp_path, monkeypatch):
+    target = tmp_path / "out.txt"
+
+    def ours(path: Path) -> None:
+        path.write_text("ours")
+
+    def refuse() -> None:
+        raise OutputError("seen")
+
+    write_atomically(target, ours, replace=False)
+    assert target.read_text() == "ours"
+    target.write_text("theirs")
+    with pytest.raises(OutputError, match="seen"):
+        write_atomically(target, ours, look=refuse)
+    with pytest.raises(FileExistsError):
+        write_atomically(target, ours, replace=False)
+    # nor where the file system knows no hard links
+    monkeypatch.setattr("os.link", lambda *_: (_ for _ in ()).throw(PermissionError(1, "Operation not permitted")))
+    with pytest.raises(FileExistsError):
+        write_atomically(target, ours, replace=False)
+    assert target.read_text() == "theirs"
+    write_atomically(tmp_path / "new.txt", ours, replace=False)
+    assert sorted(each.name for each in tmp_path.iterdir()) == ["new.txt", "out.txt"]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -262,3 +263,35 @@ def test_dirt_in_ghosts_takes_its_share_and_leaves_the_edges():
     assert dirty.sum(dtype=float) == pytest.approx(kept * clean.sum(dtype=float), rel=0.15)
     # smooth cells are drawn whole where nothing cuts them, triangle by triangle through a mask
     assert (dirty <= clean + 0.02 * clean.max()).all()
+
+
+def test_the_fringes_of_a_scratch_fade_as_colours_mix_and_end_nowhere():
+    """Second method: sinc^2 of every wavelength, added up along the middle of a scratch's fan, orders 2 to 8."""
+    dirt, N, pitch = Dirt(scratches_per_cm2=1.0, scratch_um=40.0, seed=3), 16.0, 0.02
+    soil, radius_mm = Soil(dirt), 8.0
+    pattern = pupil_pattern(Iris(), radius_mm=radius_mm, soil=soil)
+    (term,) = pattern.veil
+    bright = np.flatnonzero(term.angular > 0.99 * term.angular.max())
+    direction = math.pi * float(np.median(bright)) / len(term.angular)
+    weights = np.exp(-(((WAVES - 550.0) / 25.0) ** 2))[:, None] * np.ones(3)
+    place = np.arange(3.0, 8.0 * 0.55e-3 * 2.0 * N / (40e-3 / radius_mm), 0.15)
+    wide, high = (int(abs(part) * place[-1] / pitch) + 20 for part in (math.cos(direction), math.sin(direction)))
+    cx = 10.0 if math.cos(direction) > 0.0 else wide - 10.0
+    frame = ((pitch, pitch), (wide, high), (cx, high - 10.0), WAVES, weights)
+    spread_light = starburst_layer(Iris(), N, *frame, pattern=pattern, threads=None)
+    clean = starburst_layer(Iris(), N, *frame, pattern=replace(pattern, veil=()), threads=None)
+    columns = np.floor(cx + place * math.cos(direction) / pitch).astype(int)
+    rows = np.floor(high - 10.0 - place * math.sin(direction) / pitch).astype(int)
+    found = (spread_light - clean)[rows, columns, 0]
+    # as far from the middle as the pixel is, not the place that it holds
+    r = pitch * np.hypot(columns + 0.5 - cx, rows + 0.5 - (high - 10.0))
+    scale = 2.0 * N * WAVES * 1e-6
+    s = r[:, None] / scale
+    order = s * 40e-3 / radius_mm
+    even = (1.0 / s**3 / scale**2 @ weights[:, 0]) * 0.5
+    fringes = (np.sinc(order) ** 2 * (math.pi * order) ** 2 / s**3 / scale**2) @ weights[:, 0]
+    ratio = found / even
+    ratio *= (fringes / even).mean() / ratio.mean()
+    np.testing.assert_allclose(ratio, fringes / even, rtol=0.0, atol=0.02)
+    # they are plain far beyond the fourth order
+    assert np.ptp((fringes / even)[order[:, 10] > 5.0]) > 0.5

@@ -8,7 +8,7 @@ from typing import Any
 from ..errors import ProjectError
 from ..io.project_file import parse_coating_choice
 from ..io.spectrum_text import parse_spectrum
-from ..model import BlackBody, Everywhere, Holdout, Light, PerRow, Project, QuarterWave, Surface
+from ..model import BlackBody, Everywhere, Holdout, Iris, Light, PerRow, Project, QuarterWave, Surface
 from ..render.prepare import as_lens, settle
 
 # a drag goes no further out than this: beyond it a flat picture has no place for the light
@@ -73,9 +73,14 @@ def set_fields(project: Project, values: dict[str, Any]) -> Project:
     return changed
 
 
+def iris_of(project: Project) -> Iris:
+    """Return the iris: the project's own, else that of its lens file."""
+    return project.iris if project.iris is not None else as_lens(project.lens).iris
+
+
 def set_iris(project: Project, values: dict[str, Any]) -> Project:
     """Change the iris; what is not said stays as the lens file has it."""
-    iris = project.iris if project.iris is not None else as_lens(project.lens).iris
+    iris = iris_of(project)
     changes = dict(values)
     if changes.get("blades") in (1, 2):
         # the slider passes over numbers that no iris has

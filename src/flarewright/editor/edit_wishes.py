@@ -58,12 +58,28 @@ def add_ghost(project: Project, place_mm: float, radius_mm: float) -> Project:
     return _with(project, design.replace(structure="any", fixed_rows=()), (*design.wishes, new))
 
 
-def remove_wish(project: Project, number: int) -> Project:
-    """Take a wish back."""
+def remove_wish(project: Project, number: int, before: dict[str, Any] | None = None) -> Project:
+    """Take a wish back.
+
+    Parameters
+    ----------
+    project : Project
+    number : int
+    before : dict, optional
+        Structure and fixed rows as they were before the first new ghost was added (`history.design_before_added`): with
+        the last one goes what it needed.
+
+    Returns
+    -------
+    Project
+    """
     design = project.design
     if design is None or not 0 <= number < len(design.wishes):
         raise ProjectError(f"there is no wish {number}")
-    return _with(project, design, tuple(wish for k, wish in enumerate(design.wishes) if k != number))
+    left = tuple(wish for k, wish in enumerate(design.wishes) if k != number)
+    if before is not None and _any_new(design.wishes) and not _any_new(left):
+        design = design.replace(**before)
+    return _with(project, design, left)
 
 
 def set_new_wish(project: Project, number: int, values: dict[str, Any]) -> Project:

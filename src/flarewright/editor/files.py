@@ -25,6 +25,7 @@ from ..model import Camera, Iris, Lens, Light, Preset, Project
 from ..render.prepare import complete_lens, first_order, load_lens, settle
 from ..render.render import render
 from .edit_lens import first_coating, own_lens
+from .pictures import pictures
 from .seen import Seen
 
 SAMPLE = "heliar-tronnier"
@@ -185,9 +186,9 @@ def imported(name: str, data: bytes, folder: Path) -> Imported:
             if _is_project(table):
                 found = project_from_data(table, folder=folder, where=plain)
                 settle(found)
-                for image in _images(found):
-                    if Path(image).parent == folder and not Path(image).is_file():
-                        raise ProjectError(f"{image} does not exist")
+                for image in pictures(found):
+                    if Path(image.path).parent == folder and not Path(image.path).is_file():
+                        raise ProjectError(f"{image.path} does not exist")
                 return Imported(project=found)
         lens = load_lens(path, remarks=remarks)
     except FlarewrightError as error:
@@ -197,14 +198,6 @@ def imported(name: str, data: bytes, folder: Path) -> Imported:
             words = f"{plain}: {words.replace(f'{folder}/', '')}; a dropped file comes alone, so use Open for this one"
         raise type(error)(words) from None
     return Imported(lens=lens.replace(name=lens.name or plain), remarks=tuple(remarks))
-
-
-def _images(project: Project) -> tuple[str, ...]:
-    """Return the paths of all pictures that a project reads."""
-    iris = None if project.iris is None else project.iris.mask
-    holdouts = (project.holdout, *(light.holdout for light in project.lights))
-    hiding = (path for holdout in holdouts if holdout is not None for path in (holdout.image, holdout.depth))
-    return tuple(path for path in (iris, project.dirt.image, *hiding) if path is not None)
 
 
 def _write_bytes(path: Path, data: bytes) -> None:
@@ -222,33 +215,42 @@ def project_path(text: str) -> Path:
 def stamp_of(path: str | Path) -> str | None:
     """Return what tells the contents of a file from others; None where none can be read."""
     try:
-        return hashlib.sha256(Path(path).read_bytes()).hexdigest()
+        return _stamp(Path(path).read_bytes())
     except OSError:
         return None
 
 
-def save_project(project: Project, text: str) -> Path:
+def _stamp(data: bytes) -> str:
+    return hashlib.sha256(data).hexdigest()
+
+
+def save_project(
+    project: Project, path: Path, *, look: Callable[[], object] | None = None, replace: bool = True
+) -> str:
     """Write a project file.
 
     Parameters
     ----------
     project : Project
-    text : str
-        Path; `.toml` is added where it is missing.
+    path : Path
+    look, replace
+        As `io.atomic.write_atomically`.
 
     Returns
     -------
-    Path
+    str
+        The stamp of what was written; the file may have been changed by others since.
 
     Raises
     ------
     OutputError
         It cannot be written.
+    FileExistsError
+        When a file lies there that may not be replaced.
     """
-    path = project_path(text)
-    written = project_text(project, folder=path.parent)
-    write_atomically(path, lambda temporary: _write_bytes(temporary, written.encode()))
-    return path
+    data = project_text(project, folder=path.parent).encode()
+    write_atomically(path, lambda temporary: _write_bytes(temporary, data), look=look, replace=replace)
+    return _stamp(data)
 
 
 def command_line(file: str, project: Project) -> str:

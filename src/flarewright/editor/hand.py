@@ -16,10 +16,12 @@ from ..model import Project
 from ..render.display import view_sum
 from ..render.moving import Sheet, Still, moving_picture
 from . import studio
+from .edit_wishes import target_project
 from .screen import Screen, pixels_of_picture
 from .shown import jpeg
 from .studio import Picture
 from .view import View
+from .viewing import packed_target
 
 # sides of a picture as parts of the viewport's, and the time that one may take
 SCALES = (1.0, 2.0 / 3.0, 0.5)
@@ -27,6 +29,8 @@ SLOW_S, FAST_S = 0.04, 0.024
 # so many in a row decide: one that another program delayed does not
 STEADY = 4
 QUALITY = 80
+# the target is a draft beside the picture, and most of the time is the picture's
+TARGET_SCALE = SCALES[2]
 
 
 @dataclass(frozen=True)
@@ -62,6 +66,7 @@ class Hand:
         self._scale = 0
         self._leaning = 0
         self._sheets: tuple[Sheet, ...] = ()
+        self._target_sheets: tuple[Sheet, ...] = ()
 
     def picture(self, moved: Callable[[Project], Project], revision: int) -> Moved | None:
         """Draw the project as the hand has it.
@@ -100,6 +105,38 @@ class Hand:
         # the next one is drawn while this one is packed
         data = jpeg(self._pixels(drawn), QUALITY)
         return Moved(project, data, time.perf_counter() - begun)
+
+    def target(self, moved: Callable[[Project], Project], revision: int, *, held: bool = False) -> bytes | None:
+        """Draw the fictional target as the hand has it; what is drawn of the picture itself goes on.
+
+        Parameters
+        ----------
+        moved, revision
+            As of `picture`.
+        held : bool
+            The hand holds still and its picture is traced: as large as that one.
+
+        Returns
+        -------
+        bytes or None
+            JPEG; None where the hand has let go already.
+        """
+        session = self.screen.session
+        with self._one:
+            if revision != session.revision:
+                return None
+            project = moved(session.project)
+            view, scale = session.view, 1.0 if held else TARGET_SCALE
+            bare = target_project(project)
+            still = None
+            if not view.grey and not view.unclipped:
+                still = moving_picture(studio.moving_stage(bare, scale, ()), (*self._target_sheets, *self._sheets))
+            if still is None:
+                drawn = studio.take(bare, "moving", view, scale=scale)
+            else:
+                self._target_sheets = still.sheets
+                drawn = Picture(bare, "moving", still.ghosts, still.rest, 0.0)
+        return packed_target(self.screen, project, drawn, QUALITY)
 
     def prepare(self) -> None:
         """Draw once what all pictures of a hand share, before it moves."""

@@ -98,6 +98,22 @@ def committed(
     return History(moments, len(moments) - 1)
 
 
+def before_mask(history: History) -> Project | None:
+    """Return the project as it was before an image took the place of its blades; None where nobody knows."""
+    if not _masked(history.present):
+        return None
+    for moment in reversed(history.moments[: history.at + 1]):
+        if not _masked(moment.project):
+            return moment.project
+        if moment.begins:
+            break
+    return None
+
+
+def _masked(project: Project) -> bool:
+    return project.iris is not None and project.iris.mask is not None
+
+
 def design_before_scratch(history: History) -> Design | None:
     """Return the design as it was before it left the lens' own ghosts out; None where it does not, or always did."""
     before = history.present.design
@@ -106,6 +122,28 @@ def design_before_scratch(history: History) -> Design | None:
         if before is None or before.own_ghosts:
             break
     return None if before is None or not before.own_ghosts or before is history.present.design else before
+
+
+def design_before_added(history: History) -> Design | None:
+    """Return the design as it was before its first new ghost was added; None where there is no new ghost or none knows.
+
+    Who has chosen among structures since, or the count of surfaces, has chosen: None too.
+    """
+    present = history.present.design
+    if present is None or not _has_new(present):
+        return None
+    for moment in reversed(history.moments[: history.at + 1]):
+        before = moment.project.design
+        if before is None or not _has_new(before):
+            # a wish of one of the lens' own ghosts begins so too
+            return before or Design(structure="lens")
+        if (before.structure, before.surfaces) != (present.structure, present.surfaces) or moment.begins:
+            return None
+    return None
+
+
+def _has_new(design: Design) -> bool:
+    return any(wish.ghost is None for wish in design.wishes)
 
 
 def beginning(history: History) -> Moment | None:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 from ..errors import FlarewrightError, ProjectError
 from ..io.mask_image import read_mask
 from ..io.plate_image import read_depth, read_matte
 from .autosave import state_folder
 from .edit_lens import choose_lens
+from .edit_shot import iris_of
 from .files import imported
 from .session import Session
 from .shown import plate_for
@@ -46,7 +48,7 @@ def take_in(session: Session, name: str, data: bytes, use: str = "", light: int 
     found = imported(name, data, state_folder() / "imports")
     if found.picture is not None:
         try:
-            _use_picture(session, found.picture, use, light)
+            return _use_picture(session, found.picture, use, light)
         except FlarewrightError as error:
             # where it is kept means nothing to a person
             raise type(error)(str(error).replace(found.picture, Path(name).name)) from None
@@ -59,12 +61,12 @@ def take_in(session: Session, name: str, data: bytes, use: str = "", light: int 
     return found.remarks
 
 
-def _use_picture(session: Session, picture: str, use: str, light: int | None) -> None:
+def _use_picture(session: Session, picture: str, use: str, light: int | None) -> tuple[str, ...]:
     """Use a picture; what is none of its kind is refused here, not when it is shown."""
     if use == "mask":
         read_mask(picture)
-        session.do("set_iris", {"values": {"mask": picture}})
-    elif use == "dirt":
+        return _use_mask(session, picture)
+    if use == "dirt":
         read_mask(picture, what="dirt")
         session.do("set_dirt", {"values": {"image": picture}})
     elif use == "image":
@@ -76,3 +78,16 @@ def _use_picture(session: Session, picture: str, use: str, light: int | None) ->
     else:
         plate_for(View(plate=picture), (16, 16))
         session.set_view({"plate": picture})
+    return ()
+
+
+def _use_mask(session: Session, picture: str) -> tuple[str, ...]:
+    """Put an image in the place of the blades: upright, for their rotation was none of its own."""
+    iris = iris_of(session.project)
+    values: dict[str, Any] = {"mask": picture}
+    turned = iris.rotation_deg if iris.mask is None else 0.0
+    if turned:
+        values["rotation_deg"] = 0.0
+    session.do("set_iris", {"values": values})
+    told = f"the blades were turned by {turned:g}°; the image stands as it was drawn, and Rotation, now 0°, turns it"
+    return (told,) if turned else ()

@@ -17,6 +17,7 @@ from ..model import Project
 from ..render.display import view_sum
 from . import studio
 from .jobs import Check, Lane, Overtaken
+from .pictures import in_short
 from .seen import Seen
 from .session import Session
 from .sharpening import sharpen
@@ -96,7 +97,7 @@ class Screen:
             sharpen(self, project, view, check)
         except FlarewrightError as error:
             check()
-            self.problem = str(error)
+            self.problem = in_short(str(error), project, self.session.file)
             self._publish()
         except MemoryError:
             self.problem = "there is not enough memory for this picture; choose a smaller one"

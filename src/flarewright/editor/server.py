@@ -30,6 +30,7 @@ from .edit_shot import move_light
 from .guard import Application, Guard
 from .hand import Moved
 from .imports import take_in
+from .pictures import in_short
 from .screen import packed, shown_pixels
 from .snapshot import ghosts_of
 
@@ -56,7 +57,8 @@ def told(work: Work) -> Callable[[Desk], Answer]:
                     body = json.loads(raw) if raw else {}
                 result = await run_in_threadpool(work, desk, request, body)
             except FlarewrightError as error:
-                return JSONResponse({"error": str(error)}, status_code=400)
+                told = in_short(str(error), desk.session.project, desk.session.file)
+                return JSONResponse({"error": told}, status_code=400)
             except (ValueError, KeyError, TypeError) as error:
                 return JSONResponse({"error": f"the editor did not understand the page: {error}"}, status_code=400)
             if isinstance(result, Response):
@@ -109,15 +111,17 @@ def _picture(desk: Desk, _request: Request, _body: Any) -> Any:
     return _jpeg(packed(desk.screen))
 
 
+def _move(desk: Desk, asked: Mapping[str, Any]) -> tuple[Callable[[Project], Project], int]:
+    """Return what a hand does, with a light or along the path, and the revision that it sees."""
+    revision = int(asked.get("revision", desk.session.revision))
+    if "at" in asked:
+        return partial(go_to, at_s=float(asked["at"])), revision
+    return partial(move_light, light=int(asked["light"]), x=float(asked["x"]), y=float(asked["y"])), revision
+
+
 def _moved(desk: Desk, asked: Mapping[str, Any]) -> Moved | None:
     """Draw the project with a light elsewhere, or at a time of its path."""
-    revision = int(asked.get("revision", desk.session.revision))
-    moved: Callable[[Project], Project]
-    if "at" in asked:
-        moved = partial(go_to, at_s=float(asked["at"]))
-    else:
-        moved = partial(move_light, light=int(asked["light"]), x=float(asked["x"]), y=float(asked["y"]))
-    return desk.hand.picture(moved, revision)
+    return desk.hand.picture(*_move(desk, asked))
 
 
 def _moving(desk: Desk, request: Request, _body: Any) -> Any:
@@ -144,7 +148,7 @@ async def _follow(desk: Desk, socket: WebSocket) -> None:
                 picture = found.jpeg
                 head |= {"seconds": round(found.seconds, 4), "lights": [one.field_deg for one in found.project.lights]}
         except FlarewrightError as error:
-            head["error"] = str(error)
+            head["error"] = in_short(str(error), desk.session.project, desk.session.file)
         except (ValueError, KeyError, TypeError) as error:
             head["error"] = f"the editor did not understand the page: {error}"
         # the tab may be gone by now
@@ -166,8 +170,12 @@ async def _follow(desk: Desk, socket: WebSocket) -> None:
             await run_in_threadpool(desk.screen.rest)
 
 
-def _target(desk: Desk, _request: Request, _body: Any) -> Any:
-    return _jpeg(viewing.target_jpeg(desk.screen))
+def _target(desk: Desk, request: Request, _body: Any) -> Any:
+    asked = request.query_params
+    if not asked.keys() & {"light", "at"}:
+        return _jpeg(viewing.target_jpeg(desk.screen))
+    found = desk.hand.target(*_move(desk, asked), held="held" in asked)
+    return Response(status_code=204) if found is None else _jpeg(found)
 
 
 def _pick(desk: Desk, request: Request, _body: Any) -> Any:

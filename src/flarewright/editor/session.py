@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,8 @@ from .view import View
 from .words import sentence
 
 Listener = Callable[[dict[str, Any]], None]
+# a project, its file, and the file's stamp by its name
+Opened = tuple[Project, str | None, dict[str, str]]
 
 
 class Session:
@@ -129,20 +132,31 @@ class Session:
             next try does.
         """
         with self.lock:
-            self._spare(project_path(text))
-            path = save_project(self.project, text)
+            path = project_path(text)
+            stamp = self._written(path, self._spare(path))
             self.history = past.filed(self.history, str(path))
             self._hold(str(path), self.project)
-            self._stamp(str(path), stamp_of(path))
+            self._stamp(str(path), stamp)
             self._refused = None
             self._changed()
             return path
 
-    def _spare(self, place: Path) -> None:
-        """Refuse once to overwrite the work of others."""
+    def _written(self, path: Path, there: str | None) -> str:
+        """Write the project file where the file of a stamp lies, and none but that; return the new stamp."""
+        try:
+            # others may save while this is written: looked at once more when nothing is left but to put it there
+            return save_project(self.project, path, look=partial(self._spare, path), replace=there is not None)
+        except FileExistsError:
+            self._spare(path)
+            raise ProjectError(
+                f"{path.name} is there already and cannot be read, so nothing was written; save under another name"
+            ) from None
+
+    def _spare(self, place: Path) -> str | None:
+        """Refuse once to overwrite the work of others; return the stamp of what may be overwritten."""
         there, own = stamp_of(place), str(place) == self.file
         if there is None or self._refused == (place, there) or (own and self._stamps.get(str(place), there) == there):
-            return
+            return there
         self._refused = place, there
         why = "was changed by another program since it was opened or saved here" if own else "is there already"
         raise ProjectError(f"{place.name} {why}; save again to overwrite it, or save under another name")
@@ -154,13 +168,16 @@ class Session:
     def open(self, text: str) -> None:
         """Open another project or lens; undo leads back."""
         with self.lock:
-            before = stamp_of(Path(text).expanduser())
-            project, file = opened(text)
+            project, file, stamps = _stamped(opened, text)
             if file is not None:
                 self._hold(file, project)
-                self._stamp(file, before)
+                self._stamps |= stamps
             label = f"Open {Path(text).name}"
-            self._move(past.committed(self.history, project, label, file=file, begins=True))
+            history = past.committed(self.history, project, label, file=file, begins=True)
+            if history == self.history:
+                # the file is as it was; a picture that it names may have come
+                self._changed()
+            self._move(history)
 
     def _hold(self, file: str, project: Project | None) -> None:
         if project is not None:
@@ -191,6 +208,13 @@ def _held_by(file: str, stamps: dict[str, str]) -> Project | None:
         return None
 
 
+def _stamped(read: Callable[[str], tuple[Project, str | None]], text: str) -> Opened:
+    """Read a project or a lens; its stamp is from before, so that what others write meanwhile is theirs."""
+    before = stamp_of(Path(text.strip()).expanduser())
+    project, file = read(text)
+    return project, file, {} if file is None or before is None else {file: before}
+
+
 def begin(what: str | None) -> tuple[Session, str]:
     """Begin a session, or go on with one that was cut off.
 
@@ -216,7 +240,7 @@ def begin(what: str | None) -> tuple[Session, str]:
         cut = _cut_off()
         if cut is not None:
             return cut
-    given: tuple[Project, str | None] | None = None if what is None else open_any(what)
+    given = None if what is None else _stamped(open_any, what)
     key = None if what is None else str(Path(what).resolve()) if Path(what).exists() else what
     keeper = claim(key)
     saved = read_autosave(keeper.path)
@@ -241,17 +265,17 @@ def _cut_off() -> tuple[Session, str] | None:
     return None
 
 
-def _begun(saved: Saved | None, given: tuple[Project, str | None] | None, keeper: Keeper) -> tuple[Session, str]:
+def _begun(saved: Saved | None, given: Opened | None, keeper: Keeper) -> tuple[Session, str]:
     if saved is not None and not saved.clean and (given is None or given[0] != saved.history.present):
         told = "Went on where the last session ended; undo leads back." if len(saved.history.moments) > 1 else ""
         return Session(saved, keeper), told
     if given is None and saved is not None and saved.file is not None and Path(saved.file).is_file():
         # what was saved may have been changed by other programs since
-        stamps = {name: stamp for name, stamp in saved.stamps.items() if name != saved.file}
-        project, file = open_any(saved.file)
+        project, file, fresh_stamps = _stamped(open_any, saved.file)
+        stamps = saved.stamps | fresh_stamps
         history = past.committed(saved.history, project, "Open", file=file)
         return Session(replace(saved, history=history, stamps=stamps), keeper), ""
-    project, file = (sample_project(), None) if given is None else given
+    project, file, stamps = (sample_project(), None, {}) if given is None else given
     view = View() if saved is None else saved.view.replace(found_stops=None)
-    fresh = Saved(past.begun(project, file=file), view, file, clean=file is not None)
+    fresh = Saved(past.begun(project, file=file), view, file, clean=file is not None, stamps=stamps)
     return Session(fresh, keeper), ""

@@ -89,6 +89,7 @@ def sharpen(screen: Screen, project: Project, view: View, check: Check) -> None:
             draft = studio.take(project, "draft", view, levels=screen.match.levels)
             check()
         screen.match = studio.matched(draft, final, screen.match)
+        screen.session.tell({"type": "matched"})
     if not seen_first:
         _look(screen, project, "draft" if working else "final", check)
     if not working and screen.seen is not None:
@@ -127,6 +128,7 @@ def _match_ghosts(screen: Screen, project: Project, view: View, seen: Seen, chec
     final = screen.picture
     if final is not None:
         screen.match = replace(studio.matched(draft, final, screen.match), levels=levels)
+        screen.session.tell({"type": "matched"})
 
 
 def _progress(screen: Screen, what: str, check: Check) -> Any:

@@ -6,14 +6,14 @@ from typing import Any
 
 from ..errors import FlarewrightError
 from ..io.spectrum_text import spectrum_text
-from ..model import Project
+from ..model import Design, Project
 from ..render.prepare import as_lens
 from .edit_ghosts import hand, soloed
 from .edit_lens import prescription, table_of
 from .edit_path import length_s
-from .edit_shot import coating_text
+from .edit_shot import coating_text, iris_of
 from .edit_wishes import direction, wish_names
-from .history import History, design_before_scratch
+from .history import History, before_mask, design_before_added, design_before_scratch
 from .screen import Screen
 from .shown import FALSE_COLOURS, aces_available
 from .solving import Solver
@@ -49,7 +49,7 @@ def state_of(screen: Screen, solver: Solver) -> dict[str, Any]:
         | {"table": table_of(project), "rows": list(table.rows), "distortion": list(table.distortion)},
         "lights": [_light(project, k) for k in range(len(project.lights))],
         "camera": project.camera.model_dump(mode="json") | {"sensor": list(project.camera.sensor)},
-        "iris": _iris(project),
+        "iris": _iris(project, history),
         "dirt": project.dirt.model_dump(mode="json"),
         "starburst": project.starburst.model_dump(mode="json"),
         "holdout": None if project.holdout is None else project.holdout.model_dump(mode="json"),
@@ -126,14 +126,14 @@ def _light(project: Project, k: int) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _iris(project: Project) -> dict[str, Any]:
-    iris = project.iris
-    if iris is None:
-        try:
-            iris = as_lens(project.lens).iris
-        except FlarewrightError:
-            return {}
-    return iris.model_dump(mode="json")
+def _iris(project: Project, history: History) -> dict[str, Any]:
+    try:
+        iris, before = iris_of(project), before_mask(history)
+        # where blades take the place of the image again, they stand as they stood
+        turned = None if before is None else iris_of(before).rotation_deg
+    except FlarewrightError:
+        return {}
+    return iris.model_dump(mode="json") | {"turned_before_mask": turned}
 
 
 def _design(project: Project, history: History) -> dict[str, Any] | None:
@@ -141,11 +141,15 @@ def _design(project: Project, history: History) -> dict[str, Any] | None:
     if design is None:
         return None
     # what is searched among again where nothing begins from scratch any more
-    before = design_before_scratch(history)
-    kept = None if before is None else before.model_dump(mode="json", include={"structure", "fixed_rows"})
     return design.model_dump(mode="json", exclude={"bounds"}) | {
-        "names": list(wish_names(design)), "before_scratch": kept,
+        "names": list(wish_names(design)), "before_scratch": _structure(design_before_scratch(history)),
+        # and where no new ghost is left that needs more surfaces
+        "before_added": _structure(design_before_added(history)),
     }  # fmt: skip
+
+
+def _structure(design: Design | None) -> dict[str, Any] | None:
+    return None if design is None else design.model_dump(mode="json", include={"structure", "fixed_rows"})
 
 
 def ghosts_of(screen: Screen) -> dict[str, Any]:

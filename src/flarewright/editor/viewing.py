@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
+from ..model import Project
 from . import studio
 from .edit_wishes import new_discs, target_project
-from .screen import QUALITY, Screen
+from .screen import QUALITY, Screen, pixels_of_picture
 from .seen import alone, is_there, outline, under
-from .shown import jpeg, pixels_of, plate_for, png
+from .shown import jpeg, png
+from .studio import Picture
 
 OUTLINE = (240, 176, 84)
 # ghosts under the pointer that are looked at closely before one is believed
@@ -16,21 +20,41 @@ LOOKED_AT = 6
 
 
 def target_jpeg(screen: Screen) -> bytes:
-    """Draw the fictional target: the picture as the wishes would have it.
+    """Draw the fictional target: the picture as the wishes would have it."""
+    project = screen.session.project
+    return packed_target(screen, project, studio.take(target_project(project), "draft", screen.session.view), QUALITY)
 
-    Ghosts that the lens has not are even discs, a little brighter than what lies around them.
+
+def packed_target(screen: Screen, project: Project, drawn: Picture, quality: int) -> bytes:
+    """Pack a target as the picture is shown.
+
+    Parameters
+    ----------
+    screen : Screen
+    project : Project
+        With its wishes. Ghosts that the lens has not are even discs, a little brighter than what lies around them.
+    drawn : Picture
+        Of its `target_project`.
+    quality : int
+        Of the JPEG.
+
+    Returns
+    -------
+    bytes
     """
-    project, view = screen.session.project, screen.session.view
-    light = studio.light_of(studio.take(target_project(project), "draft", view), screen.match)
-    height, width = light.shape[:2]
-    across = width / project.camera.sensor[0]
-    level = float(np.percentile(light.max(axis=2), 90.0)) + 0.25 * 2.0**-screen.exposure_stops
-    rows, columns = np.mgrid[0:height, 0:width] + 0.5
-    for x, y, radius in new_discs(project):
-        away = np.hypot(columns - width / 2 - x * across, rows - height / 2 + y * across)
-        light[away < radius * across] += np.float32(level)
-    plate = plate_for(view, (width, height))
-    return jpeg(pixels_of(light, screen.exposure_stops, view, plate), QUALITY)
+    discs = new_discs(project)
+    if discs:
+        light = studio.light_of(drawn, screen.match)
+        height, width = light.shape[:2]
+        across = width / project.camera.sensor[0]
+        level = float(np.percentile(light[::3, ::3].max(axis=2), 90.0)) + 0.25 * 2.0**-screen.exposure_stops
+        rows, columns = np.ogrid[0:height, 0:width]
+        rest = drawn.rest.copy()
+        for x, y, radius in discs:
+            right, down = columns + 0.5 - width / 2 - x * across, rows + 0.5 - height / 2 + y * across
+            rest[np.hypot(right, down) < radius * across] += np.float32(level)
+        drawn = replace(drawn, rest=rest)
+    return jpeg(pixels_of_picture(screen, drawn), quality)
 
 
 def picked(screen: Screen, u: float, v: float) -> tuple[str, ...]:

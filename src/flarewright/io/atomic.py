@@ -11,7 +11,9 @@ from pathlib import Path
 from flarewright.errors import OutputError
 
 
-def write_atomically(path: str | Path, write: Callable[[Path], None]) -> None:
+def write_atomically(
+    path: str | Path, write: Callable[[Path], None], *, look: Callable[[], object] | None = None, replace: bool = True
+) -> None:
     """Write a file under a temporary name in the same folder, then rename it.
 
     Parameters
@@ -20,9 +22,17 @@ def write_atomically(path: str | Path, write: Callable[[Path], None]) -> None:
         Where the file shall lie; one already there is replaced only when the new one is complete.
     write : callable
         Gets the temporary path (same folder, same suffix) and writes the whole file there.
+    look : callable, optional
+        Called when all is written, right before the file takes its place: the last moment in which somebody else's
+        file can be noticed there. What it raises leaves that one as it is.
+    replace : bool
+        False: only where no file lies; one that comes up to the very last is left as it is, wherever the file system
+        knows hard links.
 
     Raises
     ------
+    FileExistsError
+        When one lies there that may not be replaced.
     OutputError
         The folder is missing, may not be written to, is full, or `path` is a folder; nothing is left behind.
 
@@ -40,8 +50,12 @@ def write_atomically(path: str | Path, write: Callable[[Path], None]) -> None:
         write(temporary)
         if not temporary.is_file():
             raise OutputError(f"cannot write {target}: nothing was written; check the free space and the permissions")
-        os.replace(temporary, target)
+        if look is not None:
+            look()
+        _place(temporary, target, replace)
     except OSError as error:
+        if isinstance(error, FileExistsError) and not replace:
+            raise
         reason = error.strerror or str(error) or type(error).__name__
         raise OutputError(
             f"cannot write {target}: {reason.lower()}; check the free space and the permissions"
@@ -49,3 +63,17 @@ def write_atomically(path: str | Path, write: Callable[[Path], None]) -> None:
     finally:
         with contextlib.suppress(OSError):
             temporary.unlink(missing_ok=True)
+
+
+def _place(temporary: Path, target: Path, replace: bool) -> None:
+    if not replace:
+        try:
+            # unlike a rename, a link never takes the place of a file
+            os.link(temporary, target)
+            return
+        except FileExistsError:
+            raise
+        except OSError:
+            if target.exists():
+                raise FileExistsError(target) from None
+    os.replace(temporary, target)

@@ -20,7 +20,7 @@ def read_mask(path: str | Path, what: str = "iris") -> NDArray[np.float64]:
     Parameters
     ----------
     path : str or Path
-        PNG, TIFF, JPEG (by Pillow) or EXR; colour is averaged, white transmits.
+        PNG, TIFF, JPEG (by Pillow) or EXR; colour is averaged, white transmits (`read_grey`).
     what : str
         What it is an image of, for messages.
 
@@ -53,20 +53,35 @@ def read_mask(path: str | Path, what: str = "iris") -> NDArray[np.float64]:
 
 
 def read_grey(path: Path) -> NDArray[np.float64]:
-    """Read a picture as grey, white 1; whatever the reader raises goes on to the caller, who knows what it is for."""
-    return _read_exr(path) if path.suffix.lower() == ".exr" else _read_picture(path)
+    """Read a picture as grey, white 1; whatever the reader raises goes on to the caller, who knows what it is for.
+
+    Where all that is not clear has one colour, alpha is the picture: a shape is told by it alone. The colour of what is
+    clear is seen by nobody and says nothing. Else alpha is not looked at.
+    """
+    grey, alpha = _read_exr(path) if path.suffix.lower() == ".exr" else _read_picture(path)
+    if alpha is None or np.ptp(alpha) == 0.0:
+        return grey
+    return alpha if np.ptp(grey[alpha > 0.0]) == 0.0 else grey
 
 
-def _read_picture(path: Path) -> NDArray[np.float64]:
+def _read_picture(path: Path) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
     from PIL import Image
 
     with Image.open(path) as image:
         deep = image.mode in ("I;16", "I", "F")
         grey = np.asarray(image if deep else image.convert("L"), dtype=np.float64)
         top = 1.0 if image.mode == "F" else (65535.0 if deep else 255.0)
-    return grey / top
+        alpha = None
+        if image.has_transparency_data and not deep:
+            alpha = np.asarray(image.convert("RGBA").getchannel("A"), dtype=np.float64) / 255.0
+    return grey / top, alpha
 
 
-def _read_exr(path: Path) -> NDArray[np.float64]:
+def _read_exr(path: Path) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
     # a matte may have one channel, or grey with alpha
-    return read_exr_plane(path, (("R", "G", "B"), ("Y",), ("R",), ("A",)))
+    grey = read_exr_plane(path, (("R", "G", "B"), ("Y",), ("R",), ("A",)))
+    try:
+        alpha = read_exr_plane(path, (("A",),))
+    except ValueError:
+        return grey, None
+    return grey, alpha if alpha.shape == grey.shape else None

@@ -23,6 +23,9 @@ FIELD = 1.65
 _RIDGE_MM, _DROPLET_MM, _DROPLET_STEP_MM, _PRINT_MM = 0.5, 0.06, 0.15, (7.0, 9.0)
 # half the angle over which a scratch bends
 _BEND_DEG = (0.5, 5.0)
+# orders of a scratch's fringes: up to the first all are drawn, from the last on their mean; white light has none so far
+# out, for a channel's band of 60 to 100 nm spans whole orders there; lines have, and what draws them has to follow each
+_FADE = (12.0, 20.0)
 
 __all__ = ["Elements", "Veil", "VeilTerm", "lay_elements", "rasterise", "scattered", "spread_area"]
 
@@ -270,11 +273,19 @@ def scattered(elements: Elements, inside: NDArray[np.bool_], inside_arcs: NDArra
             angular += fan * length / (2.0 * bend)
         w = float(arcs[0, 4])
         mean = float(angular.mean())
-        # the mean of sinc^2 over its fringes, once they are finer than the table
-        fringes = np.sinc(w * s) ** 2
-        smooth = np.where(w * s > 4.0, 0.5 / (math.pi * w * s) ** 2, fringes)
-        terms.append(VeilTerm(s, mean * w * w * smooth / s / power, angular / mean))
+        # as fine as its fringes need
+        fine = np.geomspace(0.02 / w, _FADE[1] / w, 2400)
+        s = np.concatenate([s[s < fine[0]], fine, s[s > fine[-1]]])
+        terms.append(VeilTerm(s, mean * w * w * _slit(w * s) / s / power, angular / mean))
     return tuple(terms)
+
+
+def _slit(order: Floats) -> Floats:
+    """sinc^2, far out the mean over its fringes; a step between the two would be seen, so they fade slowly."""
+    t = np.clip((order - _FADE[0]) / (_FADE[1] - _FADE[0]), 0.0, 1.0)
+    left = 1.0 - t * t * (3.0 - 2.0 * t)
+    far = 0.5 * (1.0 - left * np.cos(2.0 * math.pi * order)) / (math.pi * np.maximum(order, 1.0)) ** 2
+    return np.where(order < 1.0, np.sinc(order) ** 2, far)
 
 
 def _airy(x: Floats) -> Floats:

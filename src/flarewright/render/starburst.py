@@ -34,6 +34,9 @@ BAND = 64
 LEAST_CORE = 1.0
 """Radius of the core, before the blend begins, in parts of a pixel: with less the blend loses flux."""
 
+KNOTS = 1200
+"""Radii of the tables of dirt's light: a scratch's fringes are a hundredth of their radius apart or more."""
+
 MOST_PARTS = 100_000_000
 """Of the pixels around the centre: with more they would fill the memory."""
 
@@ -220,7 +223,7 @@ class Painter:
 
     def _radial(self, r: Floats, value: Callable[[Floats], Floats], least: float) -> Floats:
         """Sum over wavelengths of a function of s = r / (2 N lambda), by a table in ln r; shape of r and 3 channels."""
-        knots = np.geomspace(max(least, 1e-9), max(float(r.max()), 2.0 * least), 400)
+        knots = np.geomspace(max(least, 1e-9), max(float(r.max()), 2.0 * least), KNOTS)
         table = np.einsum("km,mc->kc", value(knots[:, None] / self._scale), self.weights)
         at = np.log(np.maximum(r, least))
         # times r^2 the table is nearly flat

@@ -75,7 +75,7 @@ function update() {
   for (const part of parts) part.update?.(state);
   app.refreshPanel();
   $('problem').hidden = !state.picture.problem;
-  $('problem').textContent = state.picture.problem ? `${sentence(state.picture.problem)} The last good picture is shown.` : '';
+  $('problem').textContent = state.picture.problem ? `${sentence(state.picture.problem)}${state.picture.grade ? ' The last good picture is shown.' : ''}` : '';
   document.title = `${state.clean ? '' : '• '}${fileName(state)} – Flarewright`;
   status();
   app.view.redraw();
@@ -329,7 +329,7 @@ const GRADES = { moving: 'moving, by matrices', draft: 'draft, by matrices', soo
 const FIRST = 'drawing the first picture; the very first on a machine takes some ten seconds';
 function gradeWords({ grade: drawn, seconds, number, current, problem }) {
   const { mover, shownGrade, shownNumber } = app.view;
-  if (!drawn) return FIRST;
+  if (!drawn) return problem ? 'no picture yet' : FIRST;
   if (problem) return 'the last good picture';
   // what a hand holds is of no project yet, but it is what is shown
   if (!mover.live && !current) return shownGrade === 'moving' ? GRADES.moving : 'the picture before, until the new one is drawn';
@@ -475,6 +475,8 @@ function hear(event) {
   if (event.type === 'export') { working('EXR', event.part); return; }
   if (event.type === 'ghosts') { working('', 1); loadGhosts(); return; }
   if (!state) return;
+  // the target's ghosts are as bright as those of the last final picture
+  if (event.type === 'matched') app.view.refreshTarget();
   if (event.type === 'picture') {
     state.picture = event;
     state.view.stops = event.stops;
@@ -482,8 +484,7 @@ function hear(event) {
     working('', 1);
     if (event.number !== app.view.shownNumber) app.view.refresh(true);
     update();
-    // its ghosts are as bright as those of the last final picture
-    if (['final', 'working'].includes(event.grade)) app.view.refreshTarget();
+    if (event.grade === 'working') app.view.refreshTarget();
     if (event.grade === 'final') app.remarks();
   }
   if (event.type === 'solve') { state.solve = event; panels.target.update?.(state); }

@@ -9,8 +9,8 @@ const SHAPES = {
   Slit: (pen) => pen.rect(SIDE * 0.06, SIDE * 0.44, SIDE * 0.88, SIDE * 0.12),
 };
 
-// `begin` is the address of the mask so far, to go on with; null: none.
-export function drawMask(use, begin = null) {
+// A mask so far is gone on with, as its file has it: the iris' rotation turns it in the lens, not on the sheet.
+export function drawMask(use, iris) {
   const canvas = h('canvas', { width: SIDE, height: SIDE, class: 'sheet', tabindex: 0, role: 'img', 'aria-label': 'The opening: draw with the pointer' });
   const pen = canvas.getContext('2d');
   let light = true;
@@ -18,11 +18,11 @@ export function drawMask(use, begin = null) {
   const clear = (colour) => { pen.fillStyle = colour; pen.fillRect(0, 0, SIDE, SIDE); };
   const stamp = (shape) => { pen.fillStyle = light ? '#fff' : '#000'; pen.beginPath(); shape(pen); pen.fill(); };
   clear('#000');
-  if (begin) {
+  if (iris.mask) {
     const before = new Image();
     // a mask of any shape spans the opening
     before.onload = () => { pen.drawImage(before, 0, 0, SIDE, SIDE); canvas.dataset.begun = 'yes'; };
-    before.src = begin;
+    before.src = `/api/mask?n=${Date.now()}`;
   }
   let last = null;
   const place = (event) => { const box = canvas.getBoundingClientRect(); return [(event.clientX - box.left) * SIDE / box.width, (event.clientY - box.top) * SIDE / box.height]; };
@@ -43,7 +43,8 @@ export function drawMask(use, begin = null) {
   function brush(value) { light = value; both[0].classList.toggle('on', value); both[1].classList.toggle('on', !value); }
   brush(true);
   const shapes = Object.entries(SHAPES).map(([name, shape]) => button(name, () => stamp(shape), { 'data-shape': name }));
-  const box = dialog('Draw the iris', h('p', { class: 'quietly' }, 'Every ghost becomes an image of it, and the starburst its diffraction. The inscribed circle is the opening of the f-number.'), canvas,
+  const box = dialog('Draw the iris', h('p', { class: 'quietly' }, 'Every ghost becomes an image of it, and the starburst its diffraction. The inscribed circle is the opening of the f-number.'),
+    iris.mask && iris.rotation_deg ? h('p', { id: 'mask-turned' }, `In the lens this sheet is turned by ${Number(iris.rotation_deg.toFixed(1))}° (Rotation).`) : '', canvas,
     h('div', { class: 'buttons' }, ...both, size, h('span', { class: 'gap' }), button('All blocked', () => clear('#000')), button('All open', () => clear('#fff'))),
     h('div', { class: 'buttons' }, ...shapes, h('span', { class: 'gap' }), button('Cancel', () => box.close()),
       button('Use it', () => canvas.toBlob((blob) => { box.close(); use(new File([blob], 'drawn.png')); }, 'image/png'), { kind: 'main', id: 'mask-use' })));

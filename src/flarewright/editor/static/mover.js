@@ -74,7 +74,7 @@ export function mover(app, shown) {
       if (number < received || !self.live) return;
       received = number;
       self.lights = lights;
-      shown(bitmap, lights);
+      shown(bitmap, lights, now.values);
       usual += 0.2 * (1000 * seconds - usual);
       self.stats.server.push(seconds);
       requestAnimationFrame((time) => { self.stats.shown.push(time); self.stats.latency.push(performance.now() - now.time); });

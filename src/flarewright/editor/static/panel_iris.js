@@ -6,10 +6,10 @@ export function irisPanel(app) {
   const set = (values, held = '') => app.lively('set_iris', { values }, held, `iris${Object.keys(values)}`);
   const dirt = (values, held = '') => app.lively('set_dirt', { values }, held, `dirt${Object.keys(values)}`);
   const star = (values, held = '') => app.lively('set_starburst', { values }, held, `star${Object.keys(values)}`);
-  const mask = h('span', { class: 'quietly' });
+  const mask = h('span', { class: 'quietly below' });
   const picker = h('input', { type: 'file', accept: '.png,.exr', hidden: true });
   picker.addEventListener('change', async () => { if (picker.files[0]) await app.importFile(picker.files[0], 'mask'); picker.value = ''; });
-  const dirty = h('span', { class: 'quietly' });
+  const dirty = h('span', { class: 'quietly below' });
   const dirtPicker = h('input', { type: 'file', accept: '.png,.exr', hidden: true, name: 'dirt_image' });
   dirtPicker.addEventListener('change', async () => { if (dirtPicker.files[0]) await app.importFile(dirtPicker.files[0], 'dirt'); dirtPicker.value = ''; });
   const sizes = [0, 1].map((k) => h('input', { class: 'number', type: 'text', style: 'width:58px', name: `dust_um_${k}`, 'aria-label': k ? 'Largest speck, micrometres' : 'Least speck, micrometres' }));
@@ -23,10 +23,10 @@ export function irisPanel(app) {
   const parts = [
     group('Blades', [
       slider({ label: 'Blades', tip: 'They make the ghosts polygons and the starburst spikes: as many for an even number, twice as many for an odd one. 0 is a round opening.', min: 0, max: 24, step: 1, digits: 0, name: 'blades', skip: (blades, by) => (blades === 1 || blades === 2 ? (by > 0 ? 3 : 0) : blades), get: (s) => s.iris.blades, set: (blades, held) => set({ blades }, held) }),
-      slider({ label: 'Rotation', tip: 'Turns the opening; ghosts and spikes turn with it, mirrored ones the other way up.', min: -180, max: 180, step: 1, digits: 0, unit: '°', name: 'rotation', get: (s) => s.iris.rotation_deg, set: (rotation_deg, held) => set({ rotation_deg }, held) }),
+      slider({ label: 'Rotation', tip: 'Turns the opening counter-clockwise, be it blades or a mask; ghosts and spikes turn with it, mirrored ones the other way up.', min: -180, max: 180, step: 1, digits: 0, unit: '°', name: 'rotation', get: (s) => s.iris.rotation_deg, set: (rotation_deg, held) => set({ rotation_deg }, held) }),
       slider({ label: 'Rounding', tip: 'Curved blades: 0 has straight edges and sharp spikes, 1 is a full circle without any.', min: 0, max: 1, step: 0.01, name: 'rounding', get: (s) => s.iris.rounding, set: (rounding, held) => set({ rounding }, held) }),
       slider({ label: 'Rough edges', tip: 'Micrometres by which the edges are off their line: they fray the spikes of the starburst.', min: 0, max: 100, step: 1, digits: 0, curve: 2, unit: 'µm', get: (s) => s.iris.roughness_um, set: (roughness_um, held) => set({ roughness_um }, held) }),
-      row('Mask', 'A grey picture instead of the blades, white lets light through: every ghost becomes an image of it.', [button('Draw…', () => drawMask((file) => app.importFile(file, 'mask'), app.state.iris.mask ? `/api/mask?n=${Date.now()}` : null), { id: 'mask-draw' }), button('Load…', () => picker.click(), { id: 'mask-load' }), button('None', () => set({ mask: null })), mask, picker], (s) => { mask.textContent = s.iris.mask ? `${s.iris.mask.split(/[\\/]/).pop()}, instead of blades` : ''; }),
+      row('Mask', 'A grey picture instead of the blades, white lets light through: every ghost becomes an image of it.', [button('Draw…', () => drawMask((file) => app.importFile(file, 'mask'), app.state.iris), { id: 'mask-draw' }), button('Load…', () => picker.click(), { id: 'mask-load' }), button('None', () => { const turned = app.state.iris.turned_before_mask; set({ mask: null, ...(turned === null ? {} : { rotation_deg: turned }) }); }, { id: 'mask-none' }), mask, picker], (s) => { mask.textContent = s.iris.mask ? `${s.iris.mask.split(/[\\/]/).pop()}, instead of blades${s.iris.rotation_deg ? `, turned by ${Number(s.iris.rotation_deg.toFixed(1))}°` : ''}` : ''; }),
     ]),
     group('Dirt', [
       slider({ label: 'Dust', name: 'dust', tip: 'Opaque specks per mm² in the plane of the stop: each diffracts light into a wide, faint disc.', min: 0, max: 20, step: 0.05, curve: 2, get: (s) => s.dirt.dust_per_mm2, set: (dust_per_mm2, held) => dirt({ dust_per_mm2 }, held) }),

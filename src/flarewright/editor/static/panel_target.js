@@ -21,7 +21,7 @@ export function targetPanel(app) {
   const compare = h('div', { class: 'buttons', role: 'group', 'aria-label': 'What is shown' });
   const looks = COMPARE.map(([key, words, tip]) => button(words, () => see(key), { 'data-compare': key, tip }));
   compare.append(...looks);
-  const see = (key) => { app.view.compare = key; app.view.refreshTarget(); self.update(app.state); app.view.redraw(); };
+  const see = (key) => { app.view.see(key); self.update(app.state); app.view.redraw(); };
   const drawn = h('p', { class: 'quietly', id: 'target-drawn' });
   const list = h('div', { class: 'buttons' });
   const told = h('p', { class: 'quietly' });
@@ -29,7 +29,8 @@ export function targetPanel(app) {
   colour.addEventListener('change', () => set({ color: [1, 3, 5].map((k) => Number(((parseInt(colour.value.slice(k, k + 2), 16) / 255) ** 2.2).toFixed(4))) }));
   const drop = button('Remove ghost', () => set({ action: mine()?.action === 'remove' ? 'want' : 'remove' }), { tip: 'It shall not be seen at all.', id: 'wish-remove' });
   const ignore = button('Any', () => set({ action: mine()?.action === 'ignore' ? 'want' : 'ignore' }), { tip: 'Whatever becomes of this ghost is fine; the solver is freer.' });
-  const back = button('Take back', () => (app.wish !== null ? app.deed('remove_wish', { number: app.wish }).then(() => { app.wish = null; }) : app.deed('remove_wish', { number: wishes().indexOf(mine()) })).catch(() => {}), { kind: 'quiet', tip: 'Forget what was wished of this ghost.' });
+  const takeBack = (number) => app.deed('remove_wish', { number, before: app.state.design.before_added ?? app.state.design.before_scratch });
+  const back = button('Take back', () => (app.wish !== null ? takeBack(app.wish).then(() => { app.wish = null; }) : takeBack(wishes().indexOf(mine()))).catch(() => {}), { kind: 'quiet', id: 'wish-back', tip: 'Forget what was wished of this ghost.' });
   const fields = group('What it shall be', [
     slider({ label: 'Move', tip: 'Along the line from the middle of the picture to the light, mm: no ghost of a lens of revolution can leave it.', min: -20, max: 20, step: 0.05, unit: 'mm', name: 'wish_move', get: () => (app.wish !== null ? mine()?.place_mm : mine()?.move_mm) ?? 0, set: (value, held) => set(app.wish !== null ? { place_mm: value } : { move_mm: value }, held) }),
     slider({ label: 'Size ×', tip: 'Of its radius. Its light stays, so a smaller ghost is brighter.', min: 0.05, max: 5, step: 0.01, curve: 2, name: 'wish_size', get: () => mine()?.height ?? 1, set: (height, held) => set({ height }, held) }),

@@ -37,7 +37,13 @@ export function player(app) {
     return self.rest();
   };
   // where a hand takes the light, or another project comes, nothing plays on
-  self.halt = () => { if (self.playing) { self.playing = false; self.heard(); } };
+  self.halt = () => {
+    if (!self.playing) return;
+    self.playing = false;
+    // nothing moves any more: what is drawn of the project counts again
+    app.view.letGo();
+    self.heard();
+  };
   self.reset = () => { self.halt(); self.at = 0; self.heard(); };
   self.toggle = () => (self.playing ? self.stop() : self.play());
   // by hand: a draft at once, and the final picture when the hand rests

@@ -11,6 +11,10 @@ const DISTORTION_STEP = 2;
 const STEPS = [0, -21, 21, -42, 42];
 const INK = 'rgba(240,176,84,.95)';
 const TARGET = 'target, by matrices';
+// between two targets of a moving hand: so many times as long as one takes, within bounds
+const FOLLOW_MS = 160;
+const FOLLOW_PART = 6;
+const FOLLOW_MOST_MS = 400;
 
 export function viewport(canvas, app) {
   const hint = document.getElementById('hint');
@@ -292,11 +296,48 @@ export function viewport(canvas, app) {
   });
   self.refreshTarget = latest(async () => {
     if (self.compare === 'physical') return;
+    // what a hand moves is drawn as it goes, and anew when it has let go
+    self.targetOld = self.mover.live;
+    if (self.targetOld) { if (follow.last && !self.mover.busy()) followTarget({ ...follow.last, held: 1 }); return; }
     const answer = await fetch('/api/target');
     if (!answer.ok) return;
-    self.target = await createImageBitmap(await answer.blob());
+    const bitmap = await createImageBitmap(await answer.blob());
+    self.targetOld = self.mover.live;
+    if (self.targetOld) return;
+    self.target = bitmap;
     redraw();
   });
+  self.see = (compare) => {
+    // nobody has drawn it anew while it was out of sight
+    if (self.compare === 'physical') self.target = null;
+    self.compare = compare;
+    self.refreshTarget();
+  };
+  // The target follows a hand, or a path that is played, a few times a second; most of the time is the picture's, and it
+  // is painted with the next one.
+  const follow = { values: null, last: null, running: false, stroke: 0 };
+  async function followTarget(values) {
+    follow.values = follow.last = values;
+    if (follow.running || self.compare === 'physical') return;
+    follow.running = true;
+    try {
+      while (follow.values && self.mover.live && self.compare !== 'physical') {
+        const { values: now, stroke: mine } = follow;
+        follow.values = null;
+        const begun = performance.now();
+        const answer = await fetch(`/api/target?${new URLSearchParams({ ...now, revision: app.state.revision })}`);
+        const bitmap = answer.status === 200 ? await createImageBitmap(await answer.blob()) : null;
+        // it may have let go, and begun anew, meanwhile
+        if (bitmap && self.mover.live && mine === follow.stroke) { Object.assign(self, { target: bitmap, targetOld: true }); self.stats.targets.push(performance.now()); if (!self.mover.busy()) redraw(); }
+        await new Promise((done) => { setTimeout(done, Math.min(Math.max(FOLLOW_MS, FOLLOW_PART * (performance.now() - begun)), FOLLOW_MOST_MS)); });
+      }
+    } catch (error) { complain(error); } finally { follow.running = false; }
+  }
+  self.letGo = () => {
+    follow.stroke += 1;
+    follow.values = follow.last = null;
+    self.mover.stop();
+  };
   async function overlay(name) {
     const answer = await fetch(`/api/outline?ghost=${encodeURIComponent(name)}`);
     return answer.ok ? createImageBitmap(await answer.blob()) : null;
@@ -312,15 +353,16 @@ export function viewport(canvas, app) {
   });
 
   // ----------------------------------------------------------------------------------------------------- the light
-  self.mover = mover(app, (bitmap, lights) => {
+  self.mover = mover(app, (bitmap, lights, values) => {
     self.show(bitmap, false);
+    followTarget(values);
     self.shownGrade = 'moving';
     self.shownNumber = -1;
     self.forget();
     app.status();
     app.lightsMoved(lights);
   });
-  self.stats = self.mover.stats;
+  self.stats = Object.assign(self.mover.stats, { targets: [] });
   function moveLight(px, py, time) {
     const drag = self.drag;
     const [mx, my] = toMm(px - drag.offX, py - drag.offY);
@@ -332,9 +374,13 @@ export function viewport(canvas, app) {
   // What moved is kept by a deed, and the final picture follows; also where nothing has changed after all.
   self.settle = async (name, values, group) => {
     self.released = performance.now();
-    self.mover.stop();
+    self.letGo();
     const { revision } = app.state;
-    try { await app.deed(name, values, group); } catch { return; } finally { self.mover.lights = null; redraw(); }
+    try { await app.deed(name, values, group); } catch { return; } finally {
+      self.mover.lights = null;
+      if (self.targetOld) self.refreshTarget();
+      redraw();
+    }
     if (app.state.revision !== revision) return;
     await self.mover.idle();
     await post('/api/rest');

@@ -1,0 +1,73 @@
+"""The pictures that a project reads, and how the page names one that is gone or wrong."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from ..model import Lens, Project
+
+
+@dataclass(frozen=True)
+class Named:
+    """A picture that a project names.
+
+    Attributes
+    ----------
+    path : str
+    what : str
+        It stands for.
+    panel : str
+        Where another one is chosen.
+    """
+
+    path: str
+    what: str
+    panel: str
+
+
+def pictures(project: Project) -> tuple[Named, ...]:
+    """Return all pictures that a project reads; its lens file's own are none of them."""
+    iris = project.iris
+    if iris is None and isinstance(project.lens, Lens):
+        iris = project.lens.iris
+    found = [
+        (None if iris is None else iris.mask, "iris image", "Iris"),
+        (project.dirt.image, "drawing of dirt", "Iris"),
+    ]
+    for holdout in (project.holdout, *(light.holdout for light in project.lights)):
+        if holdout is not None:
+            found += [(holdout.image, "matte", "Light"), (holdout.depth, "depth plate", "Light")]
+    return tuple(Named(path, what, panel) for path, what, panel in found if path is not None)
+
+
+def in_short(words: str, project: Project, file: str | None) -> str:
+    """Name pictures as a person does who has the project open; say of one that is gone where it was looked for.
+
+    Parameters
+    ----------
+    words : str
+        Of a refusal, with paths as the renderer knows them.
+    project : Project
+    file : str or None
+        Its file.
+
+    Returns
+    -------
+    str
+        One sentence.
+    """
+    for picture in pictures(project):
+        if picture.path not in words:
+            continue
+        place = Path(picture.path)
+        beside = file is not None and place.resolve().is_relative_to(Path(file).parent)
+        name = place.resolve().relative_to(Path(str(file)).parent).as_posix() if beside else place.name
+        if place.is_file():
+            return words.replace(picture.path, name)
+        where = f"beside {Path(str(file)).name}" if beside else f"in {place.resolve().parent}"
+        return (
+            f"the {picture.what} {name} does not exist {where}; put it there, or choose another on the panel "
+            f"{picture.panel}"
+        )
+    return words
