@@ -174,6 +174,16 @@ def test_rings_of_steep_rays_in_other_lenses(file, field, path):
 
 
 @pytest.mark.slow
+def test_a_horn_between_two_rims():
+    """A part of the pupil narrower than the coarsest cells, beside rays that end: 1.7 % of this ghost."""
+    file = CORPUS / "Canon_26mm_F1.45_(Canon_EF24mm_f1.4L_II_USM).lens"
+    if not file.exists():
+        pytest.skip(f"{CORPUS} is not there")
+    a_lens = load_lens(file)
+    compare_systems(from_lens(a_lens), a_lens, (-11.61, 22.78), paths=[(22, 14)], samples=2000)
+
+
+@pytest.mark.slow
 def test_four_reflections():
     """The brightest ghosts of four reflections: flux, place and size, bare."""
     a_lens = load_lens("triplet-pestrecov")

@@ -17,6 +17,9 @@ FRINGE_CELL = 128.0
 # cells whose rays all end, but not at one surface, are halved so often; of a path that passes light beside rays that
 # end once more, and those too where some rays end and the others do not pass
 SLIVER_LEVEL = 3
+# rays this little beyond a rim leave a coarsest cell in doubt, for two rims may leave a narrower horn between them;
+# and, beside rays that end, cells that are halved as often as those
+CLOSE, CLOSE_TO_TORN = 1.05, 1.25
 
 
 @borrowing
@@ -30,7 +33,8 @@ def _judge(
     """
     if rejected(data, nodes, crossings, iris_radius, 0.25):
         # between rays that end at different surfaces a sliver may pass
-        return SPLIT if level < SLIVER_LEVEL + slivers and _ends_differ(data, nodes, slivers) else EMPTY
+        doubtful = level < SLIVER_LEVEL + slivers and _ends_differ(data, nodes, slivers)
+        return SPLIT if doubtful or _close(data, nodes, level) else EMPTY
     if level >= max_level:
         return LEAF
     x_low, x_high, y_low, y_high = np.inf, -np.inf, np.inf, -np.inf
@@ -96,6 +100,19 @@ def _ends_differ(data, nodes, slivers):
         else:
             low, high = min(low, data[k, X]), max(high, data[k, X])
     return low < high if alive == 0 else slivers > 0 and alive < nodes.size
+
+
+@borrowing
+def _close(data, nodes, level):
+    """Tell whether a rejected cell's rays come so near to a rim that a horn between two rims may pass among them."""
+    low, alive = np.inf, 0
+    for k in nodes:
+        if data[k, ALIVE] > 0.0:
+            alive += 1
+            low = min(low, data[k, REL])
+    if level < SLIVER_LEVEL and alive < nodes.size and low < CLOSE_TO_TORN:
+        return True
+    return level == 0 and low < CLOSE
 
 
 @borrowing
