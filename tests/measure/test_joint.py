@@ -94,3 +94,20 @@ def test_light_that_lies_beside_a_ghost_is_no_part_of_it():
     wide.numbers[20:23] *= 20.0
     shown = views((small, wide), angles=FEW)
     assert len(joined([found(small), found(wide)], shown)) == 2
+
+
+def test_ghosts_that_have_shrunk_to_nothing_take_no_other_with_them():
+    """Where a fit finds no light for a ghost, its size may go to 0, and rounding gives its triangles their signs."""
+    rng = np.random.default_rng(3)
+    shown = views(GHOSTS[:2], angles=FEW)
+    vanished = []
+    for _ in range(60):
+        numbers = np.zeros(GHOSTS[0].numbers.size)
+        for first in (0, 10):
+            numbers[first : first + 4] = 10.0 ** rng.uniform(-15.0, -11.0) * rng.normal(size=4)
+        numbers[20], numbers[30:33] = 1e-13, (1e-14, 1e-15, 0.05)
+        vanished.append(Shape(numbers, 1))
+        for view in shown:
+            assert np.isfinite(render(vanished[-1], view)).all()
+    kept = lit([*map(found, vanished[:5]), *map(found, GHOSTS[:2])], shown)
+    assert [ghost.shapes[1].numbers[0] for ghost in kept] == [ghost.numbers[0] for ghost in GHOSTS[:2]]

@@ -171,7 +171,7 @@ def _cells(parameters, sigma, pupil, spots, span, densities):
                     x, y = (ax + cx + pupil[i, k, 0]) / 3.0, (ay + cy + pupil[i, k, 1]) / 3.0
                     flux += max(level(light, x * x + y * y, x * sigma), 0.0) * inner_part * wedge[j]
                     area += other
-            density = -flux / area
+            density = -flux / steadied(area)
             for j in range(first, first + wide):
                 densities[i, j, 0], densities[i, j, 1] = density, density if i > 0 else 0.0
 
@@ -206,7 +206,8 @@ def cell_light(spots, span, densities, i, first):
         if i > 0:
             light += densities[i, j, 1] * other
             area += other
-    return light, area
+    # triangles of a ghost that has shrunk to nothing have either sign
+    return light, steadied(area)
 
 
 @inner
