@@ -145,42 +145,22 @@ def test_a_ring_of_steep_rays_around_the_rest():
 @pytest.mark.parametrize(
     ("file", "field", "path"),
     [
+        # every ray of the pre-pass' grid ends, those around a spot of a third of a millimetre latest of all
         ("Sigma_29-77mm_F3.61-5.87_(Sigma_28-80mm_F3.5-5.6_Aspherical_Macro_HF).lens", (8.17, -26.28), (13, 1)),
         ("Leica_21mm_F4_(Leica_Super-Angulon-R_21mm_F4).lens", (24.86, 6.89), (7, 1)),
-    ],
-)
-def test_a_spot_that_is_seen_by_no_ray_of_the_grid(file, field, path):
-    """Every ray of the pre-pass' grid ends, those around a spot of a third of a millimetre latest of all."""
-    if not (CORPUS / file).exists():
-        pytest.skip(f"{CORPUS} is not there")
-    a_lens = load_lens(CORPUS / file)
-    compare_systems(from_lens(a_lens), a_lens, field, paths=[path], samples=2000)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("file", "field", "path"),
-    [
+        ("Canon_21-34mm_F3.5-4.5_IZ_(Canon_EF20-35mm_f3.5-4.5_USM).lens", (18.25, -27.94), (15, 2)),
+        # rings of steep rays: 2 and 5 % of these ghosts
         ("Canon_25mm_F1.85_(Canon_RF24mm_F1.8_Macro_IS_STM).lens", (2.24, -24.43), (5, 2)),
         ("Canon_26mm_F1.45_(Canon_EF24mm_f1.4L_II_USM).lens", (-20.15, -11.06), (6, 0)),
+        # a horn between two rims, narrower than the coarsest cells, beside rays that end: 1.7 %
+        ("Canon_26mm_F1.45_(Canon_EF24mm_f1.4L_II_USM).lens", (-11.61, 22.78), (22, 14)),
     ],
 )
-def test_rings_of_steep_rays_in_other_lenses(file, field, path):
-    """The same; 2 and 5 % of these ghosts."""
+def test_parts_of_the_pupil_that_are_hard_to_find(file, field, path):
     if not (CORPUS / file).exists():
         pytest.skip(f"{CORPUS} is not there")
     a_lens = load_lens(CORPUS / file)
     compare_systems(from_lens(a_lens), a_lens, field, paths=[path], samples=2000)
-
-
-@pytest.mark.slow
-def test_a_horn_between_two_rims():
-    """A part of the pupil narrower than the coarsest cells, beside rays that end: 1.7 % of this ghost."""
-    file = CORPUS / "Canon_26mm_F1.45_(Canon_EF24mm_f1.4L_II_USM).lens"
-    if not file.exists():
-        pytest.skip(f"{CORPUS} is not there")
-    a_lens = load_lens(file)
-    compare_systems(from_lens(a_lens), a_lens, (-11.61, 22.78), paths=[(22, 14)], samples=2000)
 
 
 @pytest.mark.slow
