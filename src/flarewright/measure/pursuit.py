@@ -10,6 +10,7 @@ from math import log
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter  # type: ignore[import-untyped]
 
 from ..kernels.measure_pupil import FIRST_G, FIRST_I
 from ..model.ghost_model import Blades
@@ -33,6 +34,8 @@ SURE = 6.0
 THERE = 0.35
 # part of the light taken off that may stay behind
 LEFT_BEHIND = 0.08
+# and as specks, so many pixels around the light
+LEFT_AS_SPECKS, _BESIDE = 0.2, 3
 # views that a first fit looks at
 _FEW = 16
 # how far a candidate grows: most of what lies beside it is not known yet, so its misfit tells nothing of it
@@ -158,17 +161,21 @@ def _candidates(
     iris: Blades | None,
     pool: ThreadPoolExecutor | None,
 ) -> list[Candidate]:
-    doubted = _doubted(views, rest)
-    rims = candidates(slopes_of(doubted, rest, masks, pool=pool), views[0].size_px[0], most=most, iris=iris, pool=pool)
-    small = specks(doubted, rest, masks, most=most, pool=pool)
+    slopes = slopes_of(_doubted(views, rest), rest, masks, pool=pool)
+    rims = candidates(slopes, views[0].size_px[0], most=most, iris=iris, pool=pool)
+    small = specks(_doubted(views, rest, beside=True), rest, masks, most=most, pool=pool)
     return sorted([*rims, *small], key=lambda each: -each.score)
 
 
-def _doubted(views: Sequence[View], rest: Sequence[Pixels]) -> list[View]:
-    """Return the views less certain where light was taken off: a part of it stays behind as edges."""
+def _doubted(views: Sequence[View], rest: Sequence[Pixels], *, beside: bool = False) -> list[View]:
+    """Return the views less certain where light was taken off: a part of it stays behind as edges.
+
+    With `beside` also around there: of a speck whose form is not drawn well enough a larger part stays, as specks.
+    """
     out = []
     for view, picture in zip(views, rest, strict=True):
-        known = LEFT_BEHIND * np.abs(view.pixels[..., 1] - picture)
+        known = np.abs(view.pixels[..., 1] - picture)
+        known = LEFT_AS_SPECKS * maximum_filter(known, 2 * _BESIDE + 1) if beside else LEFT_BEHIND * known
         out.append(replace(view, variance=view.variance + (known**2)[..., None]))
     return out
 
