@@ -10,7 +10,6 @@ from math import log
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import maximum_filter  # type: ignore[import-untyped]
 
 from ..kernels.measure_pupil import FIRST_G, FIRST_I
 from ..model.ghost_model import Blades
@@ -21,7 +20,7 @@ from .grow import Growth, grow
 from .journal import Journal
 from .numbers import NUMBERS, with_blades
 from .settle import touch_up
-from .specks import specks
+from .specks import highest_near, specks
 from .views import Pixels, View
 
 # votes below which a candidate is chance
@@ -175,7 +174,10 @@ def _doubted(views: Sequence[View], rest: Sequence[Pixels], *, beside: bool = Fa
     out = []
     for view, picture in zip(views, rest, strict=True):
         known = np.abs(view.pixels[..., 1] - picture)
-        known = LEFT_AS_SPECKS * maximum_filter(known, 2 * _BESIDE + 1) if beside else LEFT_BEHIND * known
+        if beside:
+            known = LEFT_AS_SPECKS * highest_near(highest_near(known, _BESIDE, axis=0), _BESIDE, axis=1)
+        else:
+            known = LEFT_BEHIND * known
         out.append(replace(view, variance=view.variance + (known**2)[..., None]))
     return out
 

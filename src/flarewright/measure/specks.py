@@ -9,14 +9,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import map_coordinates, maximum_filter1d  # type: ignore[import-untyped]
 
 from .find import Candidate
 from .numbers import Floats
 from .views import Pixels, View
+
+Kind = TypeVar("Kind", bound=np.floating)
 
 # radii that are looked for, pixels, and from where to where, beyond a speck's rim, its surroundings are looked at
 RADII = (1.0, 1.8, 3.0)
@@ -79,7 +81,7 @@ def specks(
     speeds = np.arange(-reach, reach, 1.0)
     # shape (views, speeds): where among the places a speck of each speed would be
     at = np.clip(np.rint((sigmas[:, None] * speeds + reach) / _STEP).astype(np.int64), 0, len(places) - 1)
-    near = maximum_filter1d(votes, 2 * round(STRAY / _STEP) + 1, axis=2)
+    near = highest_near(votes, round(STRAY / _STEP), axis=2)
     told = np.take_along_axis(near, np.broadcast_to(at[:, None], (len(views), len(RADII), len(speeds))), axis=2)
     told[sigmas < _LEAST_SIGMA] = 0.0
     scores, first, last = _best_runs(told)
@@ -118,12 +120,35 @@ def _votes(view: View, picture: Floats, variance: Pixels, places: Floats) -> Flo
     if not seen.any():
         return votes
     part = slice(int(np.argmax(seen)), len(seen) - int(np.argmax(seen[::-1])))
-    where = np.stack([rows[:, part], columns[:, part]])
-    strip = map_coordinates(picture, where, order=1, cval=np.nan)
-    noise = map_coordinates(variance.astype(np.float64), where, order=0, cval=np.inf)
+    strip, noise = _sampled(picture, variance, rows[:, part], columns[:, part])
     for r, radius in enumerate(RADII):
         votes[r, part] = _contrast(strip, noise, radius, across)
     return votes
+
+
+def _sampled(picture: Floats, variance: Pixels, rows: Floats, columns: Floats) -> tuple[Floats, Floats]:
+    """Return a picture between its pixels, and the nearest pixels' variance; not a number, and infinite, beside it."""
+    height, width = picture.shape
+    outside = (rows < 0.0) | (rows > height - 1.0) | (columns < 0.0) | (columns > width - 1.0)
+    rows, columns = np.clip(rows, 0.0, height - 1.0), np.clip(columns, 0.0, width - 1.0)
+    i, j = np.minimum(rows.astype(np.int64), height - 2), np.minimum(columns.astype(np.int64), width - 2)
+    down, right = rows - i, columns - j
+    upper = (1.0 - right) * picture[i, j] + right * picture[i, j + 1]
+    lower = (1.0 - right) * picture[i + 1, j] + right * picture[i + 1, j + 1]
+    noise = variance[np.rint(rows).astype(np.int64), np.rint(columns).astype(np.int64)].astype(np.float64)
+    return np.where(outside, np.nan, (1.0 - down) * upper + down * lower), np.where(outside, np.inf, noise)
+
+
+def highest_near(values: NDArray[Kind], reach: int, axis: int) -> NDArray[Kind]:
+    """Return the largest value within so many places along an axis."""
+    out = values.copy()
+    here, there = [slice(None)] * values.ndim, [slice(None)] * values.ndim
+    for away in range(1, reach + 1):
+        here[axis], there[axis] = slice(None, -away), slice(away, None)
+        a, b = tuple(here), tuple(there)
+        np.maximum(out[a], values[b], out=out[a])
+        np.maximum(out[b], values[a], out=out[b])
+    return out
 
 
 def _contrast(strip: Floats, noise: Floats, radius: float, across: Floats) -> Floats:
