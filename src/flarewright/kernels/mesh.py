@@ -104,7 +104,10 @@ def _ends_differ(data, nodes, slivers):
 
 @borrowing
 def _close(data, nodes, level):
-    """Tell whether a rejected cell's rays come so near to a rim that a horn between two rims may pass among them."""
+    """Tell whether a rejected cell's rays come so near to a rim that a horn between two rims may pass among them.
+
+    Where some lie within all rims it was the iris that rejected them, which is one limit and has no horns.
+    """
     low, alive = np.inf, 0
     for k in nodes:
         if data[k, ALIVE] > 0.0:
@@ -112,7 +115,7 @@ def _close(data, nodes, level):
             low = min(low, data[k, REL])
     if level < SLIVER_LEVEL and alive < nodes.size and low < CLOSE_TO_TORN:
         return True
-    return level == 0 and low < CLOSE
+    return level == 0 and 1.0 < low < CLOSE
 
 
 @borrowing
