@@ -210,7 +210,10 @@ def _late(data, nx, ny):
         if data[k, ALIVE] > 0.0:
             return np.inf
         last = max(last, int(data[k, X]))
-    counts = np.zeros(last + 1, dtype=np.int64)
+    # Numba's own zeros take long to compile
+    counts = np.empty(last + 1, dtype=np.int64)
+    for k in range(last + 1):
+        counts[k] = 0
     nodes = np.empty(4, dtype=np.int64)
     for cell in range(nx * ny):
         _cell_corners(cell // ny, cell % ny, ny + 1, nodes)
