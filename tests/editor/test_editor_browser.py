@@ -1153,7 +1153,8 @@ def test_false_colours_have_a_legend(tab):
     assert {"−8", "−0.5", "+0.5", "+3.5"} <= set(tab.js("written"))
 
 
-def test_a_hand_that_takes_the_light_ends_the_play(tab):
+def key_two_places(tab):
+    """Key the light where it is, and nine seconds later at another place."""
     tab.page.click("#path-key")
     tab.until("flarewright.state.lights[0].keys.length === 1")
     type_into(tab, "path_time", "9")
@@ -1162,6 +1163,10 @@ def test_a_hand_that_takes_the_light_ends_the_play(tab):
     tab.rest()
     tab.page.click("#path-key")
     tab.until("flarewright.state.lights[0].keys.length === 2")
+
+
+def test_a_hand_that_takes_the_light_ends_the_play(tab):
+    key_two_places(tab)
     tab.page.click("#path-play")
     tab.until("flarewright.player.at > 0.3 && flarewright.player.playing")
     x, y = tab.at(0.7, 0.7)
@@ -1290,14 +1295,7 @@ def test_a_hand_that_comes_back_leaves_no_target_of_elsewhere(tab):
 
 def test_keys_that_move_the_light_end_the_play(tab):
     """The picture of the place where it went on to rest had never come."""
-    tab.page.click("#path-key")
-    tab.until("flarewright.state.lights[0].keys.length === 1")
-    type_into(tab, "path_time", "9")
-    tab.rest()
-    tab.drag(tab.light(), tab.at(0.3, 0.3))
-    tab.rest()
-    tab.page.click("#path-key")
-    tab.until("flarewright.state.lights[0].keys.length === 2")
+    key_two_places(tab)
     for end in ("ArrowRight", "open"):
         tab.page.click("#path-play")
         tab.until("flarewright.player.playing && flarewright.view.shownGrade === 'moving'")
