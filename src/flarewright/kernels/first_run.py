@@ -30,12 +30,12 @@ ROOTS = {
         "mesh.build_mesh",
         f"{_GEOMETRY}, f8[:,::1], f8[:,:,::1], f8, f8, f8, i8, f8, f8, f8[::1], i8, i8, i8, i8, f8, f8, f8, f8, f8, "
         "f8, i8",
-        3.1,
+        3.7,
     ),
     "prepass": (
         "prepass.find_box",
         f"{_GEOMETRY}, f8[::1], f8[:,::1], f8, f8, f8, i8, f8, f8, f8[::1], i8, i8, i8, i8, f8, f8, f8[:,::1]",
-        2.1,
+        3.2,
     ),
     "draw": ("bundle.draw_bundle", f"{_BUNDLE}, f8[::1], i8, f8[:,::1], none, {_CANVAS}, i8", 2.6),
     "draw masked": ("bundle.draw_bundle", f"{_BUNDLE}, f8[::1], i8, f8[:,::1], {_MASK}, {_CANVAS}, i8", 5.0),
@@ -108,7 +108,7 @@ ROOTS = {
 }
 # roots that take only so long after another one in the same process, whose inner kernels they share
 KIN = {
-    "prepass": ("mesh", 1.8),
+    "prepass": ("mesh", 1.9),
     "nodes": ("mesh", 0.3),
     "measure": ("draw", 0.5),
     "densities": ("draw", 0.1),
