@@ -41,23 +41,24 @@ def mended(bundle: Bundle, data: Floats) -> tuple[Bundle, Floats]:
     alive = data[:, ALIVE] > 0.0
     if alive.all():
         return bundle, data
-    passing = alive[bundle.triangles]
-    count = passing.sum(axis=1)
-    torn = np.flatnonzero((count > 0) & (count < 3))
+    passing = alive.take(bundle.triangles)
+    first, second, third = passing.T
+    torn = np.flatnonzero((first != second) | (second != third))
     if not len(torn):
         return bundle, data
     slopes = _slopes(bundle, data, alive, torn)
+    passing = passing[torn]
     # turned until the first ray passes and the last one ends
-    turn = np.argmax(passing[torn] & ~np.roll(passing[torn], 1, axis=1), axis=1)
+    turn = np.argmax(passing & ~np.roll(passing, 1, axis=1), axis=1)
     a, b, c = (bundle.triangles[torn, (turn + k) % 3] for k in range(3))
-    two = count[torn] == 2
+    two = passing.sum(axis=1) == 2
     ends, begins = np.concatenate([np.where(two, c, b), c]), np.concatenate([np.where(two, b, a), a])
     step = 0.5 * (bundle.pupil[ends] - bundle.pupil[begins])
     more = data[begins] + np.einsum("nk,nkm->nm", step, np.concatenate([slopes, slopes]))
     more[:, WEIGHT] = np.maximum(more[:, WEIGHT], 0.0)
     more[:, ALIVE] = 1.0
-    first = len(data) + np.arange(len(torn))
-    parts = [np.stack([a, first, first + len(torn)], axis=1), np.stack([a, b, first], axis=1)[two]]
+    cuts = len(data) + np.arange(len(torn))
+    parts = [np.stack([a, cuts, cuts + len(torn)], axis=1), np.stack([a, b, cuts], axis=1)[two]]
     whole = replace(
         bundle, pupil=np.concatenate([bundle.pupil, bundle.pupil[begins] + step]),
         triangles=np.concatenate([bundle.triangles, *parts]), traced={},
