@@ -53,7 +53,8 @@ def test_cells_come_back_to_their_step():
 def test_a_sprite_lies_where_its_corner_and_the_lights_direction_say(turn, scale):
     axis, size = (51.3 * scale, 47.8 * scale), (round(104 * scale), round(98 * scale))
     toward = np.cos(np.radians(turn)), np.sin(np.radians(turn))
-    got = draw_sprites([sprite([slope()])], 3.0, (0.0, 0.0), axis, toward, size, scale)
+    one = sprite([slope()])
+    got = draw_sprites([one], [sprite_at(one, 3.0)], (0.0, 0.0), axis, toward, size, scale)
     x, y = offsets(axis, size, scale)
     # along the light's direction, and down when it is right; y counts upwards
     along, down = toward[0] * x + toward[1] * y, toward[1] * x - toward[0] * y
@@ -71,7 +72,10 @@ def test_a_sprite_lies_where_its_corner_and_the_lights_direction_say(turn, scale
 
 def test_one_that_goes_with_the_light_stays_upright_and_changes_over_the_constellation():
     one = sprite([slope(), 3.0 * slope()], follows="light", constellation_deg=(4.0, 8.0))
-    here, there = (draw_sprites([one], 5.0, place, (0.0, 0.0), (0.0, 1.0), (120, 80)) for place in ((60, 40), (63, 38)))
+    here, there = (
+        draw_sprites([one], [sprite_at(one, 5.0)], place, (0.0, 0.0), (0.0, 1.0), (120, 80))
+        for place in ((60, 40), (63, 38))
+    )
     assert np.allclose(here[2:, :-3], there[:-2, 3:], atol=1e-5)
     assert np.allclose(sprite_at(one, 5.0), 1.5 * slope(), rtol=0.05)
     assert np.array_equal(sprite_at(one, 99.0), one.pictures[1])
@@ -81,7 +85,7 @@ def test_one_that_goes_with_the_light_stays_upright_and_changes_over_the_constel
 def test_a_strip_from_the_light_lies_in_its_direction_and_nowhere_else(turn, scale):
     one = sprite([slope()], follows="light", turn_deg=turn, stretch=3.0, grain_px=1.5, corner_px=(12.0, -15.0))
     place, size = (90.3 * scale, 101.8 * scale), (round(200 * scale), round(210 * scale))
-    got = draw_sprites([one], 3.0, place, (0.0, 0.0), (0.0, 1.0), size, scale)
+    got = draw_sprites([one], [sprite_at(one, 3.0)], place, (0.0, 0.0), (0.0, 1.0), size, scale)
     x, y = offsets(place, size, scale)
     c, s = np.cos(np.radians(turn)), np.sin(np.radians(turn))
     u, v = (c * x + s * y - 12.0) / 4.5, (s * x - c * y + 15.0) / 1.5

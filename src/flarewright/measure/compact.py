@@ -237,9 +237,12 @@ def _written(ghost: AberrationGhost, found: Found, span: tuple[float, float], cu
             numbers = written_numbers(shape, held_error(fit))
             deviation = np.array([float(f"{d:.2g}") for d in deviation])
         colours.append(channel_of(numbers, shape.discs, deviation))
+    # a life's own end has room in which its curve fades
+    same = zip(span, ghost.visible_deg, ghost.fade_deg, strict=True)
     out: AberrationGhost = ghost.replace(
         red=colours[0], green=colours[1], blue=colours[2], curves=curves,
         visible_deg=(floor(1e4 * span[0]) / 1e4, ceil(1e4 * span[1]) / 1e4),
+        fade_deg=tuple(fade if end == old else 0.0 for end, old, fade in same),
     )  # fmt: skip
     return out
 

@@ -94,7 +94,15 @@ def frame(axis_px: tuple[float, float], roll_deg: float, constellation_deg: floa
 
 
 def visible(ghosts: Sequence[AberrationGhost | BezierGhost], constellation_deg: float) -> Floats:
-    """Return 1 for ghosts that are there at a constellation and 0 for the others, shape (G,)."""
+    """Return which part of each ghost's light is there at a constellation, shape (G,): 1 or 0, between at its ends."""
     return np.array([
-        1.0 if ghost.visible_deg[0] <= constellation_deg <= ghost.visible_deg[1] else 0.0 for ghost in ghosts
+        _risen(constellation_deg - ghost.visible_deg[0], ghost.fade_deg[0])
+        * _risen(ghost.visible_deg[1] - constellation_deg, ghost.fade_deg[1])
+        for ghost in ghosts
     ])  # fmt: skip
+
+
+def _risen(beyond: float, fade: float) -> float:
+    if fade == 0.0:
+        return 1.0 if beyond >= 0.0 else 0.0
+    return min(max(beyond / fade + 0.5, 0.0), 1.0)

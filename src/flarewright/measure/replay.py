@@ -10,16 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import FlarewrightError
-from ..kernels.measure_bezier import bezier_window, draw_bezier
+from ..kernels.measure_bezier import BORDER, bezier_window, draw_bezier
 from ..kernels.measure_edges import sum_into
 from ..kernels.measure_mesh import draw_ghosts
-from ..model.ghost_model import AberrationGhost, BezierGhost, Curves, GhostModel
+from ..model.ghost_model import AberrationGhost, BezierGhost, GhostModel
 from ..model.layer import Layer
 from ..render.compose import beauty
-from .curves import pose_at, posed
+from .carried import carried
 from .glow import halo_at, offsets, star_at
-from .numbers import NUMBERS, bezier_numbers, channel_numbers, field, frame, visible
-from .sprites import draw_sprites
+from .numbers import bezier_numbers, field, frame, visible
+from .packed import Packed, pack, posed_numbers
+from .sprites import draw_sprites, sprite_at
 
 Floats = NDArray[np.float64]
 
@@ -107,7 +108,14 @@ def replay(
         turn = np.radians(roll_deg)
         toward = float(side * np.cos(turn)), float(side * np.sin(turn))
         place = at[0] * scale, at[1] * scale + top
-        rest = gain * draw_sprites(model.sprites, constellation_deg, place, axis, toward, size, scale)
+        packed = pack(model)
+        pictures = [
+            carried(one, packed, model, constellation_deg)
+            if one.follows == "ghosts"
+            else sprite_at(one, constellation_deg)
+            for one in model.sprites
+        ]
+        rest = gain * draw_sprites(model.sprites, pictures, place, axis, toward, size, scale)
         layers.append(Layer("residual", np.asarray(rest, dtype=np.float32), (0, 0, *size)))
     whole = beauty(layers, size)
     singles = _single(model, constellation_deg, roll_deg, size, gain) if single else []
@@ -154,23 +162,8 @@ def draw(model: GhostModel, constellation_deg: float, roll_deg: float, size_px: 
     return draw_packed(pack(model), model, constellation_deg, roll_deg, size_px)
 
 
-Packed = tuple[tuple[AberrationGhost, ...], Floats, NDArray[np.int64], tuple[BezierGhost, ...]]
-
-
-def pack(model: GhostModel) -> Packed:
-    """Return a model's ghosts as `draw_packed` takes them, for many pictures of one model."""
-    meshes = tuple(ghost for ghost in model.ghosts if isinstance(ghost, AberrationGhost))
-    curves = tuple(ghost for ghost in model.ghosts if isinstance(ghost, BezierGhost))
-    numbers = np.zeros((3, len(meshes), NUMBERS))
-    counts = np.zeros((3, len(meshes)), np.int64)
-    for k, ghost in enumerate(meshes):
-        for m, channel in enumerate((ghost.red, ghost.green, ghost.blue)):
-            numbers[m, k], counts[m, k] = channel_numbers(channel, ghost.blades), len(channel.discs)
-    return meshes, numbers, counts, curves
-
-
 def _there(model: GhostModel, ghosts: Sequence[AberrationGhost | BezierGhost], constellation_deg: float) -> Floats:
-    """Return which ghosts are seen: beyond what was measured those that are seen where that ends."""
+    """Return which part of each ghost is seen: beyond what was measured as it is seen where that ends."""
     low, high = model.constellation_deg
     return visible(ghosts, min(max(constellation_deg, low), high))
 
@@ -186,30 +179,20 @@ def draw_packed(
     sigma = abs(field(constellation_deg, model.largest_deg))
     if meshes:
         there = _there(model, meshes, constellation_deg)
-        numbers = _posed(meshes, numbers, constellation_deg, sigma)
+        numbers = posed_numbers(meshes, numbers, constellation_deg, sigma)
         planes = np.zeros((3, height, width + 1))
         for m in range(3):
             draw_ghosts(numbers[m], counts[m], there, sigma, placed, planes[m])
         sum_into(planes, pixels)
-    for ghost, there_is in zip(curves, _there(model, curves, constellation_deg), strict=True):
-        if there_is:
-            left, top, w, h = bezier_window(bezier_numbers(ghost, constellation_deg), placed, width, height)
+    for ghost, part in zip(curves, _there(model, curves, constellation_deg), strict=True):
+        if part > 0.0:
+            numbers = bezier_numbers(ghost, constellation_deg)
+            numbers[BORDER:] *= part
+            left, top, w, h = bezier_window(numbers, placed, width, height)
             if w:
                 window = pixels[top : top + h, left : left + w]
-                draw_bezier(bezier_numbers(ghost, constellation_deg), placed, left, top, window, _NOTHING)
+                draw_bezier(numbers, placed, left, top, window, _NOTHING)
     return pixels
-
-
-def _posed(meshes: Sequence[AberrationGhost], numbers: Floats, constellation_deg: float, sigma: float) -> Floats:
-    """Return the numbers, shape (3, G, 45), as the ghosts' curves bend them at a constellation."""
-    out = numbers
-    for k, ghost in enumerate(meshes):
-        if ghost.curves != Curves():
-            out = out.copy() if out is numbers else out
-            pose = pose_at(ghost.curves, constellation_deg, ghost.visible_deg)
-            for m in range(3):
-                out[m, k] = posed(numbers[m, k], sigma, pose)
-    return out
 
 
 def _single(

@@ -242,9 +242,10 @@ def to_model(ghosts: Sequence[Found], views: Sequence[View]) -> tuple[Aberration
             channel_of(shape.numbers, shape.discs, None if fit is None else fit.uncertainty)
             for shape, fit in zip(ghost.shapes, ghost.fits, strict=True)
         ]
-        born = angles[0] if ghost.first == 0 else 0.5 * (angles[ghost.first - 1] + angles[ghost.first])
-        last = len(angles) - 1
-        died = angles[last] if ghost.last == last else 0.5 * (angles[ghost.last] + angles[ghost.last + 1])
+        # what one view shows and the next does not comes or goes from the one to the other, for all one knows
+        before, after = max(ghost.first - 1, 0), min(ghost.last + 1, len(angles) - 1)
+        born = 0.5 * (angles[before] + angles[ghost.first])
+        died = 0.5 * (angles[ghost.last] + angles[after])
         out.append(
             AberrationGhost(
                 name=str(number),
@@ -253,6 +254,7 @@ def to_model(ghosts: Sequence[Found], views: Sequence[View]) -> tuple[Aberration
                 blue=channels[2],
                 blades=blades_of(ghost.shapes[1].numbers),
                 visible_deg=(born, died),
+                fade_deg=(angles[ghost.first] - angles[before], angles[after] - angles[ghost.last]),
             )
         )
     return tuple(out)

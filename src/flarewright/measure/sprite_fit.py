@@ -15,11 +15,13 @@ from numpy.typing import NDArray
 
 from ..model.sprite import Sprite, packed
 from .numbers import Floats
-from .sprites import draw_sprites, samples
+from .sprites import draw_sprites, samples, sprite_at
 from .views import Pixels, View
 
 # cells across the picture of the coarsest pictures, and cells of the finer ones around the light to each side
 ACROSS, AROUND = 90, 64
+# cells across a large picture of what follows ghosts, and of a small one, where they are so many pixels
+_FINE, _FINE_PX = 240, 3.0
 # views for each picture that goes with the light, and how many pictures there are at most: there, and about the axis
 VIEWS, _MOST_LIGHT, _MOST_AXIS = 5, 12, 60
 # how stiff cells are over the constellation against one view: second differences and first
@@ -67,7 +69,7 @@ def light_sprites(views: Sequence[View], pixels: Sequence[Pixels]) -> tuple[Spri
 
 
 def axis_sprite(views: Sequence[View], pixels: Sequence[Pixels]) -> Sprite:
-    """Keep what is still left, coarsely, about the axis.
+    """Keep what is still left, coarsely, about the axis and beside the ghosts.
 
     Parameters
     ----------
@@ -79,7 +81,7 @@ def axis_sprite(views: Sequence[View], pixels: Sequence[Pixels]) -> Sprite:
     Sprite
     """
     width, height = views[0].size_px
-    grain = width / ACROSS
+    grain = min(max(width / _FINE, _FINE_PX), width / ACROSS)
     corners = np.array([[x, y] for x in (0.0, width) for y in (0.0, height)])
     places = np.concatenate([_turned(corners - view.frame[:2], view) for view in views])
     low, high = np.floor(places.min(axis=0) / grain), np.ceil(places.max(axis=0) / grain)
@@ -101,7 +103,7 @@ def axis_sprite(views: Sequence[View], pixels: Sequence[Pixels]) -> Sprite:
         beside(_filled(sure(np.stack(pictures), np.stack(noises)))), DIGIT * darkest_noise(views) / grain
     )
     return Sprite(
-        follows="axis", grain_px=grain, corner_px=(float(low[0] * grain), float(low[1] * grain)),
+        follows="ghosts", grain_px=grain, corner_px=(float(low[0] * grain), float(low[1] * grain)),
         constellation_deg=tuple(float(np.mean([views[k].constellation_deg for k in group])) for group in groups),
         rows=int(rows), columns=int(columns), unit=unit, cells=cells,
     )  # fmt: skip
@@ -111,7 +113,8 @@ def drawn(sprites: Sequence[Sprite], view: View) -> Pixels:
     """Draw sprites as a view shows them, shape (H, W, 3)."""
     ax, ay, cosine, sine, _ = view.frame
     axis = float(ax), float(ay)
-    return draw_sprites(sprites, view.constellation_deg, view.light_px, axis, (cosine, sine), view.size_px)
+    pictures = [sprite_at(one, view.constellation_deg) for one in sprites]
+    return draw_sprites(sprites, pictures, view.light_px, axis, (cosine, sine), view.size_px)
 
 
 def darkest_noise(views: Sequence[View]) -> float:

@@ -26,7 +26,7 @@ def sprite_at(sprite: Sprite, constellation_deg: float) -> Pixels:
 
 def draw_sprites(
     sprites: Sequence[Sprite],
-    constellation_deg: float,
+    pictures: Sequence[Pixels],
     light_px: tuple[float, float],
     axis_px: tuple[float, float],
     direction: tuple[float, float],
@@ -38,7 +38,8 @@ def draw_sprites(
     Parameters
     ----------
     sprites : sequence of Sprite
-    constellation_deg : float
+    pictures : sequence of ndarray, shape (rows, columns, 3)
+        Of each sprite, at one constellation.
     light_px, axis_px : tuple of float
         Pixels of the picture.
     direction : tuple of float
@@ -55,11 +56,11 @@ def draw_sprites(
     """
     width, height = size_px
     out = np.zeros((height, width, 3), np.float32)
-    for sprite in sprites:
-        cells = sprite_at(sprite, constellation_deg)
+    for sprite, cells in zip(sprites, pictures, strict=True):
         turn = np.radians(sprite.turn_deg)
-        cosine, sine = direction if sprite.follows == "axis" else (float(np.cos(turn)), float(np.sin(turn)))
-        x0, y0 = axis_px if sprite.follows == "axis" else light_px
+        goes = sprite.follows == "light"
+        cosine, sine = (float(np.cos(turn)), float(np.sin(turn))) if goes else direction
+        x0, y0 = light_px if goes else axis_px
         step = 1.0 / (scale * sprite.grain_px)
         # along = cos dx - sin dy and down = sin dx + cos dy, dx and dy counted right and down
         sides = np.array([1.0, 1.0 / sprite.stretch])

@@ -16,6 +16,7 @@ from .sprite import Sprite
 
 Ten = tuple[float, float, float, float, float, float, float, float, float, float]
 Rgb3 = tuple[float, float, float]
+Fade = tuple[Annotated[float, Field(ge=0.0)], Annotated[float, Field(ge=0.0)]]
 
 
 class Disc(Frozen):
@@ -133,6 +134,8 @@ class AberrationGhost(Frozen):
         In the place of the pupil's unit disc stands a polygon as large.
     visible_deg : tuple of float
         Constellations at which it appears and disappears.
+    fade_deg : tuple of float
+        Over which range about each of these its light comes and goes evenly; 0 is at once.
     curves : Curves
         What `measure compress` found to differ over the constellation.
     """
@@ -144,6 +147,7 @@ class AberrationGhost(Frozen):
     blue: Channel
     blades: Blades | None = None
     visible_deg: tuple[float, float]
+    fade_deg: Fade = (0.0, 0.0)
     curves: Curves = Curves()
 
 
@@ -162,6 +166,8 @@ class BezierGhost(Frozen):
         Standard deviation of each number about its polynomial, or empty.
     visible_deg : tuple of float
         Constellations at which it appears and disappears.
+    fade_deg : tuple of float
+        As of an `AberrationGhost`.
     """
 
     kind: Literal["bezier"] = "bezier"
@@ -169,6 +175,7 @@ class BezierGhost(Frozen):
     numbers: tuple[tuple[float, ...], ...] = Field(min_length=19, max_length=19)
     uncertainty: tuple[float, ...] = Field((), max_length=19)
     visible_deg: tuple[float, float]
+    fade_deg: Fade = (0.0, 0.0)
 
 
 class Halo(Frozen):

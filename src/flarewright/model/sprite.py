@@ -23,14 +23,15 @@ class Sprite(Frozen):
 
     Attributes
     ----------
-    follows : {"light", "axis"}
+    follows : {"light", "axis", "ghosts"}
         "light": it goes where the light's image goes and stays upright, as the star does. "axis": it stays about the
-        optical axis and turns with the direction of the light, as ghosts do.
+        optical axis and turns with the direction of the light, as ghosts do. "ghosts": as with "axis", and between two
+        of its constellations what lies at a ghost's borders goes where these go.
     grain_px : float
         Side of a cell, pixels.
     corner_px : tuple of float
         Where the first cell begins, from the light or the axis: "light": along the rows' direction and at right angles
-        to it, down when that is right; "axis": towards the light and at right angles to it, down when the light is
+        to it, down when that is right; else: towards the light and at right angles to it, down when the light is
         right.
     turn_deg : float
         "light" only: direction in which rows run, counterclockwise from the right in the upright picture.
@@ -47,7 +48,7 @@ class Sprite(Frozen):
         byte of each, then the lower byte of each. They may be below 0.
     """
 
-    follows: Literal["light", "axis"]
+    follows: Literal["light", "axis", "ghosts"]
     grain_px: float = Field(gt=0.0)
     corner_px: tuple[float, float]
     turn_deg: float = 0.0

@@ -1,0 +1,169 @@
+"""What is left at the borders of ghosts goes where these go, between the constellations that were photographed.
+
+A ghost that is not drawn quite as it is leaves light, and lack of light, along its borders. Two photographs show them
+at two places; halfway between, neither is right, and their mean is both. The ghost's numbers tell how it moves and
+grows, and what is left beside its borders goes with it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..kernels.measure_mesh import draw_ghosts, window_of
+from ..model.ghost_model import GhostModel
+from ..model.sprite import Sprite
+from .numbers import field, visible
+from .packed import Packed, posed_numbers
+from .sprites import Pixels, samples, sprite_at
+
+Floats = NDArray[np.float64]
+
+# cells to each side of a border that go with it
+_BESIDE = 2
+# pixels that no ghost reaches, and how much larger one may be than where it was photographed
+_FAR, _GROWN = 20000, 3.0
+
+
+@dataclass(frozen=True)
+class _Box:
+    """Where a ghost is: its middle towards the light and at right angles, and half its sizes, pixels from the axis."""
+
+    along: float
+    across: float
+    length: float
+    width: float
+
+
+def carried(sprite: Sprite, packed: Packed, model: GhostModel, constellation_deg: float) -> Pixels:
+    """Return the picture of a sprite that follows ghosts.
+
+    Parameters
+    ----------
+    sprite : Sprite
+    packed : Packed
+        The model's ghosts, from `pack`.
+    model : GhostModel
+    constellation_deg : float
+
+    Returns
+    -------
+    ndarray, shape (rows, columns, 3), float32
+        At constellations that were photographed the sprite's own pictures.
+
+    Notes
+    -----
+    Each cell of a photographed picture is divided among the ghosts by the squares of how steep they are around it, and
+    what remains where none is stays in its place. A ghost's share is moved and stretched as the box around the ghost
+    is, from the picture before and from the one after; where one of them did not show it, the other tells alone.
+    """
+    angles = np.array(sprite.constellation_deg)
+    k = int(np.clip(np.searchsorted(angles, constellation_deg) - 1, 0, max(angles.size - 2, 0)))
+    if angles.size == 1 or not angles[0] < constellation_deg < angles[-1] or not packed[0]:
+        return sprite_at(sprite, constellation_deg)
+    part = float((constellation_deg - angles[k]) / (angles[k + 1] - angles[k]))
+    now = _boxes(packed, model, constellation_deg)
+    out = np.zeros(sprite.pictures.shape[1:])
+    moved: dict[int, list[tuple[float, Floats, Floats]]] = {}
+    for n, weight in ((k, 1.0 - part), (k + 1, part)):
+        then, picture = float(angles[n]), sprite.pictures[n]
+        before = _boxes(packed, model, then)
+        steep = {
+            g: edge
+            for g, edge in _edges(sprite, packed, model, then).items()
+            if g in now and g in before and _alike(before[g], now[g])
+        }
+        whole: Floats = np.full(picture.shape[:2], sprite.unit**2)
+        for edge in steep.values():
+            whole = whole + edge**2
+        out += weight * (sprite.unit**2 / whole)[..., None] * picture
+        for g, edge in steep.items():
+            share = (edge**2 / whole)[..., None] * picture
+            light, shown = _moved(share, sprite, model, then, before[g], now[g])
+            moved.setdefault(g, []).append((weight, light, shown))
+    for pair in moved.values():
+        if len(pair) == 1:
+            # it is born or dies between the two, and comes or goes with its light
+            weight, light, _ = pair[0]
+            out += weight * light
+            continue
+        counts = [weight * shown for weight, _, shown in pair]
+        whole = np.maximum(counts[0] + counts[1], 1e-9)
+        for count, (_, light, _) in zip(counts, pair, strict=True):
+            out += (count / whole)[..., None] * light
+    return np.asarray(out, dtype=np.float32)
+
+
+def _alike(one: _Box, other: _Box) -> bool:
+    sizes = (one.length / other.length, one.width / other.width)
+    return all(1.0 / _GROWN < size < _GROWN for size in sizes)
+
+
+def _boxes(packed: Packed, model: GhostModel, constellation_deg: float) -> dict[int, _Box]:
+    """Return where ghosts are, also where they are out of the picture; those that are shut have no box."""
+    meshes, numbers, counts, _ = packed
+    sigma = abs(field(constellation_deg, model.largest_deg))
+    green = posed_numbers(meshes, numbers, constellation_deg, sigma)[1]
+    frame = np.array([_FAR, _FAR, 1.0, 0.0, 1.0])
+    found = {}
+    for g in range(len(meshes)):
+        left, top, width, height = window_of(green[g], counts[1, g], sigma, frame, 2 * _FAR, 2 * _FAR)
+        if 0 < width < _FAR and 0 < height < _FAR:
+            found[g] = _Box(left + 0.5 * width - _FAR, top + 0.5 * height - _FAR, 0.5 * width, 0.5 * height)
+    return found
+
+
+def _edges(sprite: Sprite, packed: Packed, model: GhostModel, constellation_deg: float) -> dict[int, Floats]:
+    """Return how steep each ghost's green is around each cell of a sprite, radiance a cell; flat ones left out."""
+    meshes, numbers, counts, _ = packed
+    sigma = abs(field(constellation_deg, model.largest_deg))
+    green = posed_numbers(meshes, numbers, constellation_deg, sigma)[1]
+    there = visible(meshes, constellation_deg)
+    grain = sprite.grain_px
+    frame = np.array([-sprite.corner_px[0] / grain, -sprite.corner_px[1] / grain, 1.0, 0.0, 1.0 / grain])
+    found = {}
+    for g in np.flatnonzero(there):
+        one = slice(g, g + 1)
+        plane = np.zeros((sprite.rows, sprite.columns + 1))
+        draw_ghosts(green[one], counts[1, one], there[one], sigma, frame, plane)
+        light = np.maximum(plane.cumsum(axis=1)[:, :-1], 0.0)
+        edge = _most_around(np.hypot(*np.gradient(light)))
+        if edge.max() > sprite.unit:
+            found[int(g)] = edge
+    return found
+
+
+def _most_around(values: Floats) -> Floats:
+    """Return the largest value of the cells around each."""
+    out = values
+    for axis in (0, 1):
+        padded = np.pad(out, [(_BESIDE, _BESIDE) if m == axis else (0, 0) for m in (0, 1)], mode="edge")
+        count = out.shape[axis]
+        out = np.max([padded.take(range(k, k + count), axis) for k in range(2 * _BESIDE + 1)], axis=0)
+    return out
+
+
+def _moved(
+    share: Floats, sprite: Sprite, model: GhostModel, then: float, before: _Box, now: _Box
+) -> tuple[Floats, Floats]:
+    """Move a picture as a box moves; return it, and 1 for cells that the photograph showed, 0 for others."""
+    grain = sprite.grain_px
+    along = sprite.corner_px[0] + grain * (np.arange(sprite.columns) + 0.5)
+    down = sprite.corner_px[1] + grain * (np.arange(sprite.rows) + 0.5)
+    along = before.along + (along - now.along) * (before.length / now.length)
+    down = before.across + (down - now.across) * (before.width / now.width)
+    side = -1.0 if then < 0.0 else 1.0
+    x, y = model.axis_px[0] + side * along, model.axis_px[1] + side * down
+    shown = np.outer((y >= 0.0) & (y <= model.size_px[1]), (x >= 0.0) & (x <= model.size_px[0]))
+    column, row = (along - sprite.corner_px[0]) / grain - 0.5, (down - sprite.corner_px[1]) / grain - 0.5
+    rows, columns = np.flatnonzero(share.any(axis=(1, 2))), np.flatnonzero(share.any(axis=(0, 2)))
+    light = np.zeros(share.shape)
+    if rows.size and columns.size:
+        near_r = np.flatnonzero((row > rows[0] - 2.0) & (row < rows[-1] + 2.0))
+        near_c = np.flatnonzero((column > columns[0] - 2.0) & (column < columns[-1] + 2.0))
+        at_r, at_c = np.meshgrid(row[near_r], column[near_c], indexing="ij")
+        moved = samples(share.astype(np.float32), at_c.ravel(), at_r.ravel())
+        light[np.ix_(near_r, near_c)] = moved.reshape(*at_r.shape, 3)
+    return light, shown.astype(float)

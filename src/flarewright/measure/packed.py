@@ -1,0 +1,41 @@
+"""A model's ghosts as arrays, for kernels that draw them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..model.ghost_model import AberrationGhost, BezierGhost, Curves, GhostModel
+from .curves import pose_at, posed
+from .numbers import NUMBERS, channel_numbers
+
+Floats = NDArray[np.float64]
+
+# ghosts by their aberrations, their numbers, shape (3, G, 45), how many discs cut each, shape (3, G), and Walch's
+Packed = tuple[tuple[AberrationGhost, ...], Floats, NDArray[np.int64], tuple[BezierGhost, ...]]
+
+
+def pack(model: GhostModel) -> Packed:
+    """Return a model's ghosts as `replay.draw_packed` takes them, for many pictures of one model."""
+    meshes = tuple(ghost for ghost in model.ghosts if isinstance(ghost, AberrationGhost))
+    curves = tuple(ghost for ghost in model.ghosts if isinstance(ghost, BezierGhost))
+    numbers = np.zeros((3, len(meshes), NUMBERS))
+    counts = np.zeros((3, len(meshes)), np.int64)
+    for k, ghost in enumerate(meshes):
+        for m, channel in enumerate((ghost.red, ghost.green, ghost.blue)):
+            numbers[m, k], counts[m, k] = channel_numbers(channel, ghost.blades), len(channel.discs)
+    return meshes, numbers, counts, curves
+
+
+def posed_numbers(meshes: Sequence[AberrationGhost], numbers: Floats, constellation_deg: float, sigma: float) -> Floats:
+    """Return the numbers, shape (3, G, 45), as the ghosts' curves bend them at a constellation."""
+    out = numbers
+    for k, ghost in enumerate(meshes):
+        if ghost.curves != Curves():
+            out = out.copy() if out is numbers else out
+            pose = pose_at(ghost.curves, constellation_deg, ghost.visible_deg)
+            for m in range(3):
+                out[m, k] = posed(numbers[m, k], sigma, pose)
+    return out

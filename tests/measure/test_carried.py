@@ -1,0 +1,120 @@
+"""What is left beside ghosts goes with them between captures; ghosts come and go between captures too."""
+
+from dataclasses import replace
+from typing import cast
+
+import numpy as np
+import pytest
+from planted_run import LARGEST, SIZE, shape, views
+
+from flarewright.kernels.measure_pupil import SOFT
+from flarewright.measure.carried import carried
+from flarewright.measure.fit import Shape
+from flarewright.measure.found import Found
+from flarewright.measure.packed import pack
+from flarewright.measure.replay import replay
+from flarewright.measure.settle import to_model
+from flarewright.measure.sprite_fit import axis_sprite
+from flarewright.measure.sprites import sprite_at
+from flarewright.model.ghost_model import GhostModel
+
+CAPTURED = np.arange(1.0, LARGEST + 0.1, 1.0)
+BETWEEN = 0.5 * (CAPTURED[:-1] + CAPTURED[1:])
+
+
+def soft(speed: float, size: float, level: float) -> Shape:
+    """Return a ghost with borders wider than a sprite's cells."""
+    one = shape(speed, size, level)
+    one.numbers[SOFT] = 2.5**2
+    return one
+
+
+# one crosses the picture and leaves it, one stays inside
+TRUE = (soft(-150.0, 30.0, 1.0), soft(60.0, 18.0, 0.6))
+
+
+def mistaken(one: Shape) -> Shape:
+    """Return a ghost drawn a little too small and too bright, in a wrong place."""
+    numbers = one.numbers.copy()
+    numbers[:4] *= 1.02
+    numbers[10:14] *= 0.93
+    numbers[20:23] *= 1.05
+    return replace(one, numbers=numbers)
+
+
+def model_of(shapes: tuple[Shape, ...]) -> tuple[GhostModel, list]:
+    """Return a model of some ghosts, and what the captures show beside it."""
+    seen = views(TRUE, angles=CAPTURED, noise=0.001)
+    ghosts = to_model([Found((one, one, one), 0, len(seen) - 1) for one in shapes], seen)
+    axis = float(seen[0].frame[0]), float(seen[0].frame[1])
+    model = GhostModel(
+        size_px=SIZE, axis_px=axis, focal_px=1e4, largest_deg=LARGEST,
+        constellation_deg=(float(CAPTURED[0]), float(CAPTURED[-1])), ghosts=ghosts,
+    )  # fmt: skip
+    left = [view.pixels - replay(model, view.constellation_deg)[0].pixels for view in seen]
+    return model.replace(sprites=(axis_sprite(seen, left),)), seen
+
+
+def missed(model: GhostModel, truth: list) -> float:
+    return sum(float(((replay(model, view.constellation_deg)[0].pixels - view.pixels) ** 2).sum()) for view in truth)
+
+
+def test_what_is_left_of_ghosts_is_foretold_between_captures():
+    model, seen = model_of(tuple(mistaken(one) for one in TRUE))
+    truth = views(TRUE, angles=BETWEEN, noise=0.0)
+    standing = model.replace(sprites=(model.sprites[0].replace(follows="axis"),))
+    interpolated = sum(
+        float(((0.5 * (seen[k].pixels + seen[k + 1].pixels) - view.pixels) ** 2).sum()) for k, view in enumerate(truth)
+    )
+    bare = missed(cast(GhostModel, model.replace(sprites=())), truth)
+    mine = missed(model, truth)
+    assert mine < 0.2 * missed(standing, truth)
+    assert mine < 0.3 * interpolated
+    assert mine < 0.02 * bare
+
+
+def test_at_captures_and_beyond_them_a_sprite_is_its_own_picture():
+    model, _ = model_of(tuple(mistaken(one) for one in TRUE))
+    sprite = model.sprites[0]
+    for k, angle in enumerate(CAPTURED[[0, 7, -1]]):
+        there = carried(sprite, pack(model), model, float(angle))
+        own = sprite.pictures[[0, 7, -1][k]]
+        assert np.abs(there - own).max() < 1e-6 + 1e-5 * np.abs(own).max()
+    assert np.array_equal(carried(sprite, pack(model), model, LARGEST + 1.0), sprite.pictures[-1])
+
+
+def test_no_light_is_made_or_lost_where_a_ghost_only_moves():
+    model, _ = model_of((mistaken(TRUE[1]),))
+    sprite = model.sprites[0]
+    # of the other ghost, which the model does not know, and of this one, far from the border
+    for angle in (5.5, 9.5):
+        there = carried(sprite, pack(model), model, angle).sum(axis=(0, 1))
+        assert there == pytest.approx(sprite_at(sprite, angle).sum(axis=(0, 1)), rel=0.03)
+
+
+def test_what_no_ghost_borders_stays_in_its_place():
+    model, _ = model_of(())
+    sprite = model.sprites[0]
+    assert np.array_equal(carried(sprite, pack(model), model, 6.3), sprite_at(sprite, 6.3))
+    # a ghost far from it changes nothing there
+    far = model_of((mistaken(soft(60.0, 4.0, 0.6)),))[0]
+    own, moved = sprite_at(far.sprites[0], 20.5), carried(far.sprites[0], pack(far), far, 20.5)
+    columns = own.shape[1] // 3
+    assert np.abs(own[:, :columns]).max() > 0.1
+    assert np.abs(own - moved)[:, :columns].max() < 0.01 * np.abs(own).max()
+
+
+def test_a_ghost_comes_and_goes_between_the_captures_that_show_it_and_those_that_do_not():
+    seen = views(TRUE, angles=CAPTURED)
+    one = TRUE[1]
+    whole, some = (to_model([Found((one, one, one), *ends)], seen)[0] for ends in ((0, 23), (5, 11)))
+    assert (whole.visible_deg, whole.fade_deg) == ((1.0, 24.0), (0.0, 0.0))
+    assert (some.visible_deg, some.fade_deg) == ((5.5, 12.5), (1.0, 1.0))
+    model = GhostModel(
+        size_px=SIZE, axis_px=(120.0, 80.0), focal_px=1e4, largest_deg=LARGEST, constellation_deg=(1.0, 24.0),
+        ghosts=(some,),
+    )  # fmt: skip
+    always = model.replace(ghosts=(some.replace(visible_deg=(1.0, 24.0), fade_deg=(0.0, 0.0)),))
+    for angle, part in ((5.0, 0.0), (5.25, 0.25), (5.5, 0.5), (6.0, 1.0), (12.0, 1.0), (12.75, 0.25), (13.0, 0.0)):
+        there, all_of_it = (float(replay(each, angle)[0].pixels.sum()) for each in (model, always))
+        assert there == pytest.approx(part * all_of_it, rel=1e-4, abs=1e-6)
