@@ -16,7 +16,6 @@ from ..model.ghost_model import Star
 from ..model.sprite import Sprite, packed
 from .numbers import Floats
 from .sprite_fit import (
-    ACROSS,
     DIGIT,
     ENOUGH,
     VIEWS,
@@ -30,6 +29,8 @@ from .sprite_fit import (
 )
 from .views import Pixels, View
 
+# cells along a spike as long as the picture is wide
+_CELLS = 90
 # half of a strip's width, part of the picture's; nearer to the light than this strips may overlap, and end
 _HALF, _BEGIN = 0.03, 0.055
 # cells at each side that tell what lies beside the spike
@@ -88,8 +89,8 @@ def _strip(
     """Fit the pictures of one spike, cell by cell; None when no view shows it."""
     cosine, sine = cos(radians(turn_deg)), sin(radians(turn_deg))
     end = max(_reach(view, cosine, sine) for view in views)
-    # square pixels across, cells as long as the coarse pictures' along
-    stretch = max(1, round(views[0].size_px[0] / ACROSS))
+    # square pixels across, long cells along
+    stretch = max(1, round(views[0].size_px[0] / _CELLS))
     rows, columns = 2 * floor(half), ceil((end - begin) / stretch)
     if columns < 2:
         return None

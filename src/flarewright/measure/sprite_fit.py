@@ -18,10 +18,11 @@ from .numbers import Floats
 from .sprites import draw_sprites, samples, sprite_at
 from .views import Pixels, View
 
-# cells across the picture of the coarsest pictures, and cells of the finer ones around the light to each side
-ACROSS, AROUND = 90, 64
-# cells across a large picture of what follows ghosts, and of a small one, where they are so many pixels
-_FINE, _FINE_PX = 240, 3.0
+# cells across the picture of the coarsest pictures that go with the light, and cells of finer ones to each side of it:
+# fine ones far from the light would learn borders of ghosts, which do not go with it
+_COARSE, _AROUND = 22, 24
+# of what follows ghosts: pixels a cell; cells across a large picture, whose cells are larger, and across a small one
+_CELL_PX, _MOST_CELLS, _LEAST_CELLS = 3.0, 240, 90
 # views for each picture that goes with the light, and how many pictures there are at most: there, and about the axis
 VIEWS, _MOST_LIGHT, _MOST_AXIS = 5, 12, 60
 # how stiff cells are over the constellation against one view: second differences and first
@@ -53,15 +54,14 @@ def light_sprites(views: Sequence[View], pixels: Sequence[Pixels]) -> tuple[Spri
         Coarse ones that cover the picture first; their pictures add up.
     """
     width = views[0].size_px[0]
-    finest = max(0, int(np.floor(np.log2(max(width / ACROSS, 1.0)))))
+    finest = max(0, int(np.floor(np.log2(max(width / _COARSE, 1.0)))))
     left = list(pixels)
     found: list[Sprite] = []
     angles = even_knots(views, min(_MOST_LIGHT, len(views) // VIEWS))
     for level in range(finest, -1, -1):
         grain = 2.0**level
-        box = (
-            _whole_box(views) if level == finest else (-AROUND * grain, -AROUND * grain, AROUND * grain, AROUND * grain)
-        )
+        side = _AROUND * grain
+        box = _whole_box(views) if level == finest else (-side, -side, side, side)
         sprite = _fitted(views, left, grain, box, angles, level < finest)
         found.append(sprite)
         left = [each - drawn((sprite,), view) for each, view in zip(left, views, strict=True)]
@@ -81,7 +81,7 @@ def axis_sprite(views: Sequence[View], pixels: Sequence[Pixels]) -> Sprite:
     Sprite
     """
     width, height = views[0].size_px
-    grain = min(max(width / _FINE, _FINE_PX), width / ACROSS)
+    grain = min(max(width / _MOST_CELLS, _CELL_PX), width / _LEAST_CELLS)
     corners = np.array([[x, y] for x in (0.0, width) for y in (0.0, height)])
     places = np.concatenate([_turned(corners - view.frame[:2], view) for view in views])
     low, high = np.floor(places.min(axis=0) / grain), np.ceil(places.max(axis=0) / grain)
