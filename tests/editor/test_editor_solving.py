@@ -97,11 +97,17 @@ def test_lenses_are_told_in_words_and_the_best_comes_first(project, monkeypatch)
     session = solver.session
     puts = []
     session.put = lambda found, label: puts.append(found)
-    solver.accept(0)
+    # the f-number of before is not that of its ghosts, and who chose it is told
+    assert solver.accept(0) == (
+        "“After Heliar-Tronnier 100 mm f/3.5 1” was accepted; it stands at its own f/3.5, no longer at f/8, for at "
+        "that opening its ghosts are as large as was found. What was wished for is taken off the list. Undo brings "
+        "all of it back."
+    )
+    assert puts[0].f_number is None
     assert resolve_coatings(puts[0].lens, puts[0].coating) == tuple(worn)
     # who has taken one may take another; for another lens they are no candidates
     session.project = puts[0]
-    solver.accept(1)
+    assert solver.accept(1).endswith("2” was accepted. Undo brings all of it back.")
     session.project = project.replace(lens="tessar-brendel")
     assert solver.fitting.found == ()
     with pytest.raises(ProjectError, match="another lens"):
@@ -137,7 +143,7 @@ def test_colours_that_are_found_keep_the_shot_as_it_is(project):
     solver._thread.join(60.0)
     assert len(solver.progress.found) == 1
     session.project = session.project.replace(lights=(Light(field_deg=(5.0, 0.0)),))
-    solver.accept(0)
+    assert solver.accept(0).startswith("The coatings were accepted; lens, opening and zoom stay as they were. ")
     (found,) = puts
     assert found.coating.kind == "per-row"
     assert found.design is None

@@ -323,8 +323,8 @@ def _stop(desk: Desk, _request: Request, _body: Any) -> Any:
 
 
 def _accept(desk: Desk, _request: Request, body: Any) -> Any:
-    desk.solver.accept(int(body["number"]))
-    return desk.state()
+    told = desk.solver.accept(int(body["number"]))
+    return desk.state() | {"told": told}
 
 
 def _candidate(desk: Desk, request: Request, _body: Any) -> Any:

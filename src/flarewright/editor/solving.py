@@ -26,7 +26,7 @@ from ..design.target import problem_of
 from ..errors import FlarewrightError, ProjectError
 from ..model import AsLens, CoatingChoice, Design, Everywhere, Lens, PerRow, Project, Surface
 from ..optics.pack import resolve_coatings
-from ..render.prepare import as_lens, first_order
+from ..render.prepare import as_lens, first_order, settle
 from .edit_wishes import clear_wishes, wish_names
 from .session import Session
 from .shown import jpeg, pixels_of
@@ -163,12 +163,14 @@ class Solver:
             # it ends by itself when it is ready, and nobody waits for that
             self._tell(False, "Stopped before the search began", 0.0, self.progress.found)
 
-    def accept(self, number: int) -> None:
-        """Take what was found, in the project as it stands now."""
-        found = self.fitting.found
+    def accept(self, number: int) -> str:
+        """Take what was found, in the project as it stands now; return what changed with it."""
+        found, before = self.fitting.found, self.session.project
         if not 0 <= number < len(found):
             raise ProjectError("what was found is for another lens than the present one; solve anew")
-        self.session.put(found[number].taken(self.session.project), "Accept what was found")
+        after = found[number].taken(before)
+        self.session.put(after, "Accept what was found")
+        return changed(before, after)
 
     def _begin(self, work: Callable[[threading.Event, threading.Event], None]) -> None:
         stop, ready = self._stop, self._ready = threading.Event(), threading.Event()
@@ -270,6 +272,36 @@ def described(lens: Lens) -> str:
     """Say in a few words what a lens is."""
     surfaces = sum(isinstance(row, Surface) for row in lens.rows)
     return f"{surfaces} surfaces, {first_order(lens).efl:.3g} mm f/{lens.f_number:.3g}"
+
+
+def changed(before: Project, after: Project) -> str:
+    """Say what else changed with what was accepted: that it comes with an opening of its own surprises who chose one.
+
+    Parameters
+    ----------
+    before, after : Project
+
+    Returns
+    -------
+    str
+        Several sentences.
+    """
+    gone = " What was wished for is taken off the list." if before.design is not None else ""
+    back = f"{gone} Undo brings all of it back."
+    if after.lens == before.lens:
+        return f"The coatings were accepted; lens, opening and zoom stay as they were.{back}"
+    old, new = settle(before).order, settle(after).order
+    told = [f"“{as_lens(after.lens).name}” was accepted"]
+    if f"{new.f_number:.3g}" != f"{old.f_number:.3g}":
+        told.append(
+            f"it stands at its own f/{new.f_number:.3g}, no longer at f/{old.f_number:.3g}, for at that opening its "
+            "ghosts are as large as was found"
+        )
+    if f"{new.efl:.3g}" != f"{old.efl:.3g}":
+        told.append(f"its focal length is {new.efl:.3g} mm, not {old.efl:.3g} mm")
+    if before.zoom is not None:
+        told.append(f"it has no zoom position {before.zoom!r}")
+    return f"{'; '.join(told)}.{back}"
 
 
 def coloured(problem: ColorProblem, values: Floats) -> str:
