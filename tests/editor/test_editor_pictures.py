@@ -133,6 +133,31 @@ def test_muted_ghosts_are_listed_and_can_be_outlined(project):
     assert alone(muted, "8-6", "draft").max() > 0.0
 
 
+def test_who_points_means_what_is_there(project):
+    """With a ghost alone, a click chose another one that was not to be seen."""
+    session, _ = begin(None)
+    session.put(project, "Open")
+    screen = Screen(session)
+    screen.seen = see(project, "draft")
+    place = screen.seen.ghosts[0].centre
+    names = picked(screen, *place)
+    assert len(names) > 2
+    session.do("set_solo", {"names": [names[-1]]})
+    assert picked(screen, *place) == (names[-1], *names[:-1])
+    session.do("set_solo", {"names": []})
+    session.do("set_ghost", {"name": names[0], "values": {"muted": True}})
+    assert picked(screen, *place) == (*names[1:], names[0])
+    # those of another lens are no ghosts of this one, and neither are those of rows with other numbers
+    listed = {row["name"] for row in ghosts_of(screen)["ghosts"]}
+    assert set(names) <= listed
+    session.do("set_cell", {"row": 0, "column": "radius", "text": "31"})
+    assert {row["name"] for row in ghosts_of(screen)["ghosts"]} == listed
+    for deed, values in (("add_row", {"row": 2}), ("choose_lens", {"lens": "tessar-brendel"})):
+        session.do(deed, values)
+        assert picked(screen, *place) == ()
+        assert ghosts_of(screen) == {"fresh": False, "ghosts": []}
+
+
 def test_drafts_are_as_bright_as_final_pictures(project):
     look = View()
     draft, final = (studio.take(project, grade, look) for grade in ("draft", "final"))

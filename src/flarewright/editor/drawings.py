@@ -120,18 +120,26 @@ def colour_map(project: Project, ghost: str) -> bytes:
 
 
 def places(project: Project) -> list[dict[str, object]]:
-    """Return where matrices put each ghost that design can move: centre (mm along the line to the light), radius."""
+    """Return where matrices put each ghost that design can move.
+
+    Parameters
+    ----------
+    project : Project
+
+    Returns
+    -------
+    list of dict
+        `name`; `per_slope`, its centre along the line to the light, mm by the tangent of the light's angle; `radius`,
+        mm.
+    """
     settled = settle(project)
     structure_of(settled.lens)
-    x, y = (np.tan(np.radians(angle)) for angle in project.lights[0].field_deg)
-    slope = float(np.hypot(x, y))
     found = placed_ghosts(
         settled.lens, f_number=settled.order.f_number, sensor_distance=settled.order.sensor_distance
     )  # fmt: skip
     return [
         {
-            "name": f"{one.first_reflection}-{one.second_reflection}", "place": one.place * slope,
-            "radius": one.radius, "hidden": bool(slope > one.reach),
+            "name": f"{one.first_reflection}-{one.second_reflection}", "per_slope": one.place, "radius": one.radius,
         }
         for one in found
     ]  # fmt: skip

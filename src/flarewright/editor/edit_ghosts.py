@@ -32,6 +32,12 @@ def hand(art: Art, name: str) -> Hand:
     return Hand() if rule is None else Hand(rule.enable is False, rule.gain, rule.tint)
 
 
+def is_shown(art: Art, name: str) -> bool:
+    """Tell whether a ghost is left in the picture: neither muted, nor dark because others are shown alone."""
+    alone = soloed(art)
+    return not hand(art, name).muted and (not alone or name in alone)
+
+
 def set_ghost(project: Project, name: str, values: dict[str, Any]) -> Project:
     """Change a ghost's own rule.
 

@@ -12,12 +12,12 @@ from .edit_ghosts import hand, soloed
 from .edit_lens import prescription, table_of
 from .edit_path import length_s
 from .edit_shot import coating_text, iris_of
-from .edit_wishes import direction, wish_names
+from .edit_wishes import wish_names
 from .history import History, before_mask, design_before_added, design_before_scratch
 from .screen import Screen
 from .shown import FALSE_COLOURS, aces_available
 from .solving import Solver
-from .studio import pictured, view_size
+from .studio import pictured, same_ghosts, view_size
 
 
 def state_of(screen: Screen, solver: Solver) -> dict[str, Any]:
@@ -62,7 +62,6 @@ def state_of(screen: Screen, solver: Solver) -> dict[str, Any]:
         "design": _design(project, history),
         "view": session.view.model_dump(mode="json") | {"stops": round(screen.exposure_stops, 2)},
         "frame": {"size": list(view_size(project)), "sensor": list(project.camera.sensor)},
-        "direction": list(direction(project)),
         "picture": _picture(screen),
         "remarks": list(shown.remarks) if shown is not None else [],
         "solve": solve_of(solver),
@@ -153,9 +152,12 @@ def _structure(design: Design | None) -> dict[str, Any] | None:
 
 
 def ghosts_of(screen: Screen) -> dict[str, Any]:
-    """Return the table of ghosts; `fresh` tells whether it belongs to the project as it stands."""
+    """Return the table of ghosts; `fresh` tells whether it belongs to the project as it stands.
+
+    It is empty while those that were measured last are of another lens: a rule for one of them would be none here.
+    """
     seen, project = screen.seen, screen.session.project
-    if seen is None:
+    if seen is None or not same_ghosts(seen.project, project):
         return {"fresh": False, "ghosts": []}
     brightest = seen.ghosts[0].flux if seen.ghosts else 1.0
     rows = []

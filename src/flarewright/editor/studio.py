@@ -12,6 +12,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import FlarewrightError
 from ..io.library import lens_path
 from ..model import Art, Layer, Lens, Output, Project, Quality, Rule
 from ..render.display import auto_exposure
@@ -304,10 +305,24 @@ def ghost_gain(picture: Picture, match: Match) -> tuple[float, float, float]:
 
 def lens_name(project: Project) -> str:
     """Return the name of a project's lens, which stays while it is edited."""
+    return _prescription(project).name
+
+
+def _prescription(project: Project) -> Lens:
     lens = project.lens
-    if isinstance(lens, str):
-        lens = _loaded(lens, lens_path(lens).stat().st_mtime_ns)
-    return lens.name
+    return _loaded(lens, lens_path(lens).stat().st_mtime_ns) if isinstance(lens, str) else lens
+
+
+def same_ghosts(one: Project, other: Project) -> bool:
+    """Tell whether a ghost of one project is the one of the same name in another: their lenses have the same rows."""
+    if one.lens == other.lens:
+        return True
+    try:
+        ours, theirs = _prescription(one), _prescription(other)
+    except FlarewrightError:
+        # a lens that cannot be read has none
+        return False
+    return ours.name == theirs.name and [row.kind for row in ours.rows] == [row.kind for row in theirs.rows]
 
 
 def pictured(project: Project) -> Project:

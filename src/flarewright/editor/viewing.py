@@ -8,11 +8,12 @@ import numpy as np
 
 from ..model import Project
 from . import studio
+from .edit_ghosts import is_shown
 from .edit_wishes import new_discs, target_project
 from .screen import QUALITY, Screen, pixels_of_picture
 from .seen import alone, is_there, outline, under
 from .shown import jpeg, png
-from .studio import Picture
+from .studio import Picture, same_ghosts
 
 OUTLINE = (240, 176, 84)
 # ghosts under the pointer that are looked at closely before one is believed
@@ -60,6 +61,8 @@ def packed_target(screen: Screen, project: Project, drawn: Picture, quality: int
 def picked(screen: Screen, u: float, v: float) -> tuple[str, ...]:
     """Return the ghosts under a place, brightest first; the first of them are looked at in full size.
 
+    Those that are muted, or dark because others are shown alone, come last: nobody points at what is not there.
+
     Parameters
     ----------
     screen : Screen
@@ -71,9 +74,10 @@ def picked(screen: Screen, u: float, v: float) -> tuple[str, ...]:
     tuple of str
     """
     seen = screen.seen
-    if seen is None:
+    project = screen.session.project
+    if seen is None or not same_ghosts(seen.project, project):
         return ()
-    found = under(seen, u, v)
+    found = sorted(under(seen, u, v), key=lambda name: not is_shown(project.art, name))
     near = [name for name in found[:LOOKED_AT] if is_there(alone(seen.project, name, _grade(screen)), u, v)]
     return (*near, *found[LOOKED_AT:])
 

@@ -5,7 +5,7 @@ export function holdoutGroup(app) {
   let whole = true;
   const light = () => (whole ? null : app.light);
   const here = (state) => (whole ? state.holdout : state.lights[app.light].holdout);
-  const set = (values, held = '') => app.lively('set_holdout', { light: light(), values }, held, `holdout${light()}${Object.keys(values ?? {})}`);
+  const set = (values, held = '') => app.lively('set_holdout', { light: light(), values }, held);
   const name = h('span', { class: 'quietly' });
   const pickers = Object.fromEntries([['image', '.png,.exr,.jpg,.jpeg'], ['depth', '.exr']].map(([use, accept]) => {
     const picker = h('input', { type: 'file', accept, hidden: true, name: `holdout_${use}` });

@@ -29,7 +29,7 @@ export function coatingPanel(app) {
     const plain = numbers.length === { 'quarter-wave': 1, film: 2 }[kind] && numbers.every((each) => Number.isFinite(Number(each)));
     return plain ? { kind, numbers: numbers.map(Number) } : { kind: KINDS.some(([key]) => key === text) ? text : 'text', numbers: [] };
   };
-  const wear = (text, held = '') => app.lively('set_cell', { row: row(), column: 'coating', text }, held, `coat${row()}`, app.table());
+  const wear = (text, held = '') => app.lively('set_cell', { row: row(), column: 'coating', text }, held, app.table());
   const film = () => { const { kind, numbers } = worn(app.state); return kind === 'film' ? numbers : [1.38, 100]; };
   const kinds = choice({ label: 'Kind', name: 'row_kind', tip: 'One film of a quarter of a wavelength is what lenses of the 1950s wear; a free film takes colours that no such film gives (thesis section 5.4).', options: (s) => (worn(s).kind === 'text' ? [...KINDS, ['text', 'layers, as written below', true]] : KINDS), get: (s) => worn(s).kind, set: (kind) => wear(FIRST[kind] ?? kind) });
   const quarter = slider({ label: 'Wavelength', name: 'row_nm', tip: 'Centre wavelength: it reflects this colour least, so what is left is the opposite one.', min: 300, max: HIGH, step: 2, digits: 0, unit: 'nm', get: (s) => worn(s).numbers[0] ?? 550, set: (nm, held) => wear(`quarter-wave:${nm}`, held) });

@@ -19,7 +19,7 @@ export function ghostPanel(app) {
     const ghost = chosen();
     if (!ghost) return null;
     Object.assign(ghost, values);
-    return app.lively('set_ghost', { name: app.ghost, values }, held, `ghost${app.ghost}${Object.keys(values)}`);
+    return app.lively('set_ghost', { name: app.ghost, values }, held);
   };
   const tint = h('input', { type: 'color' });
   const hex = (rgb) => `#${rgb.map((part) => Math.round(255 * Math.min(1, part) ** (1 / 2.2)).toString(16).padStart(2, '0')).join('')}`;

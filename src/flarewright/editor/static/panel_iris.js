@@ -3,9 +3,9 @@ import { drawMask } from './mask_sheet.js';
 import { button, entry, group, h, number, row, slider, tick, toast } from './ui.js';
 
 export function irisPanel(app) {
-  const set = (values, held = '') => app.lively('set_iris', { values }, held, `iris${Object.keys(values)}`);
-  const dirt = (values, held = '') => app.lively('set_dirt', { values }, held, `dirt${Object.keys(values)}`);
-  const star = (values, held = '') => app.lively('set_starburst', { values }, held, `star${Object.keys(values)}`);
+  const set = (values, held = '') => app.lively('set_iris', { values }, held);
+  const dirt = (values, held = '') => app.lively('set_dirt', { values }, held);
+  const star = (values, held = '') => app.lively('set_starburst', { values }, held);
   const mask = h('span', { class: 'quietly below' });
   const picker = h('input', { type: 'file', accept: '.png,.exr', hidden: true });
   picker.addEventListener('change', async () => { if (picker.files[0]) await app.importFile(picker.files[0], 'mask'); picker.value = ''; });

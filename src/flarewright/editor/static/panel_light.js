@@ -19,7 +19,7 @@ const fitted = (key, size) => cropped(pair(key), size).map((mm) => Number(mm.toF
 
 export function lightPanel(app) {
   const one = (state) => state.lights[app.light];
-  const set = (values, held = '') => app.lively('set_light', { light: app.light, values }, held, `light${app.light}${Object.keys(values)}`);
+  const set = (values, held = '') => app.lively('set_light', { light: app.light, values }, held);
   const across = entry({ label: 'Right', tip: 'Field angle: the direct image lies focal length × tan(angle) to the right of the middle.', unit: '°', name: 'light_x', digits: 3, needed: 'needs an angle', get: (s) => one(s).field_deg[0], set: (x) => app.deed('move_light', { light: app.light, x, y: one(app.state).field_deg[1] }).catch(() => {}) });
   const up = entry({ label: 'Up', tip: 'Field angle upwards. A light out of the frame has no direct image, but its ghosts may still come in.', unit: '°', name: 'light_y', digits: 3, needed: 'needs an angle', get: (s) => one(s).field_deg[1], set: (y) => app.deed('move_light', { light: app.light, x: one(app.state).field_deg[0], y }).catch(() => {}) });
   const choose = h('div', { class: 'buttons' });
@@ -43,7 +43,7 @@ export function lightPanel(app) {
     { element: h('div', { class: 'row', tip: 'A picture under the flare, to judge it in its scene; light adds, so it is added before the view. It is no part of any file.' }, h('label', {}, 'Background'), h('div', { class: 'fields' }, button('Choose…', () => picker.click()), button('None', () => view({ plate: null })), plate, picker)), update: (s) => { plate.textContent = s.view.plate ? s.view.plate.split(/[\\/]/).pop() : ''; } },
     slider({ label: 'Its brightness', tip: 'Stops of the background alone.', min: -8, max: 8, step: 0.1, digits: 1, unit: 'stops', get: (s) => s.view.plate_stops, set: (plate_stops) => view({ plate_stops }) }),
   ]);
-  const camera = (values, held = '') => app.lively('set_camera', { values }, held, `camera${Object.keys(values)}`);
+  const camera = (values, held = '') => app.lively('set_camera', { values }, held);
   const shot = group('Camera', [
     slider({ label: 'f-number', tip: 'Closing the iris makes the ghosts that it bounds smaller, each with the same brightness; the starburst grows.', min: 0.7, max: 32, step: 0.1, digits: 1, curve: 2, name: 'f_number', get: (s) => s.lens.f_number ?? s.lens.open, set: (value, held) => app.lively('set_fields', { values: { f_number: value } }, held) }),
     choice({ label: 'Zoom position', tip: 'The positions that the lens file knows: gaps between its groups change.', options: (s) => [['', 'as its rows stand'], ...(s.lens.positions ?? []).map((name) => [name, name])], get: (s) => s.lens.zoom ?? '', set: (zoom) => app.deed('set_fields', { values: { zoom: zoom || null } }).catch(() => {}) }),
@@ -56,8 +56,8 @@ export function lightPanel(app) {
     slider({ label: 'Wavelengths', tip: 'Traced wavelengths: glass bends each differently, so few of them show as steps of colour.', min: 3, max: 31, step: 1, digits: 0, get: (s) => s.quality.wavelengths, set: (wavelengths, held) => app.lively('set_quality', { values: { wavelengths } }, held) }),
     choice({ label: 'Rings in ghosts', tip: 'Diffraction at the iris draws rings into the ghosts; Collins’ integral does it for each ghost by its own matrix.', options: [['off', 'off'], ['collins', 'exact (Collins)'], ['frft', 'Hullin’s estimate']], get: (s) => s.quality.ringing, set: (ringing) => app.deed('set_quality', { values: { ringing } }).catch(() => {}) }),
     choice({ label: 'Reflections', tip: 'Four reflections make fainter ghosts; they are found by chance and drawn by rays.', options: [['2', 'two'], ['4', 'two and four']], get: (s) => String(s.quality.orders), set: (orders) => app.deed('set_quality', { values: { orders: Number(orders) } }).catch(() => {}) }),
-    slider({ label: 'Ghosts ×', tip: 'Artist’s factor on all ghosts; 1 is physics.', min: 0, max: 10, step: 0.01, curve: 2, get: (s) => s.pass_gain.ghosts ?? 1, set: (gain, held) => app.lively('set_pass_gain', { name: 'ghosts', gain }, held, 'gain ghosts') }),
-    slider({ label: 'Starburst ×', tip: 'Artist’s factor on the direct image and its diffraction; 1 is physics.', min: 0, max: 10, step: 0.01, curve: 2, get: (s) => s.pass_gain.starburst ?? 1, set: (gain, held) => app.lively('set_pass_gain', { name: 'starburst', gain }, held, 'gain starburst') }),
+    slider({ label: 'Ghosts ×', tip: 'Artist’s factor on all ghosts; 1 is physics.', min: 0, max: 10, step: 0.01, curve: 2, get: (s) => s.pass_gain.ghosts ?? 1, set: (gain, held) => app.lively('set_pass_gain', { name: 'ghosts', gain }, held) }),
+    slider({ label: 'Starburst ×', tip: 'Artist’s factor on the direct image and its diffraction; 1 is physics.', min: 0, max: 10, step: 0.01, curve: 2, get: (s) => s.pass_gain.starburst ?? 1, set: (gain, held) => app.lively('set_pass_gain', { name: 'starburst', gain }, held) }),
   ]);
   return {
     element: h('div', {}, lights.element, path.element, shot.element, seeing.element, hiding.element, work.element),

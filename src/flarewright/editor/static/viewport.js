@@ -381,7 +381,9 @@ export function viewport(canvas, app) {
       if (self.targetOld) self.refreshTarget();
       redraw();
     }
-    if (app.state.revision !== revision) return;
+    if (app.state.revision === revision) await self.rest();
+  };
+  self.rest = async () => {
     await self.mover.idle();
     await post('/api/rest');
     self.refresh(true);
@@ -396,14 +398,19 @@ export function viewport(canvas, app) {
   }
 
   // ---------------------------------------------------------------------------------------------------- annotating
-  const line = (mm) => app.state.direction.map((part) => part * mm);
+  // ghosts lie on the line to the first light, wherever a hand has it, as far along as the light is from the axis
+  const slopes = () => lightAt(0).map((deg) => Math.tan(deg * Math.PI / 180));
+  const direction = () => { const [x, y] = slopes(); const far = Math.hypot(x, y); return far ? [x / far, y / far] : [1, 0]; };
+  const line = (mm) => direction().map((part) => part * mm);
+  self.placeOf = (one) => one.per_slope * Math.hypot(...slopes());
   self.chosenKey = () => (app.wish !== null && app.wish !== undefined ? `w${app.wish}` : app.ghost);
   function wished() {
     const wishes = app.state.design?.wishes ?? [];
     const out = self.places.map((one) => {
       const wish = wishes.find((each) => each.ghost === one.name);
-      const place = (wish?.place_mm ?? one.place) + (wish?.move_mm ?? 0);
-      return { key: one.name, name: one.name, own: one, place, radius: one.radius * (wish?.height ?? 1), changed: Boolean(wish), removed: wish?.action === 'remove' };
+      const unmoved = self.placeOf(one);
+      const place = (wish?.place_mm ?? unmoved) + (wish?.move_mm ?? 0);
+      return { key: one.name, name: one.name, own: { place: unmoved, radius: one.radius }, place, radius: one.radius * (wish?.height ?? 1), changed: Boolean(wish), removed: wish?.action === 'remove' };
     });
     wishes.forEach((wish, number) => {
       if (!wish.ghost) out.push({ key: `w${number}`, number, place: wish.place_mm + wish.move_mm, radius: wish.radius_mm * wish.height, changed: true });
@@ -425,7 +432,7 @@ export function viewport(canvas, app) {
     }
     return null;
   }
-  const along = (px, py) => { const [x, y] = toMm(px, py); return x * app.state.direction[0] + y * app.state.direction[1]; };
+  const along = (px, py) => { const mm = toMm(px, py); return direction().reduce((sum, part, axis) => sum + part * mm[axis], 0); };
   function pull(px, py) {
     const { kind, one, start } = self.drag;
     if (kind === 'ghost') self.preview = { key: one.key, place: along(px, py) - start, radius: one.radius };
@@ -441,8 +448,11 @@ export function viewport(canvas, app) {
     self.drag = null;
     if (!now) return;
     const round = (value) => Number(value.toFixed(3));
-    if (one.number !== undefined) await app.deed('set_new_wish', { number: one.number, values: { place_mm: round(now.place), move_mm: 0, radius_mm: round(now.radius), height: 1 } }, group);
-    else await app.deed('set_wish', { ghost: one.name, values: { move_mm: round(now.place - one.own.place), height: Number(Math.max(0.01, Math.abs(now.radius / one.own.radius)).toFixed(4)) } }, group);
+    const wish = one.number !== undefined
+      ? ['set_new_wish', { number: one.number, values: { place_mm: round(now.place), move_mm: 0, radius_mm: round(now.radius), height: 1 } }]
+      : ['set_wish', { ghost: one.name, values: { move_mm: round(now.place - one.own.place), height: Number(Math.max(0.01, Math.abs(now.radius / one.own.radius)).toFixed(4)) } }];
+    // one that is refused is told, and stands where it stood
+    await app.deed(...wish, group).catch(() => {});
     self.preview = null;
     redraw();
   }
