@@ -146,3 +146,12 @@ class Tab:
             "r.readAsDataURL(b); })); })()"
         )
         return np.asarray(Image.open(io.BytesIO(base64.b64decode(data))).convert("RGB"))
+
+
+def download(tab, entry, path):
+    """Export as a person would."""
+    tab.page.click("#export")
+    with tab.page.expect_download(timeout=60000) as waiting:
+        tab.page.click(f"[role=menuitem]:has-text('{entry}')")
+    waiting.value.save_as(path)
+    return path

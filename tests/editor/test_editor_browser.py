@@ -18,7 +18,7 @@ from flarewright.render.render import render
 pytest.importorskip("playwright", reason="the extra e2e is not installed")
 pytest.importorskip("starlette", reason="the extra ui is not installed")
 
-from chromium import Editor, Tab, browser, chromium
+from chromium import Tab, chromium, download
 
 pytestmark = [
     pytest.mark.browser,
@@ -26,38 +26,9 @@ pytestmark = [
 ]
 
 
-@pytest.fixture(scope="module")
-def chrome():
-    with browser() as found:
-        yield found
-
-
-@pytest.fixture
-def tab(chrome, tmp_path):
-    editor = Editor(tmp_path / "state")
-    context = chrome.new_context(viewport={"width": 1280, "height": 720}, accept_downloads=True)
-    yield (opened := Tab(context.new_page(), editor))
-    context.close()
-    editor.end()
-    # the browser tells of every answer 400 by itself; the page told it in words
-    assert [said for said in opened.said if "400" not in said] == []
-    # no request leaves the machine
-    assert {url.split("/")[2] for url in opened.asked if not url.startswith(("blob:", "data:"))} <= {
-        editor.address.split("/")[2]
-    }
-
-
 def project_of(tab, tmp_path) -> Project:
     """Take the project from the page as a person would: export it, and read the file."""
     return read_project(download(tab, "Project file", tmp_path / "exported.toml"))
-
-
-def download(tab, entry, path):
-    tab.page.click("#export")
-    with tab.page.expect_download(timeout=60000) as waiting:
-        tab.page.click(f"[role=menuitem]:has-text('{entry}')")
-    waiting.value.save_as(path)
-    return path
 
 
 def judged(tab, project):
@@ -477,7 +448,7 @@ def test_annotate_solve_accept(tab, tmp_path):
     tab.js("flarewright.choose('8-6')")
     tab.rest()
     # pull it by its middle, along the line
-    x, y = tab.js(f"flarewright.view.toPage(...flarewright.view.line({place['place']}))")
+    x, y = tab.js(f"(v => v.toPage(...v.line(v.placeOf({json.dumps(place)}))))(flarewright.view)")
     box = tab.page.locator("#view").bounding_box()
     start = (box["x"] + x, box["y"] + y)
     tab.drag(start, (start[0] + 30, start[1] - 16))
@@ -496,8 +467,18 @@ def test_annotate_solve_accept(tab, tmp_path):
     assert 1 <= count <= 5
     assert tab.page.locator(".candidates img").count() == count
     tab.until("[...document.querySelectorAll('.candidates img')].every(i => i.naturalWidth > 0)")
+    # they stand below what was asked for, and come into sight
+    frame, shown = (tab.page.locator(each).bounding_box() for each in ("#page", ".candidates figure >> nth=0"))
+    assert shown["y"] + shown["height"] <= frame["y"] + frame["height"] + 1
+    assert tab.page.locator("#stop").bounding_box()["y"] >= frame["y"] - 1
+    before, lens = tab.state()["lens"]["facts"]["f_number"], tab.state()["solve"]["found"][0]
     tab.page.click("[data-accept='0']")
     tab.until("flarewright.state.lens.name.startsWith('After')")
+    # whose f-number is its own, and this is told
+    after = tab.state()["lens"]["facts"]["f_number"]
+    assert f" mm f/{after:.3g};" in lens
+    told = tab.page.locator(".toast.good", has_text="was accepted").inner_text()
+    assert f"at its own f/{after:.3g}, no longer at f/{before:.3g}" in told
     tab.rest()
     project = project_of(tab, tmp_path)
     assert project.lens.name == f"After {name} 1"
@@ -518,7 +499,7 @@ def test_a_ghost_beside_the_light_can_be_pulled_too(tab):
     box = tab.page.locator("#view").bounding_box()
 
     def at(one):
-        x, y = tab.js(f"flarewright.view.toPage(...flarewright.view.line({one['place']}))")
+        x, y = tab.js(f"(v => v.toPage(...v.line(v.placeOf({json.dumps(one)}))))(flarewright.view)")
         return box["x"] + x, box["y"] + y
 
     places = [(one, at(one)) for one in tab.js("flarewright.view.places")]

@@ -1,8 +1,9 @@
 // Asking the server, and telling a person what went wrong in its words.
-import { toast } from './ui.js';
+import { hush, toast } from './ui.js';
 
 export async function get(path) {
   const answer = await fetch(path);
+  hush('lost');
   const data = await answer.json();
   if (!answer.ok) throw new Error(data.error || answer.statusText);
   return data;
@@ -23,6 +24,7 @@ async function send(path, body) {
     headers: raw ? {} : { 'Content-Type': 'application/json' },
     body: raw ? body : JSON.stringify(body ?? {}),
   });
+  hush('lost');
   const data = await answer.json();
   if (!answer.ok) throw new Error(data.error || answer.statusText);
   return data;
@@ -36,10 +38,12 @@ export const sentence = (text) => {
 };
 
 export function inWords(error) {
-  const lost = error instanceof TypeError && /fetch/i.test(error.message);
-  return lost ? 'The editor does not answer. Start flarewright edit again; nothing is lost.' : sentence(error.message);
+  return isLost(error) ? LOST : sentence(error.message);
 }
-export const complain = (error, about = '') => toast(inWords(error), 'error', 9000, about);
+const isLost = (error) => error instanceof TypeError && /fetch/i.test(error.message);
+// for as long as it is so, and once
+export const LOST = 'The editor does not answer. Everything up to here is saved; start flarewright edit again.';
+export const complain = (error, about = '') => (isLost(error) ? toast(LOST, 'error', Infinity, 'lost') : toast(inWords(error), 'error', 9000, about));
 
 // Only the newest call counts: while one is under way, the last of the others waits. What is returned waits for all.
 export function latest(work) {
@@ -57,5 +61,31 @@ export function latest(work) {
     next = values;
     running ??= run();
     return running;
+  };
+}
+
+// One after another, in the order in which they were asked for: what is saved or undone right behind a number is saved or
+// undone with it. Of those of one stroke that wait next to each other only the newest is done, for all of them.
+export function inLine() {
+  const waiting = [];
+  let running = false;
+  async function run() {
+    running = true;
+    while (waiting.length) {
+      const { work, done, failed } = waiting.shift();
+      try { done(await work()); } catch (error) { failed(error); }
+    }
+    running = false;
+  }
+  return function add(work, stroke = '') {
+    let one = waiting.at(-1);
+    if (stroke && one?.stroke === stroke) one.work = work;
+    else {
+      one = { work, stroke };
+      one.answer = new Promise((done, failed) => { Object.assign(one, { done, failed }); });
+      waiting.push(one);
+    }
+    if (!running) run();
+    return one.answer;
   };
 }

@@ -1,5 +1,5 @@
 // The page: one state from the server, drawn by panels; every change is a deed that the server does or refuses.
-import { complain, get, inWords, latest, post, sentence, under } from './api.js';
+import { LOST, complain, get, inLine, inWords, latest, post, sentence, under } from './api.js';
 import { fitted } from './section.js';
 import { button, dialog, h, hush, menu, stroke, tips, toast, slider } from './ui.js';
 import { viewport } from './viewport.js';
@@ -38,10 +38,16 @@ function take(state) {
   Object.assign(state.view, asked);
   app.state = state;
   app.light = Math.min(app.light, state.lights.length - 1);
+  // a hand holds nothing any more where another tab took its light away
+  if (app.view.drag?.light >= state.lights.length) { app.view.drag = null; app.view.letGo(); }
   const before = known;
   known = { ghosts: ghostsOf(state), places: placesOf(state), shot: shotOf(state), design: JSON.stringify(state.design), seen: seenOf(state) };
   // another lens has other ghosts, and so has one whose rows have other numbers
-  if (old && before.ghosts !== known.ghosts) { Object.assign(app, { ghost: null, wish: null }); app.hint(); }
+  if (old && before.ghosts !== known.ghosts) {
+    Object.assign(app, { ghost: null, wish: null, ghosts: { fresh: false, ghosts: [] } });
+    plainGhosts = null;
+    app.hint();
+  }
   // nor is there a new ghost any more whose wish was undone
   if (app.wish !== null && state.design?.wishes[app.wish]?.ghost !== null) app.wish = null;
   if (before.places !== known.places) app.view.forget();
@@ -88,27 +94,25 @@ app.refreshPanel = () => {
 };
 const fileName = (state) => (state.file ? state.file.split(/[\\/]/).pop() : state.lens.name);
 
-// In the order in which they were asked for, so that the last word of a hand is the last.
-let line = Promise.resolve();
-app.deed = (name, values, group = '', table = null) => {
+// What changes the project goes one after another, so that the last word of a hand is the last, and what is saved, undone or
+// searched for is what the page shows.
+const line = inLine();
+app.line = line;
+app.deed = async (name, values, group = '', table = null, stroke = '') => {
   const about = `deed ${name}`;
-  line = line.then(() => post('/api/do', { name, values, group, table: typeof table === 'function' ? table() : table })).then((state) => {
-    hush(about);
-    take(state);
-    if (state.became) toast(sentence(state.became), 'info', 9000, about);
-  });
-  const answer = line;
-  line = line.catch(() => {});
-  return answer.catch((error) => { complain(error, about); app.back(); reload(); loadGhosts(); throw error; });
+  try {
+    await line(async () => {
+      const state = await post('/api/do', { name, values, group, table: typeof table === 'function' ? table() : table });
+      hush(about);
+      take(state);
+      if (state.became) toast(sentence(state.became), 'info', 9000, about);
+    }, stroke);
+  } catch (error) { complain(error, about); app.back(); reload(); loadGhosts(); throw error; }
 };
 // the rows that the page shows: a deed on one of them is none on a row of another lens
 app.table = () => app.state.lens.table;
-const slow = new Map();
 // A slider may ask faster than the server answers: only its newest value is sent.
-app.lively = (name, values, group, key = name, table = null) => {
-  if (!slow.has(key)) slow.set(key, latest((...asked) => app.deed(...asked).catch(() => {})));
-  return slow.get(key)(name, values, group, table);
-};
+app.lively = (name, values, group, table = null) => app.deed(name, values, group, table, group).catch(() => {});
 // Keys come faster than answers: the page knows at once what was asked for, and nothing that was asked is dropped.
 let asked = {};
 const sendView = latest(async () => {
@@ -125,11 +129,22 @@ app.setView = (values) => {
 };
 app.ask = async (path, body) => {
   try {
-    const state = await post(path, body);
-    hush(path);
-    take(state);
-    return state;
+    return await line(async () => {
+      const state = await post(path, body);
+      hush(path);
+      take(state);
+      return state;
+    });
   } catch (error) { complain(error, path); return null; }
+};
+// A search is ended at once, whatever waits.
+app.stopSolving = async () => { try { take(await post('/api/stop')); } catch (error) { complain(error); } };
+// What plays is not kept where it stops: that would be a step of the history, and nothing could be done again.
+app.step = async (path) => {
+  const played = app.player.playing;
+  app.player.halt();
+  await app.ask(path);
+  if (played) await app.view.rest();
 };
 
 // ------------------------------------------------------------------------------------------------------------- ghosts
@@ -209,8 +224,8 @@ function facts(state) {
 // ------------------------------------------------------------------------------------------------------------- header
 function header() {
   const file = h('span', { class: 'file' });
-  const undo = button('↶', () => app.ask('/api/undo'), { kind: 'quiet', 'aria-label': 'Undo', id: 'undo' });
-  const redo = button('↷', () => app.ask('/api/redo'), { kind: 'quiet', 'aria-label': 'Redo', id: 'redo' });
+  const undo = button('↶', () => app.step('/api/undo'), { kind: 'quiet', 'aria-label': 'Undo', id: 'undo' });
+  const redo = button('↷', () => app.step('/api/redo'), { kind: 'quiet', 'aria-label': 'Redo', id: 'redo' });
   const look = h('select', { id: 'look', 'aria-label': 'View', tip: 'How linear light becomes a picture for the screen; files stay linear.' },
     h('option', { value: 'srgb' }, 'sRGB'), h('option', { value: 'filmic' }, 'Filmic'), h('option', { value: 'aces' }, 'ACES'), h('option', { value: 'false-colour' }, 'False colour'));
   look.addEventListener('change', () => app.setView({ look: look.value }));
@@ -256,6 +271,8 @@ const exports = [
 async function download(kind) {
   if (kind === 'exr') toast('Rendering the EXR…');
   try {
+    // of what the page shows, not of what has not reached the editor yet
+    await line(() => {});
     const answer = await fetch(`/api/export/${kind}`);
     if (!answer.ok) throw new Error((await answer.json()).error);
     const name = /filename="([^"]+)"/.exec(answer.headers.get('Content-Disposition'))?.[1] ?? `flare.${kind}`;
@@ -268,7 +285,7 @@ async function download(kind) {
 }
 async function copyCommand() {
   try {
-    const { text } = await get('/api/command');
+    const { text } = await line(() => get('/api/command'));
     try {
       await navigator.clipboard.writeText(text);
       toast(`Copied: ${text}`, 'good', 9000);
@@ -293,7 +310,7 @@ function asking(title, words, value, path, done = () => {}) {
     if (busy || !box.value.trim()) return;
     busy = true;
     try {
-      const state = await post(path, { text: box.value.trim() });
+      const state = await line(() => post(path, { text: box.value.trim() }));
       take(state);
       window_.close();
       done(state);
@@ -394,14 +411,17 @@ const KEYS = [
 ];
 function help() { dialog('Keys and hands', h('div', { class: 'keys' }, ...KEYS.flatMap(([key, words]) => [h('kbd', {}, key), h('span', {}, words)]))); }
 let nudging = null;
+// keys come faster than answers: they go on from where they were
+const ahead = { asked: 0, light: null, place: null };
 function nudge(dx, dy, big) {
   const light = app.state.lights[app.light];
   nudging ??= stroke();
   app.player.halt();
-  const [x, y] = light.field_deg;
+  const [x, y] = ahead.asked && ahead.light === app.light ? ahead.place : light.field_deg;
   const by = big ? 1 : 0.1;
   light.field_deg = [x + dx * by, y + dy * by];
-  app.lively('move_light', { light: app.light, x: light.field_deg[0], y: light.field_deg[1] }, nudging);
+  Object.assign(ahead, { asked: ahead.asked + 1, light: app.light, place: light.field_deg });
+  app.lively('move_light', { light: app.light, x: light.field_deg[0], y: light.field_deg[1] }, nudging).finally(() => { ahead.asked -= 1; });
 }
 addEventListener('keyup', (event) => { if (event.key.startsWith('Arrow')) nudging = null; if (event.key === ' ') app.view.space = false; });
 addEventListener('keydown', (event) => {
@@ -411,8 +431,8 @@ addEventListener('keydown', (event) => {
     const key = event.key.toLowerCase();
     if (key === 's') { event.preventDefault(); document.activeElement.blur(); if (event.shiftKey) saveAs(); else save(); }
     if (typing) return;
-    if (key === 'z') { event.preventDefault(); app.ask(event.shiftKey ? '/api/redo' : '/api/undo'); }
-    if (key === 'y') { event.preventDefault(); app.ask('/api/redo'); }
+    if (key === 'z') { event.preventDefault(); app.step(event.shiftKey ? '/api/redo' : '/api/undo'); }
+    if (key === 'y') { event.preventDefault(); app.step('/api/redo'); }
     return;
   }
   if (typing || event.altKey) return;
@@ -459,10 +479,10 @@ addEventListener('drop', async (event) => {
 // ---------------------------------------------------------------------------------------------------------- listening
 function listen() {
   const socket = new WebSocket(`${location.protocol === 'https:' ? 'wss' : 'ws'}://${location.host}/ws`);
-  socket.onopen = () => { if (listen.lost) { toast('The editor is back.', 'good'); listen.lost = false; app.state = null; app.view.shownNumber = -1; } reload(); loadGhosts(); };
+  socket.onopen = () => { hush('lost'); if (listen.lost) { toast('The editor is back.', 'good'); listen.lost = false; app.state = null; app.view.shownNumber = -1; } reload(); loadGhosts(); };
   socket.onmessage = (message) => hear(JSON.parse(message.data));
   socket.onclose = () => {
-    if (!listen.lost) toast('The editor does not answer. Everything up to here is saved; start flarewright edit again.', 'error');
+    if (!listen.lost) toast(LOST, 'error', Infinity, 'lost');
     listen.lost = true;
     setTimeout(listen, 1000);
   };

@@ -122,7 +122,7 @@ export function lensPanel(app) {
     entry({ label: 'Wide open', tip: 'The smallest f-number: sets how far the stop opens.', name: 'open', needed: 'needs a number', get: (s) => s.lens.open, set: (f_number) => app.deed('set_lens_facts', { values: { f_number } }).catch(() => {}) }),
   ]);
   app.deed_quiet = async (name, values, table) => {
-    app.take(await post('/api/do', { name, values, table }));
+    await app.line(async () => app.take(await post('/api/do', { name, values, table })));
   };
   const picker = h('input', { type: 'file', accept: '.lens,.toml,.zmx', hidden: true });
   picker.addEventListener('change', async () => { if (picker.files[0]) await app.importFile(picker.files[0]); picker.value = ''; });

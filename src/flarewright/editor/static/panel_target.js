@@ -16,8 +16,8 @@ export function targetPanel(app) {
   const own = () => app.view.places.find((one) => one.name === app.ghost);
   const mine = () => (app.wish !== null ? wishes()[app.wish] : wishes().find((wish) => wish.ghost === app.ghost));
   const set = (values, held = '') => (app.wish !== null
-    ? app.lively('set_new_wish', { number: app.wish, values }, held, 'wish')
-    : app.ghost && app.lively('set_wish', { ghost: app.ghost, values }, held, 'wish'));
+    ? app.lively('set_new_wish', { number: app.wish, values }, held)
+    : app.ghost && app.lively('set_wish', { ghost: app.ghost, values }, held));
   const compare = h('div', { class: 'buttons', role: 'group', 'aria-label': 'What is shown' });
   const looks = COMPARE.map(([key, words, tip]) => button(words, () => see(key), { 'data-compare': key, tip }));
   compare.append(...looks);
@@ -49,16 +49,26 @@ export function targetPanel(app) {
     if (seconds !== value) toast(`${value} s became ${seconds} s: a search takes whole seconds from 1 to ${MOST_SECONDS}.`, 'info', 9000, 'seconds');
     time.update(app.state);
   } });
-  const solve = button('Solve', () => app.ask('/api/solve', { seconds }), { kind: 'main', id: 'solve', tip: 'Search lenses whose ghosts are where they are wished to be; the best so far are shown below.' });
-  const colors = button('Solve colours', () => app.ask('/api/colors', { kind: 'quarter-wave', seconds }), { tip: 'Quarter-wave coatings for all rows, so that ghosts get the wished colours and the others keep theirs.', id: 'solve-colors' });
-  const films = button('…with free films', () => app.ask('/api/colors', { kind: 'film', seconds }), { tip: 'Films of any index and thickness: more colours, less like real lenses.' });
-  const stop = button('Stop', () => app.ask('/api/stop'), { id: 'stop', tip: 'End the search and keep the best.' });
+  // what is searched is shown below what was asked for: it comes into sight with its first picture
+  let awaited = false;
+  const search = (path, values) => { awaited = true; return app.ask(path, { ...values, seconds }); };
+  const solve = button('Solve', () => search('/api/solve'), { kind: 'main', id: 'solve', tip: 'Search lenses whose ghosts are where they are wished to be; the best so far are shown below.' });
+  const colors = button('Solve colours', () => search('/api/colors', { kind: 'quarter-wave' }), { tip: 'Quarter-wave coatings for all rows, so that ghosts get the wished colours and the others keep theirs.', id: 'solve-colors' });
+  const films = button('…with free films', () => search('/api/colors', { kind: 'film' }), { tip: 'Films of any index and thickness: more colours, less like real lenses.' });
+  const stop = button('Stop', app.stopSolving, { id: 'stop', tip: 'End the search and keep the best.' });
   const clear = button('Take all back', () => app.deed('clear_wishes', {}).catch(() => {}), { kind: 'quiet', tip: 'Forget all wishes; the lens stays.' });
   const add = button('Add a ghost', () => app.deed('add_ghost', { place_mm: 5 - 4 * (wishes().filter((wish) => !wish.ghost).length % 5), radius_mm: 1.5 }).then(() => app.chooseWish(wishes().length - 1)).catch(() => {}), { tip: 'One that the lens has not; drag it along the line.', id: 'wish-add' });
   // why a button cannot be pressed
   const needed = h('p', { class: 'quietly', id: 'solve-needs' });
   const progress = h('p', { class: 'quietly', id: 'solve-words' });
   const found = h('div', { class: 'candidates' });
+
+  async function accept(number) {
+    const state = await app.ask('/api/accept', { number });
+    if (!state) return;
+    see('physical');
+    toast(state.told, 'good', 15000, 'accept');
+  }
 
   const self = {
     element: h('div', {}, h('div', { class: 'group' }, h('h3', {}, 'Target'), compare, drawn, told, list, h('div', { class: 'buttons' }, add, clear)), fields.element, how.element, h('div', { class: 'group' }, time.element, h('div', { class: 'buttons' }, solve, stop, colors, films), needed, progress, found)),
@@ -94,7 +104,8 @@ export function targetPanel(app) {
       if (found.dataset.key !== key) {
         found.dataset.key = key;
         found.replaceChildren(...run.found.map((words, k) => h('figure', {}, h('img', { src: `/api/candidate/${k}?n=${run.number}`, alt: words }), h('figcaption', {}, words,
-          button('Accept', async () => { if (await app.ask('/api/accept', { number: k })) see('physical'); }, { kind: 'main', disabled: run.running, 'data-accept': k })))));
+          button('Accept', () => accept(k), { kind: 'main', disabled: run.running, 'data-accept': k })))));
+        if (awaited && run.found.length && app.tab === 'target') { awaited = false; solve.parentElement.scrollIntoView({ block: 'start' }); }
       }
     },
   };

@@ -9,9 +9,11 @@ export function player(app) {
 
   function frame(now) {
     if (!self.playing) return;
+    // its path is gone
+    if (end() <= 0) { self.halt(); return; }
     let at = from + (now - begun) / 1000;
     if (at > end()) {
-      if (!self.loop || end() <= 0) { self.at = end(); self.stop(); return; }
+      if (!self.loop) { self.at = end(); self.stop(); return; }
       from = at % end();
       begun = now;
       at = from;

@@ -29,8 +29,10 @@ export function toast(text, kind = 'info', lasting = kind === 'error' ? 9000 : 4
   // what is said again stands there once, and no more than can be read
   for (const each of [...shelf.children]) if (each.textContent === box.textContent || (about && each.dataset.about === about)) each.remove();
   shelf.append(box);
-  while (shelf.children.length > 3) shelf.firstChild.remove();
-  setTimeout(() => box.remove(), lasting);
+  // what went wrong stays longest, also where other things went well at the same moment
+  const dated = () => [...shelf.children].find((each) => each !== box && !each.classList.contains('error'));
+  while (shelf.children.length > 3) (dated() ?? shelf.firstChild).remove();
+  if (Number.isFinite(lasting)) setTimeout(() => box.remove(), lasting);
 }
 
 // What was refused before has been done by now.

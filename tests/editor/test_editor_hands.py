@@ -1,0 +1,207 @@
+"""Hands that are faster than the editor, and what must follow them: `pytest -m browser`."""
+
+import json
+
+import pytest
+
+from flarewright.io.project_file import read_project
+
+pytest.importorskip("playwright", reason="the extra e2e is not installed")
+pytest.importorskip("starlette", reason="the extra ui is not installed")
+
+from chromium import chromium, download
+
+pytestmark = [
+    pytest.mark.browser,
+    pytest.mark.skipif(chromium() is None, reason="no Chromium was found; on Debian: apt-get install chromium"),
+]
+
+
+def delay(tab, ms=300):
+    """Let every change of the project arrive late, as on a busy machine."""
+    tab.js(
+        f"(() => {{ const ask = window.fetch; window.fetch = async (path, rest) => {{ if (String(path) === '/api/do') "
+        f"await new Promise(done => {{ setTimeout(done, {ms}); }}); return ask(path, rest); }}; }})()"
+    )
+
+
+def test_what_is_saved_or_exported_is_what_was_typed(tab, tmp_path):
+    """What was typed and saved at once was not in the file in seven of ten tries."""
+    file = tmp_path / "shot.toml"
+    tab.page.keyboard.press("Control+s")
+    tab.page.fill("dialog input", str(file))
+    tab.page.keyboard.press("Enter")
+    tab.until("flarewright.state.clean")
+    delay(tab)
+    tab.page.fill("input[name=intensity]", "3.5")
+    tab.page.keyboard.press("Control+s")
+    tab.until("flarewright.state.lights[0].intensity === 3.5 && flarewright.state.clean")
+    assert read_project(file).lights[0].intensity == 3.5
+    tab.page.fill("input[name=intensity]", "2.5")
+    tab.page.click("#save")
+    tab.until("flarewright.state.lights[0].intensity === 2.5 && flarewright.state.clean")
+    assert read_project(file).lights[0].intensity == 2.5
+    tab.page.fill("input[name=intensity]", "1.5")
+    exported = read_project(download(tab, "Project file", tmp_path / "exported.toml"))
+    assert exported.lights[0].intensity == 1.5
+    # a cell of the prescription too
+    tab.tab("lens")
+    tab.page.fill("[data-row='2'][data-column=thickness]", "4.25")
+    tab.page.keyboard.press("Control+s")
+    tab.until("flarewright.state.lens.rows[2].thickness === '4.25' && flarewright.state.clean")
+    assert read_project(file).lens.rows[2].thickness == 4.25
+
+
+def test_undo_takes_back_what_was_asked_for_last(tab):
+    """Undo overtook the last of the keys, which was then done behind it."""
+    before = tab.state()["lights"][0]["field_deg"]
+    delay(tab)
+    tab.page.locator("#view").focus()
+    for _ in range(20):
+        # held down, for longer than an answer takes
+        tab.page.keyboard.down("ArrowRight")
+        tab.page.wait_for_timeout(30)
+    tab.page.keyboard.up("ArrowRight")
+    tab.page.keyboard.press("Control+z")
+    tab.until("flarewright.state.redo === 'Move the light' && !flarewright.under.way", 20.0)
+    tab.rest()
+    assert tab.state()["lights"][0]["field_deg"] == before
+    assert tab.state()["undo"] == ""
+    tab.page.keyboard.press("Control+Shift+z")
+    tab.until("flarewright.state.undo === 'Move the light'", 20.0)
+    # nor is any of them lost
+    assert tab.state()["lights"][0]["field_deg"][0] == pytest.approx(before[0] + 2.0)
+
+
+def test_undo_while_a_path_plays_can_be_done_again(tab):
+    """It stopped where it was, which was a step of its own: nothing could be done again."""
+    tab.page.click("#path-key")
+    tab.until("flarewright.state.lights[0].keys.length === 1")
+    tab.page.fill("input[name=path_time]", "3")
+    tab.page.press("input[name=path_time]", "Enter")
+    tab.rest()
+    tab.drag(tab.light(), tab.at(0.4, 0.6))
+    tab.rest()
+    tab.page.click("#path-key")
+    tab.until("flarewright.state.lights[0].keys.length === 2")
+    steps, place = tab.state()["steps"], tab.state()["lights"][0]["field_deg"]
+    tab.page.locator("#view").focus()
+    tab.page.keyboard.press("t")
+    tab.until("flarewright.player.playing && flarewright.view.shownGrade === 'moving'")
+    tab.page.keyboard.press("Control+z")
+    tab.until("flarewright.state.lights[0].keys.length === 1")
+    tab.rest()
+    assert not tab.js("flarewright.player.playing")
+    assert tab.state()["steps"] == steps | {"at": steps["at"] - 1}
+    assert tab.state()["lights"][0]["field_deg"] == place
+    tab.page.keyboard.press("Control+Shift+z")
+    tab.until("flarewright.state.lights[0].keys.length === 2")
+    # where there is nothing to be done, the picture of the project comes back all the same
+    tab.page.keyboard.press("t")
+    tab.until("flarewright.player.playing && flarewright.view.shownGrade === 'moving'")
+    tab.page.keyboard.press("Control+Shift+z")
+    tab.until("!flarewright.player.playing")
+    tab.rest()
+    assert tab.js("flarewright.view.shownGrade") == "final"
+    assert tab.state()["steps"] == steps
+
+
+def test_the_circle_of_a_wish_goes_with_the_light(tab):
+    """It stood still while the light was dragged, and the target beside it moved."""
+    tab.tab("target")
+    tab.until("flarewright.view.places.length > 0")
+    tab.js("flarewright.deed('set_wish', {ghost: '8-6', values: {move_mm: 2}})")
+    tab.page.click("[data-compare=side]")
+    tab.rest()
+    where = "(v => v.line(v.placeOf(v.places.find(one => one.name === '8-6')) + 2))(flarewright.view)"
+    x, y = tab.light()
+    tab.page.mouse.move(x, y)
+    tab.page.mouse.down()
+    tab.page.mouse.move(x - 150, y + 90, steps=10)
+    tab.until("flarewright.view.mover.live && flarewright.view.shownGrade === 'final'")
+    during = tab.js(where)
+    tab.page.mouse.up()
+    tab.rest()
+    # where it stands then, as the project has it
+    assert during == pytest.approx(tab.js(where), abs=1e-3)
+    slopes = tab.js("flarewright.state.lights[0].field_deg.map(deg => Math.tan(deg * Math.PI / 180))")
+    assert during[0] * slopes[1] == pytest.approx(during[1] * slopes[0], abs=1e-6)
+
+
+def test_what_went_wrong_is_not_pushed_out_by_what_went_well(tab):
+    said = ["it cannot be read", "one", "two", "three"]
+    for k, words in enumerate(said):
+        tab.js(f"import('/static/ui.js').then(ui => ui.toast({json.dumps(words)}, '{'good' if k else 'error'}'))")
+    assert tab.page.locator(".toast").all_inner_texts() == [said[0], *said[2:]]
+    # but nothing is pushed out by what was said before
+    for words in ("no", "nor this", "this is new"):
+        kind = "info" if words == "this is new" else "error"
+        tab.js(f"import('/static/ui.js').then(ui => ui.toast({json.dumps(words)}, '{kind}'))")
+    assert tab.page.locator(".toast").all_inner_texts() == ["no", "nor this", "this is new"]
+
+
+def test_that_the_editor_is_gone_is_said_until_it_is_back(tab):
+    tab.editor.kill()
+    gone = tab.page.locator(".toast.error", has_text="does not answer")
+    gone.wait_for()
+    tab.page.fill("input[name=intensity]", "3")
+    tab.page.keyboard.press("Enter")
+    # longer than other words stand
+    tab.page.wait_for_timeout(10000)
+    assert gone.count() == 1
+    tab.editor.start()
+    tab.page.locator(".toast.good", has_text="is back").wait_for(timeout=20000)
+    assert gone.count() == 0
+    # the browser tells of it too
+    tab.said[:] = [said for said in tab.said if "ERR_CONNECTION" not in said]
+
+
+def test_ghosts_of_the_lens_before_are_none_of_the_next(tab):
+    """What was chosen in the old table had become a rule for another lens' ghost."""
+    tab.tab("ghosts")
+    assert tab.page.locator("tr[data-ghost]").count() > 5
+    tab.js("flarewright.deed('choose_lens', {lens: 'takumar-50-f1.4'})")
+    tab.until("flarewright.state.lens.name.includes('Takumar')")
+    listed = tab.js("fetch('/api/ghosts').then(a => a.json())")
+    assert listed["fresh"] or listed["ghosts"] == []
+    assert tab.js("flarewright.ghosts.fresh || flarewright.ghosts.ghosts.length === 0")
+    tab.rest()
+    assert tab.page.locator("tr[data-ghost]").count() > 5
+
+
+def test_a_pull_that_is_refused_leaves_the_ghost_where_it_was(tab):
+    """It had stayed where the hand let go, as if it had been wished there."""
+    tab.tab("target")
+    tab.page.click("#wish-add")
+    tab.until("flarewright.wish === 0")
+    where = "(v => v.toPage(...v.line(flarewright.state.design.wishes[0].place_mm)))(flarewright.view)"
+    x, y = tab.js(where)
+    box = tab.page.locator("#view").bounding_box()
+    start = (box["x"] + x, box["y"] + y)
+    refused = {"status": 400, "body": json.dumps({"error": "it was taken away in another tab"})}
+    tab.page.route("**/api/do", lambda route: route.fulfill(**refused))
+    tab.drag(start, (start[0] - 60, start[1] + 33))
+    tab.page.locator(".toast.error", has_text="It was taken away").wait_for()
+    assert tab.js("flarewright.view.preview") is None
+    assert tab.js(where) == [x, y]
+
+
+def test_a_light_that_another_tab_takes_away_is_held_no_more(tab):
+    """Every move of the hand was a mistake of the page."""
+    tab.page.click("#light-add")
+    tab.until("flarewright.state.lights.length === 2 && flarewright.light === 1")
+    tab.rest()
+    x, y = tab.light()
+    x2, y2 = tab.js("flarewright.view.lightPage(1)")
+    box = tab.page.locator("#view").bounding_box()
+    tab.page.mouse.move(box["x"] + x2, box["y"] + y2)
+    tab.page.mouse.down()
+    tab.page.mouse.move(box["x"] + x2 - 60, box["y"] + y2 + 20, steps=5)
+    tab.until("flarewright.view.drag?.kind === 'light' && flarewright.view.shownGrade === 'moving'")
+    tab.js("fetch('/api/undo', {method: 'POST'})")
+    tab.until("flarewright.state.lights.length === 1")
+    tab.page.mouse.move(box["x"] + x2 - 90, box["y"] + y2 + 20, steps=3)
+    tab.page.mouse.up()
+    tab.rest()
+    assert tab.light() == (x, y)
+    assert tab.js("flarewright.view.shownGrade") == "final"
