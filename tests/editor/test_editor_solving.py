@@ -1,15 +1,19 @@
 """What a search says in the editor; the search itself is tried in tests/design and in the browser."""
 
+import io
 import threading
 import time
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from flarewright.design.colors import color_problem, own_colors, perceived_differences
-from flarewright.editor import solving
-from flarewright.editor.solving import Solver
+from flarewright.editor import solving, studio
+from flarewright.editor.shown import pixels_of
+from flarewright.editor.solving import Seeing, Solver
+from flarewright.editor.view import View
 from flarewright.errors import ProjectError
 from flarewright.model import AsLens, Design, Everywhere, GhostWish, Light, Preset, QuarterWave, Surface
 from flarewright.optics.pack import resolve_coatings
@@ -176,6 +180,22 @@ def test_how_near_colours_come_is_told_and_cemented_rows_stay_bare(project):
     assert said[1].startswith("the other ghosts: changed, ghost ")
     assert said[1].endswith(f" is farthest off, by {others.max():.2g}")
     assert said[-1] == "the cemented rows (1, 7) stay bare, for no film can be put there"
+
+
+@pytest.mark.parametrize(("chosen", "look"), [(None, "srgb"), (9.0, "filmic")])
+def test_coatings_are_shown_as_they_will_be_once_they_are_taken(project, chosen, look):
+    """At an exposure of their own they had looked brighter than the picture was with them."""
+    shot = project.replace(design=Design(wishes=(GhostWish(ghost="8-6", color=(1.0, 0.2, 0.1)),)))
+    view = View(exposure_stops=chosen, look=look)
+    solver = Solver(_Session(shot), lambda: Seeing(view, 7.5))
+    solver.start_colors("quarter-wave", 5.0)
+    solver._thread.join(60.0)
+    (found,) = solver.progress.found
+    picture = studio.take(found.taken(shot), "draft", View(), scale=solving.THUMB_SCALE)
+    light = studio.light_of(picture, studio.Match())
+    assert abs(studio.exposure_of(picture) - 7.5) > 0.5
+    shown = np.asarray(Image.open(io.BytesIO(found.picture)), dtype=float)
+    assert np.abs(shown - pixels_of(light, chosen or 7.5, View(look=look))).mean() < 2.0
 
 
 def test_a_search_for_colours_is_stopped_at_once(project):

@@ -12,7 +12,7 @@ from .hand import Hand
 from .screen import Screen
 from .session import Session
 from .snapshot import picture_of, solve_of, state_of
-from .solving import Solver
+from .solving import Seeing, Solver
 
 
 class Desk:
@@ -20,7 +20,8 @@ class Desk:
 
     def __init__(self, session: Session, greeting: str = "") -> None:
         self.session, self.greeting = session, greeting
-        self.screen, self.solver = Screen(session), Solver(session)
+        self.screen = Screen(session)
+        self.solver = Solver(session, lambda: Seeing(session.view, self.screen.exposure_stops))
         self.hand = Hand(self.screen)
         self.screen.idle = self.hand.prepare
         # the page whose hand moved last

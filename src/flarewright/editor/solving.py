@@ -73,6 +73,21 @@ class Found:
 
 
 @dataclass(frozen=True)
+class Seeing:
+    """How the picture is shown, so that what is found is shown as it will be once it is taken.
+
+    Attributes
+    ----------
+    view : View
+    held_stops : float or None
+        The exposure of the present lens, which other coatings of it keep; None: each has its own.
+    """
+
+    view: View = field(default_factory=View)
+    held_stops: float | None = None
+
+
+@dataclass(frozen=True)
 class Progress:
     """How a search stands."""
 
@@ -89,10 +104,12 @@ class Solver:
     Parameters
     ----------
     session : Session
+    seeing : callable
+        Returns how the picture is shown at the moment.
     """
 
-    def __init__(self, session: Session) -> None:
-        self.session = session
+    def __init__(self, session: Session, seeing: Callable[[], Seeing] = Seeing) -> None:
+        self.session, self.seeing = session, seeing
         self.progress = Progress()
         # the lens that the search began with
         self._searched: Lens | str | None = None
@@ -148,7 +165,7 @@ class Solver:
             worn = tuple(row.coating if isinstance(row, Surface) else None for row in new.rows)
             words = coloured(problem, values)
             changes = {"lens": project.lens, "coating": PerRow(coatings=worn)}
-            self._tell(False, "Coatings were found", took, (_found(project, changes, words),))
+            self._tell(False, "Coatings were found", took, (_found(project, changes, words, self.seeing()),))
 
         self._begin(work)
 
@@ -229,7 +246,7 @@ class Solver:
             bare = "" if coating is not None else "; without the coatings, which do not fit it"
             words = named(f"Lens {number}: {described(lens)}; {judged(one, problem)}{bare}", project.design)
             changes = {"lens": lens, "coating": coating or AsLens(), "f_number": None, "zoom": None}
-            out.append(_found(project, changes, words))
+            out.append(_found(project, changes, words, self.seeing()))
         return tuple(out)
 
     def _tell(self, running: bool, words: str, seconds: float, found: tuple[Found, ...]) -> None:
@@ -355,8 +372,13 @@ def _worst(one: Outcome) -> float:
     return float(abs(one.residuals).max())
 
 
-def _found(project: Project, changes: dict[str, Any], words: str) -> Found:
+def _found(project: Project, changes: dict[str, Any], words: str, seeing: Seeing) -> Found:
     """Draw what was found, small."""
     found = Found(changes, words, b"")
-    picture = take(found.taken(project), "draft", View(), scale=THUMB_SCALE)
-    return replace(found, picture=jpeg(pixels_of(light_of(picture, Held()), exposure_of(picture), View()), 85))
+    taken = found.taken(project)
+    picture = take(taken, "draft", View(), scale=THUMB_SCALE)
+    # another lens is shown at an exposure of its own, as it will be
+    stops = seeing.held_stops if taken.lens == project.lens else None
+    chosen = seeing.view.exposure_stops
+    stops = chosen if chosen is not None else exposure_of(picture) if stops is None else stops
+    return replace(found, picture=jpeg(pixels_of(light_of(picture, Held()), stops, seeing.view), 85))
