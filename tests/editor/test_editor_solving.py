@@ -187,15 +187,26 @@ def test_coatings_are_shown_as_they_will_be_once_they_are_taken(project, chosen,
     """At an exposure of their own they had looked brighter than the picture was with them."""
     shot = project.replace(design=Design(wishes=(GhostWish(ghost="8-6", color=(1.0, 0.2, 0.1)),)))
     view = View(exposure_stops=chosen, look=look)
-    solver = Solver(_Session(shot), lambda: Seeing(view, 7.5))
+    told = []
+    session = _Session(shot)
+    session.tell = lambda event: told.append((event["type"], solver.progress.running, len(solver.progress.found)))
+    solver = Solver(session, lambda: Seeing(view, 7.5))
     solver.start_colors("quarter-wave", 5.0)
     solver._thread.join(60.0)
+    # first by matrices, then by traced rays, as the picture will be
+    assert solver._tracing.wait(60.0)
     (found,) = solver.progress.found
-    picture = studio.take(found.taken(shot), "draft", View(), scale=solving.THUMB_SCALE)
-    light = studio.light_of(picture, studio.Match())
+    picture = studio.take(found.taken(shot), "soon", View(), scale=solving.THUMB_SCALE)
     assert abs(studio.exposure_of(picture) - 7.5) > 0.5
     shown = np.asarray(Image.open(io.BytesIO(found.picture)), dtype=float)
-    assert np.abs(shown - pixels_of(light, chosen or 7.5, View(look=look))).mean() < 2.0
+
+    def off(other):
+        pixels = pixels_of(studio.light_of(other, studio.Match()), chosen or 7.5, View(look=look))
+        return np.abs(shown - pixels).mean()
+
+    assert off(picture) < 1.5
+    assert off(studio.take(found.taken(shot), "draft", View(), scale=solving.THUMB_SCALE)) > 2.0 * off(picture)
+    assert told[-2:] == [("solve", False, 1)] * 2
 
 
 def test_a_search_for_colours_is_stopped_at_once(project):

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..design.candidate import Outcome, outcomes
-from ..design.color_search import solve_colors
+from ..design.color_search import ColorStep, solve_colors
 from ..design.colors import ColorProblem, Floats, coated, color_problem, colors_of, perceived_differences
 from ..design.hunt import until
 from ..design.impossible import obstacles
@@ -28,10 +28,11 @@ from ..model import AsLens, CoatingChoice, Design, Everywhere, Lens, PerRow, Pro
 from ..optics.pack import resolve_coatings
 from ..render.prepare import as_lens, first_order, settle
 from .edit_wishes import clear_wishes, wish_names
+from .jobs import Check, Lane
 from .session import Session
 from .shown import jpeg, pixels_of
+from .studio import Grade, exposure_of, light_of, take
 from .studio import Match as Held
-from .studio import exposure_of, light_of, take
 from .view import View
 
 CANDIDATES = 5
@@ -117,6 +118,8 @@ class Solver:
         # set once a search can be ended at any time: compiling, at the first one of a machine, cannot
         self._ready = threading.Event()
         self._thread: threading.Thread | None = None
+        self._telling = threading.Lock()
+        self._tracing = Lane("found")
 
     @property
     def fitting(self) -> Progress:
@@ -153,10 +156,11 @@ class Solver:
         def work(stop: threading.Event, ready: threading.Event) -> None:
             ready.set()
             begun = time.perf_counter()
-            found = solve_colors(
-                problem, time_limit=seconds, cancelled=stop.is_set,
-                note=lambda step: self._tell(True, "Searching coatings", step.seconds, ()),
-            )  # fmt: skip
+
+            def note(step: ColorStep) -> None:
+                self._tell(True, "Searching coatings", step.seconds, ())
+
+            found = solve_colors(problem, time_limit=seconds, cancelled=stop.is_set, note=note)
             took = time.perf_counter() - begun
             # nobody sees, or evaporates, a hundredth of a nanometre
             values = np.round(found.values, 2) if films == "quarter-wave" else found.values
@@ -165,7 +169,7 @@ class Solver:
             worn = tuple(row.coating if isinstance(row, Surface) else None for row in new.rows)
             words = coloured(problem, values)
             changes = {"lens": project.lens, "coating": PerRow(coatings=worn)}
-            self._tell(False, "Coatings were found", took, (_found(project, changes, words, self.seeing()),))
+            self._end(project, "Coatings were found", took, (_found(project, changes, words, self.seeing()),))
 
         self._begin(work)
 
@@ -192,6 +196,7 @@ class Solver:
     def _begin(self, work: Callable[[threading.Event, threading.Event], None]) -> None:
         stop, ready = self._stop, self._ready = threading.Event(), threading.Event()
         self._searched = self.session.project.lens
+        self._tracing.cancel()
         self._tell(True, GETTING_READY, 0.0, ())
 
         def run() -> None:
@@ -231,7 +236,7 @@ class Solver:
         if proven:
             why = " ".join(f"{one.target}: {one.reason}" for one in proven)
             told = f"No lens can do that: {named(why, project.design)} ({told})"
-        self._tell(False, told, state.seconds, found)
+        self._end(project, told, state.seconds, found)
 
     def _found(
         self, project: Project, problem: Problem, state: State, count: int, name: str,
@@ -249,8 +254,25 @@ class Solver:
             out.append(_found(project, changes, words, self.seeing()))
         return tuple(out)
 
-    def _tell(self, running: bool, words: str, seconds: float, found: tuple[Found, ...]) -> None:
-        self.progress = Progress(running, words, seconds, found, self.progress.number + 1)
+    def _tell(self, running: bool, words: str, seconds: float, found: tuple[Found, ...]) -> Progress:
+        with self._telling:
+            told = self.progress = Progress(running, words, seconds, found, self.progress.number + 1)
+        self.session.tell({"type": "solve"})
+        return told
+
+    def _end(self, project: Project, words: str, seconds: float, found: tuple[Found, ...]) -> None:
+        """Tell what was found, and draw it anew by traced rays: matrices may flatter a lens that is wide open."""
+        told = self._tell(False, words, seconds, found)
+        if found:
+            self._tracing.submit(partial(self._trace, project, told))
+
+    def _trace(self, project: Project, told: Progress, check: Check) -> None:
+        seeing = self.seeing()
+        traced = tuple(_drawn(one, project, seeing, "soon", check) for one in told.found)
+        with self._telling:
+            if self.progress is not told:
+                return
+            self.progress = replace(told, found=traced, number=told.number + 1)
         self.session.tell({"type": "solve"})
 
 
@@ -373,10 +395,19 @@ def _worst(one: Outcome) -> float:
 
 
 def _found(project: Project, changes: dict[str, Any], words: str, seeing: Seeing) -> Found:
-    """Draw what was found, small."""
-    found = Found(changes, words, b"")
+    """Draw what was found, small and fast."""
+    return _drawn(Found(changes, words, b""), project, seeing, "draft", lambda: None)
+
+
+def _drawn(found: Found, project: Project, seeing: Seeing, grade: Grade, check: Check) -> Found:
+    """Draw what was found, as it will be shown once it is taken; as it was where it cannot be drawn so."""
     taken = found.taken(project)
-    picture = take(taken, "draft", View(), scale=THUMB_SCALE)
+    try:
+        picture = take(taken, grade, View(), scale=THUMB_SCALE, progress=lambda *_: check())
+    except FlarewrightError:
+        if found.picture:
+            return found
+        raise
     # another lens is shown at an exposure of its own, as it will be
     stops = seeing.held_stops if taken.lens == project.lens else None
     chosen = seeing.view.exposure_stops

@@ -49,9 +49,18 @@ export function targetPanel(app) {
     if (seconds !== value) toast(`${value} s became ${seconds} s: a search takes whole seconds from 1 to ${MOST_SECONDS}.`, 'info', 9000, 'seconds');
     time.update(app.state);
   } });
-  // what is searched is shown below what was asked for: it comes into sight with its first picture
+  // what is searched is shown below what was asked for: it comes into sight with its first picture and with its last,
+  // unless a hand has scrolled meanwhile
   let awaited = false;
-  const search = (path, values) => { awaited = true; return app.ask(path, { ...values, seconds }); };
+  let left = null;
+  const search = (path, values) => { awaited = true; left = null; return app.ask(path, { ...values, seconds }); };
+  function intoSight(run) {
+    const page = document.getElementById('page');
+    if (!awaited || !run.found.length || app.tab !== 'target') return;
+    if (left === null || left === page.scrollTop) solve.parentElement.scrollIntoView({ block: 'start' });
+    left = page.scrollTop;
+    awaited = run.running;
+  }
   const solve = button('Solve', () => search('/api/solve'), { kind: 'main', id: 'solve', tip: 'Search lenses whose ghosts are where they are wished to be; the best so far are shown below.' });
   const colors = button('Solve colours', () => search('/api/colors', { kind: 'quarter-wave' }), { tip: 'Quarter-wave coatings for all rows, so that ghosts get the wished colours and the others keep theirs.', id: 'solve-colors' });
   const films = button('…with free films', () => search('/api/colors', { kind: 'film' }), { tip: 'Films of any index and thickness: more colours, less like real lenses.' });
@@ -99,13 +108,16 @@ export function targetPanel(app) {
       needed.textContent = wished ? (coloured ? '' : 'Solve colours needs a ghost that was given a colour.') : 'Nothing is wished for yet: choose a ghost and say what it shall be, or add one; then solve.';
       stop.disabled = !run.running;
       progress.textContent = run.words ? `${run.words}${run.seconds ? ` · ${run.seconds.toFixed(0)} s` : ''}` : '';
-      // with another lens what was found goes
-      const key = `${run.number} ${run.found.length}`;
+      // with another lens what was found goes; what is only drawn anew leaves the keyboard where it was
+      const key = JSON.stringify([run.running, run.found]);
+      const pictures = `${run.number} ${run.found.length}`;
+      if (found.dataset.key === key && found.dataset.pictures !== pictures) found.querySelectorAll('img').forEach((image, k) => { image.src = `/api/candidate/${k}?n=${run.number}`; });
+      found.dataset.pictures = pictures;
       if (found.dataset.key !== key) {
         found.dataset.key = key;
         found.replaceChildren(...run.found.map((words, k) => h('figure', {}, h('img', { src: `/api/candidate/${k}?n=${run.number}`, alt: words }), h('figcaption', {}, words,
           button('Accept', () => accept(k), { kind: 'main', disabled: run.running, 'data-accept': k })))));
-        if (awaited && run.found.length && app.tab === 'target') { awaited = false; solve.parentElement.scrollIntoView({ block: 'start' }); }
+        intoSight(run);
       }
     },
   };
