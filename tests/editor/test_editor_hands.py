@@ -205,3 +205,36 @@ def test_a_light_that_another_tab_takes_away_is_held_no_more(tab):
     tab.rest()
     assert tab.light() == (x, y)
     assert tab.js("flarewright.view.shownGrade") == "final"
+
+
+def test_zoom_pan_and_wipe_are_reached_by_keys(tab):
+    """They were there for a mouse alone."""
+    view = tab.page.locator("#view")
+    view.focus()
+    fitted = tab.js("flarewright.view.frame()")
+    box = view.bounding_box()
+    tab.page.keyboard.press("PageUp")
+    larger = tab.js("flarewright.view.frame()")
+    assert larger["w"] == pytest.approx(1.25 * fitted["w"])
+    # about the middle of the view
+    assert larger["x"] + larger["w"] / 2 == pytest.approx(box["width"] / 2)
+    place = tab.state()["lights"][0]["field_deg"]
+    for key, axis, by in (("ArrowRight", "x", -40), ("ArrowLeft", "x", 0), ("ArrowUp", "y", 40), ("ArrowDown", "y", 0)):
+        tab.page.keyboard.press(f"Control+{key}")
+        assert tab.js("flarewright.view.frame()")[axis] == pytest.approx(larger[axis] + by)
+    tab.page.keyboard.press("PageDown")
+    assert tab.js("flarewright.view.frame()")["w"] == pytest.approx(fitted["w"])
+    tab.tab("target")
+    tab.page.click("[data-compare=wipe]")
+    view.focus()
+    tab.page.keyboard.press("]")
+    assert tab.js("flarewright.view.wipe") == pytest.approx(0.55)
+    for _ in range(30):
+        tab.page.keyboard.press("[")
+    assert tab.js("flarewright.view.wipe") == 0.0
+    # where pages and lists are scrolled with them, these keys are theirs
+    tab.tab("ghosts")
+    tab.page.focus("tr[data-ghost] >> nth=0")
+    tab.page.keyboard.press("PageUp")
+    assert tab.js("flarewright.view.frame()")["w"] == pytest.approx(fitted["w"])
+    assert tab.state()["lights"][0]["field_deg"] == place

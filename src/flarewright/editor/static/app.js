@@ -401,12 +401,12 @@ function tabs() {
 // ---------------------------------------------------------------------------------------------------------- shortcuts
 const KEYS = [
   ['Drag', 'move the light, also out of the frame'], ['Click', 'choose the ghost under the pointer'],
-  ['Scroll on it', 'walk through the ghosts there'], ['Scroll', 'zoom'], ['Alt + drag', 'pan, also the middle button'],
+  ['Scroll on it', 'walk through the ghosts there'], ['Scroll', 'zoom, also PgUp and PgDn'], ['Alt + drag', 'pan, also the middle button and Ctrl + arrows'],
   ['Arrows', 'move the light by 0.1°, Shift 1°'], ['F', 'fit the frame'], ['Z', 'zoom to 1:1'], ['A', 'exposure found anew'], ['+  −', 'exposure by half a stop'],
   ['V', 'next view'], ['G', 'grey: every ghost reflects alike'], ['E', 'no entrance clipping'], ['H', 'safe frame'],
   ['S', 'solo the chosen ghost'], ['M', 'mute the chosen ghost'], ['N  P', 'next, previous ghost of the list'],
   ['T', 'play the light’s path, stop'], ['K', 'key the light at this time'], [', .', 'previous, next key'],
-  ['X', 'show or hide the cross-section'], ['1 – 7', 'panels'], ['W', 'physical, target, wipe, side by side'], ['Ctrl+Z', 'undo'],
+  ['X', 'show or hide the cross-section'], ['1 – 7', 'panels'], ['W', 'physical, target, wipe, side by side'], ['[  ]', 'move the wipe'], ['Ctrl+Z', 'undo'],
   ['Ctrl+Shift+Z', 'redo'], ['Ctrl+S', 'save'], ['Ctrl+Shift+S', 'save under another name'], ['O', 'open'], ['Esc', 'let go of the ghost'], ['?', 'this sheet'],
 ];
 function help() { dialog('Keys and hands', h('div', { class: 'keys' }, ...KEYS.flatMap(([key, words]) => [h('kbd', {}, key), h('span', {}, words)]))); }
@@ -423,9 +423,12 @@ function nudge(dx, dy, big) {
   Object.assign(ahead, { asked: ahead.asked + 1, light: app.light, place: light.field_deg });
   app.lively('move_light', { light: app.light, x: light.field_deg[0], y: light.field_deg[1] }, nudging).finally(() => { ahead.asked -= 1; });
 }
+const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
+const PAN_PX = 40;
 addEventListener('keyup', (event) => { if (event.key.startsWith('Arrow')) nudging = null; if (event.key === ' ') app.view.space = false; });
 addEventListener('keydown', (event) => {
   if (!app.state || document.querySelector('dialog[open]')) return;
+  const onPage = event.target === $('view') || event.target === document.body;
   const typing = event.target.matches('input:not([type=range]):not([type=checkbox]), select, textarea');
   if (event.ctrlKey || event.metaKey) {
     const key = event.key.toLowerCase();
@@ -433,13 +436,15 @@ addEventListener('keydown', (event) => {
     if (typing) return;
     if (key === 'z') { event.preventDefault(); app.step(event.shiftKey ? '/api/redo' : '/api/undo'); }
     if (key === 'y') { event.preventDefault(); app.step('/api/redo'); }
+    if (ARROWS[event.key] && onPage) { event.preventDefault(); const [x, y] = ARROWS[event.key]; app.view.pan(-PAN_PX * x, PAN_PX * y); }
     return;
   }
   if (typing || event.altKey) return;
-  const onPage = event.target === $('view') || event.target === document.body;
   const { view } = app.state;
-  const steps = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] }[event.key];
+  const steps = ARROWS[event.key];
   if (steps && onPage) { event.preventDefault(); nudge(...steps, event.shiftKey); return; }
+  const zoom = { PageUp: 1.25, PageDown: 0.8 }[event.key];
+  if (zoom && onPage) { event.preventDefault(); app.view.zoomBy(zoom); return; }
   if (event.key === ' ' && onPage) { event.preventDefault(); app.view.space = true; return; }
   const looks = ['srgb', 'filmic', ...(app.state.aces ? ['aces'] : []), 'false-colour'];
   const work = {
@@ -449,7 +454,7 @@ addEventListener('keydown', (event) => {
     e: () => app.setView({ unclipped: !view.unclipped }), h: () => app.setView({ safe_frame: !view.safe_frame }),
     s: () => panels.ghosts.solo(), m: () => panels.ghosts.mute(), n: () => panels.ghosts.step(1), p: () => panels.ghosts.step(-1),
     t: () => app.player.toggle(), k: () => app.player.key(), ',': () => app.player.step(-1), '.': () => app.player.step(1),
-    x: () => fold.click(), w: () => { app.open('target'); panels.target.next(); }, o: openFile, '?': help, Escape: () => app.choose(null),
+    '[': () => app.view.moveWipe(-0.05), ']': () => app.view.moveWipe(0.05), x: () => fold.click(), w: () => { app.open('target'); panels.target.next(); }, o: openFile, '?': help, Escape: () => app.choose(null),
   }[event.key.length === 1 ? event.key.toLowerCase() : event.key];
   if (work) { event.preventDefault(); work(); return; }
   const tab = Object.keys(NAMES)[Number(event.key) - 1];

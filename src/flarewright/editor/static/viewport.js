@@ -545,15 +545,19 @@ export function viewport(canvas, app) {
     const step = event.deltaY > 0 ? 1 : -1;
     if (near(self.asked?.spot)) { self.asked.steps += step; return; }
     if (near(self.spot) && self.stack.length > 1) { self.walk(step); return; }
+    self.zoomBy(Math.exp(-event.deltaY * 0.0015), px, py);
+  }, { passive: false });
+  // about a place that stays where it is
+  self.zoomBy = (times, px = half() / 2, py = box().h / 2) => {
     const before = frame();
     const u = (px - before.x) / before.w;
     const v = (py - before.y) / before.h;
-    self.zoom = Math.max(0.15, Math.min(24, self.zoom * Math.exp(-event.deltaY * 0.0015)));
+    self.zoom = Math.max(0.15, Math.min(24, self.zoom * times));
     const after = frame();
-    self.panX += px - (after.x + u * after.w);
-    self.panY += py - (after.y + v * after.h);
-    redraw();
-  }, { passive: false });
+    self.pan(px - (after.x + u * after.w), py - (after.y + v * after.h));
+  };
+  self.pan = (dx, dy) => { self.panX += dx; self.panY += dy; redraw(); };
+  self.moveWipe = (by) => { if (self.compare === 'wipe') { self.wipe = Math.max(0, Math.min(1, self.wipe + by)); redraw(); } };
   function cursor(px, py) {
     const { near, taken } = app.state ? under(px, py) : {};
     canvas.style.cursor = near ? 'grab' : taken ? (taken.kind === 'rim' ? 'nwse-resize' : 'move') : 'crosshair';
