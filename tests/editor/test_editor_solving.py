@@ -192,6 +192,8 @@ def test_coatings_are_shown_as_they_will_be_once_they_are_taken(project, chosen,
     session.tell = lambda event: told.append((event["type"], solver.progress.running, len(solver.progress.found)))
     solver = Solver(session, lambda: Seeing(view, 7.5))
     solver.start_colors("quarter-wave", 5.0)
+    # what is moved meanwhile is moved in their pictures too
+    shot = session.project = shot.replace(lights=(Light(field_deg=(-4.0, 2.0)),))
     solver._thread.join(60.0)
     # first by matrices, then by traced rays, as the picture will be
     assert solver._tracing.wait(60.0)

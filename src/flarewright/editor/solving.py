@@ -169,7 +169,8 @@ class Solver:
             worn = tuple(row.coating if isinstance(row, Surface) else None for row in new.rows)
             words = coloured(problem, values)
             changes = {"lens": project.lens, "coating": PerRow(coatings=worn)}
-            self._end(project, "Coatings were found", took, (_found(project, changes, words, self.seeing()),))
+            drawn = _found(self._shot(project), changes, words, self.seeing())
+            self._end(project, "Coatings were found", took, (drawn,))
 
         self._begin(work)
 
@@ -251,7 +252,7 @@ class Solver:
             bare = "" if coating is not None else "; without the coatings, which do not fit it"
             words = named(f"Lens {number}: {described(lens)}; {judged(one, problem)}{bare}", project.design)
             changes = {"lens": lens, "coating": coating or AsLens(), "f_number": None, "zoom": None}
-            out.append(_found(project, changes, words, self.seeing()))
+            out.append(_found(self._shot(project), changes, words, self.seeing()))
         return tuple(out)
 
     def _tell(self, running: bool, words: str, seconds: float, found: tuple[Found, ...]) -> Progress:
@@ -266,9 +267,14 @@ class Solver:
         if found:
             self._tracing.submit(partial(self._trace, project, told))
 
+    def _shot(self, project: Project) -> Project:
+        """Return the project as it stands, for the light may have been moved; as it was, where it has another lens."""
+        now = self.session.project
+        return now if now.lens == project.lens else project
+
     def _trace(self, project: Project, told: Progress, check: Check) -> None:
-        seeing = self.seeing()
-        traced = tuple(_drawn(one, project, seeing, "soon", check) for one in told.found)
+        shot, seeing = self._shot(project), self.seeing()
+        traced = tuple(_drawn(one, shot, seeing, "soon", check) for one in told.found)
         with self._telling:
             if self.progress is not told:
                 return
