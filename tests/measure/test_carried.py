@@ -77,9 +77,12 @@ def test_at_captures_and_beyond_them_a_sprite_is_its_own_picture():
     model, _ = model_of(tuple(mistaken(one) for one in TRUE))
     sprite = model.sprites[0]
     for k, angle in enumerate(CAPTURED[[0, 7, -1]]):
-        there = carried(sprite, pack(model), model, float(angle))
         own = sprite.pictures[[0, 7, -1][k]]
-        assert np.abs(there - own).max() < 1e-6 + 1e-5 * np.abs(own).max()
+        assert np.array_equal(carried(sprite, pack(model), model, float(angle)), own)
+        # and nothing leaps next to them
+        for beside in (angle - 1e-7, angle + 1e-7):
+            there = carried(sprite, pack(model), model, float(beside))
+            assert np.abs(there - own).max() < 1e-4 * np.abs(own).max()
     assert np.array_equal(carried(sprite, pack(model), model, LARGEST + 1.0), sprite.pictures[-1])
 
 

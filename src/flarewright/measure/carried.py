@@ -60,9 +60,10 @@ def carried(sprite: Sprite, packed: Packed, model: GhostModel, constellation_deg
     is, from the picture before and from the one after; where one of them did not show it, the other tells alone.
     """
     angles = np.array(sprite.constellation_deg)
-    k = int(np.clip(np.searchsorted(angles, constellation_deg) - 1, 0, max(angles.size - 2, 0)))
-    if angles.size == 1 or not angles[0] < constellation_deg < angles[-1] or not packed[0]:
+    between = angles[0] < constellation_deg < angles[-1] and constellation_deg not in angles
+    if not between or not packed[0]:
         return sprite_at(sprite, constellation_deg)
+    k = int(np.searchsorted(angles, constellation_deg)) - 1
     part = float((constellation_deg - angles[k]) / (angles[k + 1] - angles[k]))
     now = _boxes(packed, model, constellation_deg)
     out = np.zeros(sprite.pictures.shape[1:])
