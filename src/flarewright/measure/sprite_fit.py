@@ -23,6 +23,8 @@ from .views import Pixels, View
 _COARSE, _AROUND = 22, 24
 # of what follows ghosts: pixels a cell; cells across a large picture, whose cells are larger, and across a small one
 _CELL_PX, _MOST_CELLS, _LEAST_CELLS = 3.0, 240, 90
+# cells that reading between cells looks beyond the last one that was seen; they are as that one
+_NEXT = 3
 # views for each picture that goes with the light, and how many pictures there are at most: there, and about the axis
 VIEWS, _MOST_LIGHT, _MOST_AXIS = 5, 12, 60
 # how stiff cells are over the constellation against one view: second differences and first
@@ -100,7 +102,7 @@ def axis_sprite(views: Sequence[View], pixels: Sequence[Pixels]) -> Sprite:
         pictures.append(np.where(known, light / np.maximum(total, 1e-9), np.nan))
         noises.append(np.where(known, noise / np.maximum(total, 1e-9) ** 2, 0.0))
     unit, cells = packed(
-        beside(_filled(sure(np.stack(pictures), np.stack(noises)))), DIGIT * darkest_noise(views) / grain
+        beside(_filled(beside(sure(np.stack(pictures), np.stack(noises)), _NEXT))), DIGIT * darkest_noise(views) / grain
     )
     return Sprite(
         follows="ghosts", grain_px=grain, corner_px=(float(low[0] * grain), float(low[1] * grain)),
@@ -295,18 +297,23 @@ def points(picture: Pixels, x: Floats, y: Floats) -> tuple[Floats, Floats]:
     return values.astype(float), (clear & inside[..., None]).astype(float)
 
 
-def beside(pictures: Floats | Pixels) -> Pixels:
-    """Fill cells that are not known from known ones beside them, farther and farther; with 0 where there are none."""
+def beside(pictures: Floats | Pixels, far: int | None = None) -> Pixels:
+    """Fill cells that are not known from known ones beside them, farther and farther; with 0 where there are none.
+
+    With `far` only so many cells out; the rest stays not a number.
+    """
     out = np.asarray(pictures, dtype=np.float32)
-    while True:
+    while far is None or far > 0:
         gaps = np.isnan(out)
         if not gaps.any() or gaps.all(axis=(1, 2)).any():
-            return np.nan_to_num(out)
+            return np.nan_to_num(out) if far is None else out
+        far = None if far is None else far - 1
         padded = np.pad(out, ((0, 0), (1, 1), (1, 1), (0, 0)), constant_values=np.nan)
         around = np.stack([padded[:, :-2, 1:-1], padded[:, 2:, 1:-1], padded[:, 1:-1, :-2], padded[:, 1:-1, 2:]])
         count = np.isfinite(around).sum(axis=0)
         mean = np.nansum(around, axis=0) / np.maximum(count, 1)
         out = np.where(gaps & (count > 0), mean, out)
+    return out
 
 
 def _filled(pictures: Floats) -> NDArray[np.float32]:
