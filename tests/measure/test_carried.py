@@ -17,6 +17,7 @@ from flarewright.measure.settle import to_model
 from flarewright.measure.sprite_fit import axis_sprite
 from flarewright.measure.sprites import sprite_at
 from flarewright.model.ghost_model import GhostModel
+from flarewright.model.sprite import Sprite, packed
 
 CAPTURED = np.arange(1.0, LARGEST + 0.1, 1.0)
 BETWEEN = 0.5 * (CAPTURED[:-1] + CAPTURED[1:])
@@ -105,6 +106,18 @@ def test_what_no_ghost_borders_stays_in_its_place():
     columns = own.shape[1] // 3
     assert np.abs(own[:, :columns]).max() > 0.1
     assert np.abs(own - moved)[:, :columns].max() < 0.01 * np.abs(own).max()
+
+
+@pytest.mark.parametrize(("rows", "columns"), [(1, 1), (1, 30), (20, 1)])
+def test_a_sprite_of_one_row_is_drawn_as_it_stands(rows, columns):
+    model, _ = model_of((mistaken(TRUE[1]),))
+    unit, cells = packed(np.ones((2, rows, columns, 3), np.float32), 1e-3)
+    thin = Sprite(
+        follows="ghosts", grain_px=4.0, corner_px=(-60.0, -40.0), constellation_deg=(3.0, 5.0), rows=rows,
+        columns=columns, unit=unit, cells=cells,
+    )  # fmt: skip
+    drawn = replay(cast(GhostModel, model.replace(sprites=(thin,))), 4.0)
+    assert drawn[-1].name == "residual" and drawn[-1].pixels.max() == pytest.approx(1.0, rel=0.05)
 
 
 def test_a_ghost_comes_and_goes_between_the_captures_that_show_it_and_those_that_do_not():

@@ -61,7 +61,8 @@ def carried(sprite: Sprite, packed: Packed, model: GhostModel, constellation_deg
     """
     angles = np.array(sprite.constellation_deg)
     between = angles[0] < constellation_deg < angles[-1] and constellation_deg not in angles
-    if not between or not packed[0]:
+    # of a single row or column nothing tells how steep a ghost is
+    if not between or not packed[0] or min(sprite.rows, sprite.columns) < 2:
         return sprite_at(sprite, constellation_deg)
     k = int(np.searchsorted(angles, constellation_deg)) - 1
     part = float((constellation_deg - angles[k]) / (angles[k + 1] - angles[k]))
