@@ -117,7 +117,8 @@ def test_a_sprite_of_one_row_is_drawn_as_it_stands(rows, columns):
         columns=columns, unit=unit, cells=cells,
     )  # fmt: skip
     drawn = replay(cast(GhostModel, model.replace(sprites=(thin,))), 4.0)
-    assert drawn[-1].name == "residual" and drawn[-1].pixels.max() == pytest.approx(1.0, rel=0.05)
+    assert drawn[-1].name == "residual"
+    assert drawn[-1].pixels.max() == pytest.approx(1.0, rel=0.05)
 
 
 def test_a_ghost_comes_and_goes_between_the_captures_that_show_it_and_those_that_do_not():

@@ -316,7 +316,7 @@ def beside(pictures: Floats | Pixels, far: int | None = None) -> Pixels:
     return out
 
 
-def _filled(pictures: Floats) -> NDArray[np.float32]:
+def _filled(pictures: Floats | Pixels) -> NDArray[np.float32]:
     """Fill what one constellation did not measure from the nearest ones that did."""
     count = len(pictures)
     out = pictures.copy()
