@@ -103,15 +103,20 @@ def _alike(one: _Box, other: _Box) -> bool:
     return all(1.0 / _GROWN < size < _GROWN for size in sizes)
 
 
-def _boxes(packed: Packed, model: GhostModel, constellation_deg: float) -> dict[int, _Box]:
-    """Return where ghosts are, also where they are out of the picture; those that are shut have no box."""
+def _greens(packed: Packed, model: GhostModel, constellation_deg: float) -> tuple[Floats, NDArray[np.int64], float]:
+    """Return the ghosts' numbers in green at a constellation, how many discs cut each, and the field."""
     meshes, numbers, counts, _ = packed
     sigma = abs(field(constellation_deg, model.largest_deg))
-    green = posed_numbers(meshes, numbers, constellation_deg, sigma)[1]
+    return posed_numbers(meshes, numbers, constellation_deg, sigma)[1], counts[1], sigma
+
+
+def _boxes(packed: Packed, model: GhostModel, constellation_deg: float) -> dict[int, _Box]:
+    """Return where ghosts are, also where they are out of the picture; those that are shut have no box."""
+    green, counts, sigma = _greens(packed, model, constellation_deg)
     frame = np.array([_FAR, _FAR, 1.0, 0.0, 1.0])
     found = {}
-    for g in range(len(meshes)):
-        left, top, width, height = window_of(green[g], counts[1, g], sigma, frame, 2 * _FAR, 2 * _FAR)
+    for g in range(len(green)):
+        left, top, width, height = window_of(green[g], counts[g], sigma, frame, 2 * _FAR, 2 * _FAR)
         if 0 < width < _FAR and 0 < height < _FAR:
             found[g] = _Box(left + 0.5 * width - _FAR, top + 0.5 * height - _FAR, 0.5 * width, 0.5 * height)
     return found
@@ -119,17 +124,15 @@ def _boxes(packed: Packed, model: GhostModel, constellation_deg: float) -> dict[
 
 def _edges(sprite: Sprite, packed: Packed, model: GhostModel, constellation_deg: float) -> dict[int, Floats]:
     """Return how steep each ghost's green is around each cell of a sprite, radiance a cell; flat ones left out."""
-    meshes, numbers, counts, _ = packed
-    sigma = abs(field(constellation_deg, model.largest_deg))
-    green = posed_numbers(meshes, numbers, constellation_deg, sigma)[1]
-    there = visible(meshes, constellation_deg)
+    green, counts, sigma = _greens(packed, model, constellation_deg)
+    there = visible(packed[0], constellation_deg)
     grain = sprite.grain_px
     frame = np.array([-sprite.corner_px[0] / grain, -sprite.corner_px[1] / grain, 1.0, 0.0, 1.0 / grain])
     found = {}
     for g in np.flatnonzero(there):
         one = slice(g, g + 1)
         plane = np.zeros((sprite.rows, sprite.columns + 1))
-        draw_ghosts(green[one], counts[1, one], there[one], sigma, frame, plane)
+        draw_ghosts(green[one], counts[one], there[one], sigma, frame, plane)
         light = np.maximum(plane.cumsum(axis=1)[:, :-1], 0.0)
         edge = _most_around(np.hypot(*np.gradient(light)))
         if edge.max() > sprite.unit:

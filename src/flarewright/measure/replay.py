@@ -91,7 +91,8 @@ def replay(
         )
     size = size_px or model.size_px
     about: dict[str, str | float] = {"constellation_deg": constellation_deg, "roll_deg": roll_deg}
-    pixels = draw(model, constellation_deg, roll_deg, size) * gain
+    packed = pack(model)
+    pixels = draw_packed(packed, model, constellation_deg, roll_deg, size) * gain
     layers = [Layer("ghosts", pixels.astype(np.float32), (0, 0, *size), about)]
     scale, top = _fit(model, size)
     at = light_px(model, constellation_deg, roll_deg)
@@ -108,7 +109,6 @@ def replay(
         turn = np.radians(roll_deg)
         toward = float(side * np.cos(turn)), float(side * np.sin(turn))
         place = at[0] * scale, at[1] * scale + top
-        packed = pack(model)
         pictures = [
             carried(one, packed, model, constellation_deg)
             if one.follows == "ghosts"
