@@ -20,6 +20,9 @@ SLIVER_LEVEL = 3
 # rays this little beyond a rim leave a coarsest cell in doubt, for two rims may leave a narrower horn between them;
 # and, beside rays that end, cells that are halved as often as those
 CLOSE, CLOSE_TO_TORN = 1.05, 1.25
+# where so many of a cell's nine rays land, beyond so many times the picture's radius, the others would, which end; of
+# cells that are halved so often
+TELLING, FAR_OUT, FAR_LEVEL = 3, 2.0, 2
 
 
 @borrowing
@@ -38,15 +41,20 @@ def _judge(
     if level >= max_level:
         return LEAF
     x_low, x_high, y_low, y_high = np.inf, -np.inf, np.inf, -np.inf
+    alive = 0
     for k in nodes:
-        if data[k, ALIVE] == 0.0:
-            return SPLIT
-        x_low, x_high = min(x_low, data[k, X]), max(x_high, data[k, X])
-        y_low, y_high = min(y_low, data[k, Y]), max(y_high, data[k, Y])
+        if data[k, ALIVE] > 0.0:
+            alive += 1
+            x_low, x_high = min(x_low, data[k, X]), max(x_high, data[k, X])
+            y_low, y_high = min(y_low, data[k, Y]), max(y_high, data[k, Y])
     # what falls outside the picture is not seen, however rough
-    out_x = max(x_low, 0.0)
-    out_y = max(max(y_low, -y_high), 0.0)
-    if out_x * out_x + out_y * out_y > view_radius * view_radius:
+    out_x, out_y = max(max(x_low, -x_high), 0.0), max(max(y_low, -y_high), 0.0)
+    out2 = out_x * out_x + out_y * out_y
+    if alive < nodes.size:
+        # nor is what lies between rays that land far outside it and rays that end, and where those lie is not known
+        far = FAR_OUT * view_radius
+        return EMPTY if alive >= TELLING and level >= FAR_LEVEL and out2 > far * far else SPLIT
+    if out2 > view_radius * view_radius:
         return FLAT
     extent = max(x_high - x_low, y_high - y_low) * scale
     error = 0.0
