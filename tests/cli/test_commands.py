@@ -348,6 +348,12 @@ def test_ghosts_table_is_for_people(capsys):
     assert len([line for line in out.splitlines() if line.startswith("│")]) == 3
 
 
+def test_ghosts_table_has_no_negative_zero(capsys):
+    out = call(capsys, "ghosts", "heliar-tronnier", "--light", "10,0").out
+    assert "17.50, 0.00" in out
+    assert "-0.00" not in out
+
+
 def test_lenses_lists_all_that_ship(capsys):
     listed = call_json(capsys, "lenses")["lenses"]
     assert [row["name"] for row in listed] == list(shipped())
@@ -370,6 +376,8 @@ def test_lens_show_json_has_every_row(capsys):
     keys |= {"semi_diameter_estimated", "coating", "radius_x_mm", "shape"}
     assert all(set(row) == keys for row in data["rows"])
     assert data["rows"][0]["glass"] == "LAKN7"
+    # 1 / (1 / 30.81) is 30.810000000000002
+    assert [row["radius_mm"] for row in data["rows"][:2]] == [30.81, -89.35]
     text = call(capsys, "lens", "show", "heliar-tronnier").out
     for words in ("LAKN7", "stop", "flat", "99.236", "thesis"):
         assert words in text

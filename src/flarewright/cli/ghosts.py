@@ -240,7 +240,8 @@ def _cells(row: GhostRow, direct: GhostRow) -> tuple[str, ...]:
     return (
         f"{row.throughput_mm2:.4g}",
         f"{row.throughput_mm2 / direct.throughput_mm2:.2e}" if compared else "-" if ghost else "1",
-        f"{row.centroid_mm[0]:.2f}, {row.centroid_mm[1]:.2f}",
+        # z: a centroid on the axis has a sign of its own, and nobody wants to read -0.00
+        f"{row.centroid_mm[0]:z.2f}, {row.centroid_mm[1]:z.2f}",
         f"{row.rms_radius_mm:.3g}",
         f"{row.peak_irradiance:.3g}" if compared else "-",
         row.bounded_by if ghost else "-",

@@ -79,6 +79,13 @@ def _mirrors(text: str) -> tuple[int | None, int]:
     return None if match[1].lower() == "sensor" else int(match[1]), int(match[2])
 
 
+def _radius_mm(curvature: float) -> float | None:
+    """Return a radius as the lens file has it; None for a plane."""
+    from ..io.lens_writer import shortest_radius
+
+    return (shortest_radius(curvature) or 1.0 / curvature) if curvature else None
+
+
 def as_data(lens: Lens, order: FirstOrder) -> dict[str, Any]:
     """Return a lens as the JSON that `--json` prints."""
     from ..io.coating_text import format_coating
@@ -98,10 +105,10 @@ def as_data(lens: Lens, order: FirstOrder) -> dict[str, Any]:
             {
                 "row": k,
                 "stop": False,
-                "radius_mm": 1.0 / row.curvature if row.curvature else None,
+                "radius_mm": _radius_mm(row.curvature),
                 "curvature": row.curvature,
                 "conic": row.conic,
-                "radius_x_mm": 1.0 / row.meridian_x[0] if row.toroidal and row.meridian_x[0] else None,
+                "radius_x_mm": _radius_mm(row.meridian_x[0]) if row.toroidal else None,
                 "shape": _shape(row),
                 "thickness": row.thickness,
                 "n_d": medium.n_d if medium else None,

@@ -92,16 +92,31 @@ def _row(row: Row) -> str:
     return ", ".join(parts)
 
 
+def shortest_radius(curvature: float) -> float | None:
+    """Return the radius of fewest digits that gives exactly a curvature again, as a person would have written it.
+
+    Parameters
+    ----------
+    curvature : float
+        1/mm.
+
+    Returns
+    -------
+    float or None
+        mm; None for a plane, and where no radius below 1e9 mm gives it.
+    """
+    if curvature == 0.0 or abs(curvature) <= 1e-9:
+        return None
+    texts = (f"{1.0 / curvature:.{digits}g}" for digits in range(1, 18))
+    return next((float(text) for text in texts if 1.0 / float(text) == curvature), None)
+
+
 def _radius(curvature: float, axis: str = "") -> str:
     """Write the shortest radius that gives exactly this curvature again, or the curvature itself where none does."""
     if curvature == 0.0:
         return f'radius{axis} = "flat"'
-    radius = 1.0 / curvature
-    for digits in range(1, 18):
-        text = f"{radius:.{digits}g}"
-        if abs(radius) < 1e9 and 1.0 / float(text) == curvature:
-            return f"radius{axis} = {_number(float(text))}"
-    return f"curvature{axis} = {_number(curvature)}"
+    radius = shortest_radius(curvature)
+    return f"curvature{axis} = {_number(curvature)}" if radius is None else f"radius{axis} = {_number(radius)}"
 
 
 def _coating(coating: Coating | None) -> str:
