@@ -372,6 +372,34 @@ def _axial_blur(lens: Lens, order: FirstOrder, rays: int = 64) -> float:
     return sqrt(float((weight * (at_sensor[:, 1] + shift * slope) ** 2).sum()))
 
 
+def axial_opening(lens: Lens, order: FirstOrder) -> tuple[float, int]:
+    """Tell how far a lens opens for the beam on the axis.
+
+    Parameters
+    ----------
+    lens : Lens
+    order : FirstOrder
+
+    Returns
+    -------
+    float
+        The part of the entrance pupil's radius, as the f-number has it, that comes through; in steps of 1/50.
+    int
+        The row at which the most of it ends: beyond the rim, or beside the surface. 0 where all comes through.
+    """
+    y = np.linspace(0.02, 1.0, 50) * order.entrance_pupil_diameter / 2.0
+    hits = trace_polylines(lens, None, np.zeros_like(y), y, 0.0, sensor_distance=order.bfl)
+    opening, where, through = 1.0, 0, np.ones(len(y), dtype=np.bool_)
+    for k, row in enumerate(lens.rows):
+        if isinstance(row, Surface):
+            rim = np.inf if row.semi_diameter is None else row.semi_diameter * (1.0 + 1e-9)
+            through &= np.abs(hits[:, 1 + k, 1]) <= rim
+            free = 1.0 if through.all() else float(y[: int(np.argmin(through))].max(initial=0.0) / y[-1])
+            if free < opening:
+                opening, where = free, k
+    return opening, where
+
+
 def _tell_rims(raw: RawLens, rows: list[RawRow], lens: Lens, order: FirstOrder, remarks: list[str]) -> None:
     """Tell when a rim cuts the axial beam, so that the lens is slower than stated."""
     y = np.linspace(0.02, 1.0, 50) * order.entrance_pupil_diameter / 2.0

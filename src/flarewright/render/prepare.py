@@ -24,7 +24,7 @@ from ..optics.pack import SensorMirror, resolve_coatings
 from ..optics.paraxial import FirstOrder
 from ..optics.paraxial import first_order as _first_order
 from ..optics.plates import with_cover_glass, with_filter
-from ..optics.repair import Apertures, repair
+from ..optics.repair import RIM_CUT, Apertures, axial_opening, repair
 from ..optics.semi_diameters import complete
 from ..optics.sequence import lens_of_sequence
 from ..optics.zoom import at_position, positioned
@@ -92,10 +92,10 @@ def _completed(reading: LensReading | RawLens | RawSequence, apertures: Aperture
         reading = lens_of_sequence(reading)
     lens, found = reading
     told = list(found)
-    return complete_lens(lens, remarks=told, focal_length_told=table), tuple(told)
+    return complete_lens(lens, remarks=told, repaired=table), tuple(told)
 
 
-def complete_lens(lens: Lens, *, remarks: list[str] | None = None, focal_length_told: bool = False) -> Lens:
+def complete_lens(lens: Lens, *, remarks: list[str] | None = None, repaired: bool = False) -> Lens:
     """Fill in what a prescription leaves out and check that it makes an image.
 
     Parameters
@@ -103,8 +103,9 @@ def complete_lens(lens: Lens, *, remarks: list[str] | None = None, focal_length_
     lens : Lens
     remarks : list of str, optional
         Estimates are told here.
-    focal_length_told : bool
-        Whether it has been told already how far off the stated focal length is, as the repair of a `.lens` table does.
+    repaired : bool
+        Whether it has been told already how far off the stated focal length is and what rims cut, as the repair of a
+        `.lens` table does.
 
     Returns
     -------
@@ -129,8 +130,10 @@ def complete_lens(lens: Lens, *, remarks: list[str] | None = None, focal_length_
             )
             remarks.append(f"semi-diameters of {which} estimated from f/{lens.f_number:g} and the field of view")
         stated = lens.stated_focal_length
-        if stated is not None and not focal_length_told and abs(order.efl / stated - 1.0) > 0.02:
+        if stated is not None and not repaired and abs(order.efl / stated - 1.0) > 0.02:
             remarks.append(f"the focal length is {order.efl:.2f} mm, the file says {stated:g} mm")
+        if not repaired:
+            _tell_opening(full, order, remarks)
         for position in full.positions:
             if position.focal_length is None or position.focus_distance is not None:
                 # a patent's focal lengths are those at infinity
@@ -140,6 +143,16 @@ def complete_lens(lens: Lens, *, remarks: list[str] | None = None, focal_length_
                 told = f"the focal length is {efl:.2f} mm, the file says {position.focal_length:g} mm"
                 remarks.append(f"position {position.name!r}: {told}")
     return full
+
+
+def _tell_opening(lens: Lens, order: FirstOrder, remarks: list[str]) -> None:
+    """Tell when a lens is slower than its f-number says."""
+    opening, row = axial_opening(lens, order)
+    # it comes in steps as large as this
+    if opening > 1.0 - RIM_CUT - 1e-9:
+        return
+    passes = f"f/{lens.f_number / opening:.2f}" if opening > 0.0 else "nothing"
+    remarks.append(f"row {row} cuts the beam on the axis: the lens passes {passes}, not f/{lens.f_number:g}")
 
 
 def _complete_everywhere(lens: Lens) -> Lens:

@@ -1,0 +1,55 @@
+"""A lens that does not open as far as its f-number says is told."""
+
+import numpy as np
+import pytest
+
+from flarewright.model import Surface
+from flarewright.optics.paraxial import first_order
+from flarewright.optics.repair import axial_opening
+from flarewright.optics.trace import trace_polylines
+from flarewright.render.prepare import complete_lens, load_lens
+
+
+def narrowed(row, part):
+    """The Heliar with one rim at a part of the marginal ray's height there, and that height as traced."""
+    lens = load_lens("heliar-tronnier")
+    order = first_order(lens)
+    y = np.array([0.5 * part * order.entrance_pupil_diameter])
+    height = abs(float(trace_polylines(lens, None, 0.0 * y, y, 0.0, sensor_distance=order.bfl)[0, 1 + row, 1]))
+    rows = list(lens.rows)
+    rows[row] = rows[row].replace(semi_diameter=height * (1.0 + 1e-6))
+    return lens.replace(rows=tuple(rows))
+
+
+def test_a_lens_that_opens_as_it_says_is_not_told():
+    remarks = []
+    lens = load_lens("heliar-tronnier", remarks=remarks)
+    assert axial_opening(lens, first_order(lens)) == (1.0, 0)
+    assert not any("cuts the beam" in remark for remark in remarks)
+
+
+@pytest.mark.parametrize(("row", "part"), [(0, 0.5), (3, 0.8), (8, 0.7)])
+def test_the_rim_that_cuts_tells_how_far_the_lens_opens(row, part):
+    lens = narrowed(row, part)
+    assert axial_opening(lens, first_order(lens)) == (pytest.approx(part), row)
+    remarks = []
+    complete_lens(lens, remarks=remarks)
+    assert f"row {row} cuts the beam on the axis: the lens passes f/{3.5 / part:.2f}, not f/3.5" in remarks
+
+
+def test_rays_beside_a_surface_are_cut_too():
+    """f/0.35 asks for a beam of twice the sphere's own width: no rim is needed to lose it."""
+    lens = load_lens("heliar-tronnier").replace(f_number=0.5)
+    bare = lens.replace(
+        rows=tuple(row.replace(semi_diameter=None) if isinstance(row, Surface) else row for row in lens.rows)
+    )
+    opening, _ = axial_opening(bare, first_order(bare))
+    assert opening < 0.4
+
+
+def test_a_lens_that_passes_nothing_is_told():
+    remarks = []
+    lens = load_lens("heliar-tronnier")
+    front = lens.rows[0].replace(semi_diameter=0.01)
+    complete_lens(lens.replace(rows=(front, *lens.rows[1:])), remarks=remarks)
+    assert "row 0 cuts the beam on the axis: the lens passes nothing, not f/3.5" in remarks
