@@ -46,6 +46,20 @@ def test_layers_windows_and_metadata_come_back(tmp_path, layers):
     assert np.count_nonzero(back.layers[1].pixels) == layers[1].pixels.size
 
 
+def test_layers_are_not_held_twice_to_be_written(monkeypatch, tmp_path, layers):
+    """351 layers of floats fill a memory once; planes by channel would be as many bytes again."""
+    parts, make = [], OpenEXR.Part
+
+    def part(header, channels, name):
+        # the library puts objects of its own into what it is given
+        parts.append(dict(channels))
+        return make(header, channels, name)
+
+    monkeypatch.setattr(OpenEXR, "Part", part)
+    write_exr(tmp_path / "a.exr", layers, SIZE, pixel_type="float", metadata={})
+    assert all(np.shares_memory(parts[k][layers[k].name], layers[k].pixels) for k in (2, 3))
+
+
 def test_first_part_has_the_plain_channels_that_every_program_opens(tmp_path, layers):
     path = tmp_path / "a.exr"
     write_exr(path, layers, SIZE, pixel_type="half", metadata={}, colorspace="acescg", pixel_aspect=2.0)

@@ -5,9 +5,10 @@ layer is a part of its own, named after the layer, with channels `layer.R`, `lay
 programs list it under its name whether they go by parts or by channel names. A file with one layer is an ordinary
 single-part file. Pixels are linear and scene-referred; `chromaticities` states the primaries.
 
-The parts of single ghosts cover their own data window only, so that a lens with 171 ghosts makes a file of tens of
-megabytes in a second. Nuke, Fusion, Natron and OpenImageIO place such a part where it belongs; Blender (up to 5 at
-least) puts it into the picture's corner, for which `full_windows=True` writes every layer at the size of the picture.
+The parts of single ghosts cover their own data window only, which keeps files of small ghosts small. Wide open, where
+most ghosts fill the picture, 351 of them make gigabytes all the same; `--brightest` and `--half` are for that. Nuke,
+Fusion, Natron and OpenImageIO place such a part where it belongs; Blender (up to 5 at least) puts it into the picture's
+corner, for which `full_windows=True` writes every layer at the size of the picture.
 """
 
 from __future__ import annotations
@@ -123,7 +124,7 @@ def write_exr(
         pixels, window = _over_picture(layer, size_px) if whole else (layer.pixels, layer.window)
         # a variance is an irradiance squared, far too small for half floats
         kind: Literal["half", "float"] = "float" if layer.name.endswith(".variance") else pixel_type
-        channels, lost = _channels(pixels, "" if k == 0 else f"{layer.name}.", kind)
+        channels, lost = _channels(pixels, "RGB" if k == 0 else layer.name, kind)
         clipped += lost
         header = _header(layer, window, size_px, pixel_aspect, colorspace)
         if k == 0:
@@ -314,18 +315,17 @@ def _over_picture(layer: Layer, size_px: tuple[int, int]) -> tuple[NDArray[np.fl
 
 
 def _channels(
-    pixels: NDArray[np.float32], prefix: str, pixel_type: Literal["half", "float"]
+    pixels: NDArray[np.float32], name: str, pixel_type: Literal["half", "float"]
 ) -> tuple[dict[str, NDArray[Any]], int]:
-    """Return the planes by channel name, and how many values half floats could not hold."""
-    lost = 0
-    channels: dict[str, NDArray[Any]] = {}
-    for c, name in enumerate(_CHANNELS):
-        plane = np.ascontiguousarray(pixels[..., c])
-        if pixel_type == "half":
-            lost += int(np.count_nonzero(np.abs(plane) > HALF_MAX))
-            plane = np.clip(plane, -HALF_MAX, HALF_MAX).astype(np.float16)
-        channels[f"{prefix}{name}"] = plane
-    return channels, lost
+    """Return the pixels by name, and how many values half floats could not hold.
+
+    The library takes the three channels from one array, "RGB" as R, G, B and any other name as NAME.R, NAME.G, NAME.B:
+    planes of their own would hold all layers in memory twice.
+    """
+    if pixel_type == "float":
+        return {name: np.ascontiguousarray(pixels)}, 0
+    lost = int(np.count_nonzero(np.abs(pixels) > HALF_MAX))
+    return {name: np.clip(pixels, -HALF_MAX, HALF_MAX).astype(np.float16)}, lost
 
 
 def _header(
