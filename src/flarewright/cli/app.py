@@ -187,7 +187,8 @@ def _call(words: list[str]) -> int:
     except (KeyboardInterrupt, typer.Abort):
         code = 130
     except MemoryError:
-        return _fail("there is not enough memory for this picture; choose a smaller --size or fewer layers")
+        remedy = "choose a smaller --size or fewer layers (--brightest 20)"
+        return _fail(f"there is not enough memory for this picture; {remedy}")
     except BrokenPipeError:
         raise
     except OSError as error:

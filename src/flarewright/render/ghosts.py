@@ -33,6 +33,7 @@ from .ghosts_draft import (
 )
 from .ghosts_final import SCREEN, STEP_CONTRAST, FinalPass, contrast, detail_of, draw_alone, draw_final
 from .looking import kindred, looking
+from .room import need, spare_bytes
 from .shot import Shot
 from .sources import halvings, motion, spread_border
 
@@ -491,7 +492,8 @@ def _collect(
     chunks = _chunks(shot, (len(items) - alone) * ghosts_each, most)
     rest = [items[alone + c :: chunks] for c in range(chunks)]
     totals: list[Plane | None] = [None] * DETAILS
-    layers = []
+    layers: list[Layer] = []
+    spare, held = spare_bytes() if alone else 0.0, 0.0
     for k, planes in enumerate(pool.map(draw, [[k] for k in items[:alone]])):
         path, pixels = named[k], merge(planes, shot.size_px)
         about: dict[str, str | float] = {
@@ -502,6 +504,8 @@ def _collect(
         if path.name in art:
             about["art"] = art[path.name].text()
         layers.append(to_layer(f"ghost.{path.name}", pixels, pixel_area, about))
+        held += layers[-1].pixels.nbytes
+        need(held, spare)
         # the layer has its own copy by now
         totals = _added(totals, planes)
     # a single group is drawn here: it may have parts for the pool's workers

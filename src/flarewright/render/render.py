@@ -26,6 +26,7 @@ from .compose import beauty
 from .direct import DirectImage, direct_image, widest_defocus_mm
 from .ghosts import plain_level, render_ghosts
 from .prepare import Settled, settle
+from .room import need, spare_bytes
 from .scatter import dimmed, render_scatter, scatter_facts, scatter_of
 from .shot import Shot, make_opening, make_shots, soiled_opening
 from .starburst_pass import OUT_OF_FOCUS_PX, read_soil, starburst_of
@@ -38,6 +39,8 @@ Progress = Callable[[float, str], None]
 
 BESIDE_PX = 1_000_000
 """The starburst of a larger picture is not made beside its ghosts: together they hold 100 MB more at 1080p."""
+PIXEL_BYTES = 12
+"""Of a layer: three float32."""
 BLACK = "the picture is black: no light comes through the lens to the sensor"
 HIDDEN = "the picture is black: what stands in front (holdout) hides every light"
 
@@ -98,7 +101,11 @@ def render(
     ------
     FlarewrightError
         When the project cannot be rendered; the message says what, where, and the remedy.
+    MemoryError
+        When its layers are more than the memory holds.
     """
+    # beauty, ghosts and starburst, whatever else
+    need(prod(project.camera.size_px) * PIXEL_BYTES * (3 if project.output.starburst else 2), spare_bytes())
     settled = settle(project)
     mask = None if settled.iris.mask is None else read_mask(settled.iris.mask)
     # rules that choose nothing are refused in every quality
