@@ -75,7 +75,9 @@ def validation_sentences(
         where = place(keys)
         match finding["type"]:
             case "missing":
-                found.setdefault((f"{where} is missing", ""), [])
+                heading = _HEADINGS.get(str(keys[-1]))
+                remedy = f": add at least one {heading}" if heading else ""
+                found.setdefault((f"{where} is missing{remedy}", ""), [])
             case "extra_forbidden":
                 found.setdefault((f"{where} is not a known key{unknown(keys)}", ""), [])
             case "value_error":
@@ -186,7 +188,8 @@ def shorten(value: object, limit: int = 60) -> str:
 
 def did_you_mean(word: str, known: Iterable[str]) -> str:
     """Return '; did you mean "x"?' for a misspelt word, or nothing."""
-    near = difflib.get_close_matches(word, list(known), n=1, cutoff=0.6)
+    # at 0.6 colour is near to holdout
+    near = difflib.get_close_matches(word, list(known), n=1, cutoff=0.65)
     return f"; did you mean {near[0]!r}?" if near else ""
 
 
