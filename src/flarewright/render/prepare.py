@@ -65,22 +65,25 @@ def load_lens(name_or_path: str | Path, *, remarks: list[str] | None = None, ape
 
 @lru_cache(maxsize=64)
 def _shipped_lens(path: Path) -> tuple[Lens, tuple[str, ...]]:
-    return _read_complete(path)
+    # tests judge the prescriptions that ship, and their notes tell it: a first command need not compile for that
+    return _read_complete(path, judged=True)
 
 
-def _read_complete(path: Path, apertures: Apertures = "auto") -> tuple[Lens, tuple[str, ...]]:
+def _read_complete(path: Path, apertures: Apertures = "auto", judged: bool = False) -> tuple[Lens, tuple[str, ...]]:
     """Read a lens file and fill in what it leaves out; also returns what there is to tell."""
     reading = read_lens(path)
     try:
         with naming(path):
-            return _completed(reading, apertures)
+            return _completed(reading, apertures, judged)
     except ValidationError as error:
         # a combination of values that no check foresaw
         problems = validation_sentences(error)
         raise LensError(summary(str(path), problems), tuple(problems)) from None
 
 
-def _completed(reading: LensReading | RawLens | RawSequence, apertures: Apertures) -> tuple[Lens, tuple[str, ...]]:
+def _completed(
+    reading: LensReading | RawLens | RawSequence, apertures: Apertures, judged: bool
+) -> tuple[Lens, tuple[str, ...]]:
     """Judge what was read, and fill in what it leaves out."""
     if apertures != "auto" and not isinstance(reading, RawLens):
         raise LensError(f"only the columns of a .lens table may be read as {apertures}; leave --apertures out")
@@ -92,10 +95,10 @@ def _completed(reading: LensReading | RawLens | RawSequence, apertures: Aperture
         reading = lens_of_sequence(reading)
     lens, found = reading
     told = list(found)
-    return complete_lens(lens, remarks=told, repaired=table), tuple(told)
+    return complete_lens(lens, remarks=told, judged=judged or table), tuple(told)
 
 
-def complete_lens(lens: Lens, *, remarks: list[str] | None = None, repaired: bool = False) -> Lens:
+def complete_lens(lens: Lens, *, remarks: list[str] | None = None, judged: bool = False) -> Lens:
     """Fill in what a prescription leaves out and check that it makes an image.
 
     Parameters
@@ -103,7 +106,7 @@ def complete_lens(lens: Lens, *, remarks: list[str] | None = None, repaired: boo
     lens : Lens
     remarks : list of str, optional
         Estimates are told here.
-    repaired : bool
+    judged : bool
         Whether it has been told already how far off the stated focal length is and what rims cut, as the repair of a
         `.lens` table does.
 
@@ -130,9 +133,9 @@ def complete_lens(lens: Lens, *, remarks: list[str] | None = None, repaired: boo
             )
             remarks.append(f"semi-diameters of {which} estimated from f/{lens.f_number:g} and the field of view")
         stated = lens.stated_focal_length
-        if stated is not None and not repaired and abs(order.efl / stated - 1.0) > 0.02:
+        if stated is not None and not judged and abs(order.efl / stated - 1.0) > 0.02:
             remarks.append(f"the focal length is {order.efl:.2f} mm, the file says {stated:g} mm")
-        if not repaired:
+        if not judged:
             _tell_opening(full, order, remarks)
         for position in full.positions:
             if position.focal_length is None or position.focus_distance is not None:
