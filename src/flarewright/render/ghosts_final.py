@@ -260,7 +260,7 @@ def draw_final(
     bend = traced_bend(shot, path, bundle, item.to_pixels)
     if few and _drawn_in_few(item, bundle, bend, canvas.plane(detail), to_pixels, careful=not quality.screen):
         return
-    rings, step_px = None, BRIDGE_PX
+    rings, step_px, sharp = None, BRIDGE_PX, bundle
     if shot.ringing is not None and visibility >= STEP_CONTRAST:
         pixels_per_mm = (float(to_pixels[2]), float(to_pixels[3]))
         nearness = shot.packed.nearness / shot.incidence.tilt_cosine
@@ -280,18 +280,24 @@ def draw_final(
         pieces = _bridges(traced, limit, item.view_radius, scale, visibility, step_px)
     steps = [(w, k / n) for w, n in enumerate(pieces) for k in range(n)] + [(count - 1, 0.0)]
     fine_nm = np.interp([w + part for w, part in steps], np.arange(count), shot.packed.wavelengths_nm)
-    patterns = None
+    patterns, flux = None, None
     if rings is not None:
+        from .ring_flux import ring_flux
+
+        plane = canvas.plane(detail)
         patterns = rings.textures(fine_nm, _seen(item, rings, bundle, traced, to_pixels, canvas, detail))
-    for k, ((w, part), rgb) in enumerate(zip(steps, shot.weights(fine_nm, bend) * item.art.rgb, strict=True)):
+        middle, size_px = steps.index((count // 2, 0.0)), (plane.shape[1] * plane.shape[3], plane.shape[0])
+        flux = ring_flux(shot, patterns, sharp, bundle, middle, to_pixels, size_px)
+    for k, ((w, part), color) in enumerate(zip(steps, shot.weights(fine_nm, bend) * item.art.rgb, strict=True)):
         if stop is not None and stop.is_set():
             return
-        if not rgb.any():
+        if not color.any():
             continue
         data = traced[w] if part == 0.0 else _between(traced[w], traced[w + 1], part)
         whole, data = mended(bundle, data)
         densities = node_densities(data, whole.pupil, whole.triangles)
         plane = canvas.plane(detail)
+        rgb = color if flux is None else color * flux.kept(k, w + part, whole, data, densities)
         for place, share in _places(item, to_pixels, w, part):
             if patterns is not None:
                 patterns.draw(k, whole, data, densities, shot.incidence.axes, place, shot.gain, rgb * share, plane)

@@ -1,0 +1,189 @@
+"""What a ghost with rings has to be multiplied by, so that it keeps its flux.
+
+Diffraction moves light and takes none. A pattern by itself keeps it too, but where a path crosses the stop several
+times the product of its patterns does not, as edges that lie on each other show; and a pattern that is asked at the
+centres of pixels says little of ghosts of a few of them. So the ghost is drawn for itself, with rings and without,
+wherever it lands, and the flux of both is compared.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..kernels.bundle import draw_bundle, node_densities
+from ..kernels.raster import blank_plane, to_pixels
+from ..kernels.trace import ALIVE, REL, STOP_X, X, Y
+from ..optics.bundle import Bundle, trace_bundle
+from ..optics.tears import mended
+
+if TYPE_CHECKING:
+    from .ringing import Textures
+    from .shot import Shot
+
+Floats = NDArray[np.float64]
+
+# pixels across beyond which a ghost is drawn smaller, for its flux alone
+WIDEST_PX = 256.0
+# ghosts no larger than this are compared at every wavelength that is drawn, others at the middle one
+SMALL_PX = 48.0
+# of a ghost that ends outside the picture, what lies within this part of its sides around it is compared, if that is
+# this part of the ghost: elsewhere its grid is coarse
+AROUND, SEEN = 0.1, 0.5
+# pixels around a ghost
+_MARGIN = 2
+
+Box = tuple[float, float, float, float]
+
+
+@dataclass(frozen=True)
+class RingFlux:
+    """How a ghost's flux is kept.
+
+    Attributes
+    ----------
+    shot : Shot
+    patterns : Textures
+    place : ndarray, shape (4,)
+        Column and row of the axis, pixels per mm.
+    box : tuple of float, or None
+        Left, top, right and bottom of what is compared, pixels; None: nothing is.
+    sharp : ndarray, shape (W,)
+        Flux without rings at the traced wavelengths, where the ghost is small.
+    middle : float
+        What others are multiplied by.
+    """
+
+    shot: Shot
+    patterns: Textures
+    place: Floats
+    box: Box | None
+    sharp: Floats
+    middle: float
+
+    def kept(self, k: int, at: float, whole: Bundle, data: Floats, densities: Floats) -> float:
+        """Return what the ghost has to be multiplied by at the k-th drawn wavelength.
+
+        Parameters
+        ----------
+        k : int
+        at : float
+            The same as traced wavelengths are counted.
+        whole, data, densities
+            The ghost as it is about to be drawn.
+        """
+        if self.box is None or not self.sharp.size:
+            return self.middle
+        sharp = float(np.interp(at, np.arange(self.sharp.size), self.sharp))
+        return _over(sharp, _ringed(self.shot, self.patterns, self.place, self.box, k, whole, data, densities))
+
+
+def ring_flux(
+    shot: Shot, patterns: Textures, sharp: Bundle, ringed: Bundle, middle: int, place: Floats, size_px: tuple[int, int]
+) -> RingFlux:
+    """Compare a ghost's flux without rings and with them.
+
+    Parameters
+    ----------
+    shot : Shot
+    patterns : Textures
+    sharp, ringed : Bundle
+        The grid of its light, and that which follows it into the shadow.
+    middle : int
+        Which of the drawn wavelengths is the middle one of those that are traced.
+    place : ndarray, shape (4,)
+        Column and row of the axis, pixels per mm.
+    size_px : tuple of int
+        Of the picture.
+
+    Returns
+    -------
+    RingFlux
+
+    Notes
+    -----
+    `tests/render/test_ringing.py` compares sums of layers with and without rings.
+    """
+    count, tilt = len(shot.packed.wavelengths_nm), shot.incidence.tilt
+    box = _compared(_box(shot, patterns, ringed, place), size_px)
+    if box is None:
+        return RingFlux(shot, patterns, place, None, np.empty(0), 1.0)
+    if max(box[2] - box[0], box[3] - box[1]) <= SMALL_PX:
+        fluxes = [
+            _sharp(shot, place, box, *mended(sharp, trace_bundle(shot.packed, w, sharp, tilt))) for w in range(count)
+        ]
+        return RingFlux(shot, patterns, place, box, np.array(fluxes), 1.0)
+    whole, data = mended(ringed, trace_bundle(shot.packed, count // 2, ringed, tilt))
+    densities = node_densities(data, whole.pupil, whole.triangles)
+    found = _over(
+        _sharp(shot, place, box, *mended(sharp, trace_bundle(shot.packed, count // 2, sharp, tilt))),
+        _ringed(shot, patterns, place, box, middle, whole, data, densities),
+    )
+    return RingFlux(shot, patterns, place, box, np.empty(0), found)
+
+
+def _over(sharp: float, ringed: float) -> float:
+    return sharp / ringed if sharp > 0.0 and ringed > 0.0 else 1.0
+
+
+def _box(shot: Shot, patterns: Textures, ringed: Bundle, place: Floats) -> Box | None:
+    """Return left, top, right and bottom of a ghost, pixels of the picture; None where no ray passes."""
+    ends = []
+    for data in ringed.traced.values():
+        radius = np.hypot(data[:, STOP_X::2], data[:, STOP_X + 1 :: 2])
+        lit = data[(data[:, ALIVE] > 0.0) & (data[:, REL] <= 1.0) & (radius <= patterns.rings.reach).all(axis=1)]
+        for side in (1.0, -1.0)[: ringed.halves]:
+            ends.append(place[:2] + place[2:] * (-1.0, 1.0) * ((lit[:, [X, Y]] * (side, 1.0)) @ shot.incidence.axes))
+    at = np.concatenate(ends)
+    if not len(at):
+        return None
+    (left, top), (right, bottom) = at.min(axis=0), at.max(axis=0)
+    return float(left), float(top), float(right), float(bottom)
+
+
+def _compared(box: Box | None, size_px: tuple[int, int]) -> Box | None:
+    """Return the part of a ghost that is compared; None where that says nothing of the rest."""
+    if box is None:
+        return None
+    width, height = size_px
+    beside, below = AROUND * width, AROUND * height
+    part = max(box[0], -beside), max(box[1], -below), min(box[2], width + beside), min(box[3], height + below)
+    if part[2] <= part[0] or part[3] <= part[1]:
+        return None
+    whole = (box[2] - box[0]) * (box[3] - box[1])
+    return part if (part[2] - part[0]) * (part[3] - part[1]) >= SEEN * whole else None
+
+
+def _scratch(place: Floats, box: Box) -> tuple[Floats, int, int]:
+    """Return where a ghost is drawn for its flux, and the width and height of that picture."""
+    size = np.array([box[2] - box[0], box[3] - box[1]])
+    smaller = min(1.0, WIDEST_PX / float(size.max()))
+    # by whole pixels, so that what is asked at pixels' centres is asked there again
+    corner = np.floor(box[:2]) - _MARGIN
+    width, height = (int(side) for side in np.ceil(size * smaller) + 2 * _MARGIN + 1)
+    return np.append((place[:2] - corner) * smaller, place[2:] * smaller), width, height
+
+
+def _sharp(shot: Shot, place: Floats, box: Box, whole: Bundle, data: Floats) -> float:
+    """Return the flux of a ghost without rings, in the unit of `_ringed`."""
+    at, width, height = _scratch(place, box)
+    plane, opening = blank_plane(width, height), shot.opening
+    draw_bundle(
+        data, whole.pupil, whole.triangles, node_densities(data, whole.pupil, whole.triangles),
+        whole.path.stop_crossings, opening.blades, opening.levels, shot.incidence.axes, at, shot.gain, np.ones(3),
+        plane, whole.halves,
+    )  # fmt: skip
+    return float(to_pixels(plane, width).sum(dtype=np.float64))
+
+
+def _ringed(
+    shot: Shot, patterns: Textures, place: Floats, box: Box, k: int, whole: Bundle, data: Floats, densities: Floats
+) -> float:
+    """Return the flux of a ghost with rings."""
+    at, width, height = _scratch(place, box)
+    plane = blank_plane(width, height)
+    patterns.draw(k, whole, data, densities, shot.incidence.axes, at, shot.gain, np.ones(3), plane)
+    return float(to_pixels(plane, width).sum(dtype=np.float64))
