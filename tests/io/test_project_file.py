@@ -306,7 +306,11 @@ def test_coating_choices(tmp_path):
 @pytest.mark.parametrize(
     ("content", "words"),
     [
-        (b"lens = ", "not valid TOML"),
+        (b"lens = ", "not valid TOML.*at end of document.: a value, a closing bracket or a closing quote is missing"),
+        (b'lens = "tessar\n', r"illegal character .* \(at line 1, column 15\): close the quotes in that line"),
+        (b"lens = tessar\n", "at line 1, column 8.: a value is a number, true, false, text in quotes"),
+        (b"lens\n", "at line 1, column 5.: write KEY = VALUE"),
+        (b'lens = "tessar" f_number = 4\n', "at line 1, column 17.: write one key a line"),
         (b"\xff\xfe", "UTF-8"),
         (b"schema_version = 2\n", "newer than this program"),
         (b"", "empty"),

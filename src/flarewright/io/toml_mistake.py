@@ -14,6 +14,17 @@ _NAME = r"""[\w-]+|"[^"\n]*"|'[^'\n]*'"""
 _DOTTED = rf"(?:{_NAME})(?:\s*\.\s*(?:{_NAME}))*"
 _HEADING = re.compile(rf"\s*(\[\[?)\s*({_DOTTED})\s*\]\]?\s*(?:#.*)?")
 _KEY = re.compile(rf"\s*({_DOTTED})\s*=")
+# by what the reader's words begin with
+_REMEDIES = {
+    "Unclosed": "close what is open there",
+    "Unterminated": "close the quotes",
+    "Expected newline": "write one key a line",
+    "Expected": "write KEY = VALUE",
+    "Invalid statement": "write KEY = VALUE, a [heading] or a # comment",
+    "Invalid value": "a value is a number, true, false, text in quotes, or a list in brackets",
+    "Illegal character '\\n'": "close the quotes in that line",
+    "Illegal character": "remove it, or put the text in quotes",
+}
 # tables of which a file may have several
 _SEVERAL = ("lights", "cameras", "rows", "elements", "positions", "rules", "wishes", "keyframes")
 
@@ -46,7 +57,10 @@ def toml_sentence(text: str, error: TOMLDecodeError) -> str:
         elif name.startswith("["):
             remedy = "put all its keys below one of them"
         return f"says {name} twice, in lines {first} and {second}: {remedy}"
-    return f"is not valid TOML: {said[:1].lower()}{said[1:]}"
+    remedy = next((f": {advice}" for words, advice in _REMEDIES.items() if said.startswith(words)), "")
+    if "at end of document" in said:
+        remedy = ": a value, a closing bracket or a closing quote is missing"
+    return f"is not valid TOML: {said[:1].lower()}{said[1:]}{remedy}"
 
 
 def _repeated(text: str) -> Iterator[tuple[str, int, int]]:
