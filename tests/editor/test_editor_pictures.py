@@ -678,3 +678,51 @@ def test_undo_leads_back_to_the_exposure_of_the_lens_before(project):
     assert screen.wait(60.0)
     assert screen.exposure_stops == other
     session.keeper.close()
+
+
+def test_a_picture_that_rests_is_as_large_as_the_page_shows_it(project):
+    def size(room, **camera):
+        return studio.rest_size(project.replace(camera=Camera(**camera)), room)
+
+    full = {"size_px": (1920, 1080)}
+    assert size((1400, 788), **full) == (1400, 788)
+    # no larger than the file, nor than a screen; no smaller than what a hand is shown
+    assert size((9000, 5000), **full) == size((9000, 5000), size_px=(3840, 2160)) == (1920, 1080)
+    assert size((300, 200), **full) == (960, 540)
+    assert size((1400, 900), size_px=(640, 480)) == (720, 540)
+
+    session, _ = begin(None)
+    screen = Screen(session)
+    grades = []
+    show = screen.show
+    screen.show = lambda picture: (grades.append(picture.grade), show(picture))
+    screen.start()
+    assert screen.wait(60.0)
+    small, seen, match = screen.picture, screen.seen, screen.match
+    grades.clear()
+    screen.make_room((1440, 900))
+    assert screen.wait(60.0)
+    # at once, without a draft between, and what is known of it holds
+    large = screen.picture
+    assert grades == ["final"]
+    assert large.ghosts.shape == (810, 1440, 3)
+    assert (screen.seen, screen.match) == (seen, match)
+    # neither brightness nor place has changed
+    both = [
+        np.asarray(one.ghosts.reshape(27, -1, 48, one.ghosts.shape[1] // 48, 3).mean(axis=(1, 3)))
+        for one in (small, large)
+    ]
+    assert np.abs(both[0] - both[1]).max() < 0.03 * both[0].max()
+    assert both[1].sum() == pytest.approx(both[0].sum(), rel=2e-3)
+    # a page that has become smaller has all it needs
+    screen.make_room((1000, 600))
+    assert screen.wait(60.0)
+    assert screen.picture is large
+    # a hand is followed in small pictures, and what it lets go of is as large as the page again
+    hand = Hand(screen)
+    moved = partial(move_light, light=0, x=1.0, y=1.0)
+    found = hand.picture(moved, session.revision)
+    assert Image.open(io.BytesIO(found.jpeg)).width <= 960
+    session.do("move_light", {"light": 0, "x": 1.0, "y": 1.0})
+    assert screen.wait(60.0)
+    assert screen.picture.ghosts.shape == (562, 1000, 3)

@@ -41,6 +41,13 @@ def sharpen(screen: Screen, project: Project, view: View, check: Check) -> None:
         Raises when something newer waits.
     """
     shown = screen.picture
+    if shown is not None and _stands(screen, shown, project, view):
+        _enlarge(screen, shown, view, check)
+    else:
+        _sharpen(screen, shown, project, view, check)
+
+
+def _sharpen(screen: Screen, shown: Picture | None, project: Project, view: View, check: Check) -> None:
     # another lens has an exposure of its own; while one is worked on it is held, so that brightness can be compared
     if shown is None and view.found_stops is not None:
         screen.match = Match(exposure_stops=view.found_stops)
@@ -52,7 +59,8 @@ def sharpen(screen: Screen, project: Project, view: View, check: Check) -> None:
     followed = screen.moved is not None and studio.same_scene(screen.moved, project)
     draft: Picture | None = None
     if changed or working or (screen.final_s > SOON_S and not followed):
-        draft = studio.take(project, "draft", view, levels=() if changed else screen.match.levels)
+        room = screen.room if working else None
+        draft = studio.take(project, "draft", view, room=room, levels=() if changed else screen.match.levels)
         check()
         if other and shown is not None and screen.exposed:
             screen.leave(studio.pictured(shown.project))
@@ -76,7 +84,7 @@ def sharpen(screen: Screen, project: Project, view: View, check: Check) -> None:
             _show_soon(screen, project, view, check)
         if seen_first:
             _look(screen, project, "final", check)
-        final = studio.take(project, "final", view, progress=_progress(screen, "final picture", check))
+        final = _final(screen, project, view, check)
         check()
         screen.final_s = final.seconds
         if fresh:
@@ -107,9 +115,33 @@ def _exposure(screen: Screen, picture: Picture) -> float:
 
 def _show_soon(screen: Screen, project: Project, view: View, check: Check) -> None:
     """Trace a project as well as a screen can show it, unless something newer waits by then."""
-    soon = studio.take(project, "soon", view, progress=_progress(screen, "traced picture", check))
+    progress = _progress(screen, "traced picture", check)
+    soon = studio.take(project, "soon", view, room=screen.room, progress=progress)
     check()
     screen.show(soon)
+
+
+def _final(screen: Screen, project: Project, view: View, check: Check) -> Picture:
+    return studio.take(
+        project, "final", view, room=screen.room, progress=_progress(screen, "final picture", check)
+    )  # fmt: skip
+
+
+def _stands(screen: Screen, shown: Picture, project: Project, view: View) -> bool:
+    """Tell whether all is drawn and measured already: a hand came back, or the page has another size."""
+    if view.grey or view.unclipped or shown.grade != "final" or screen.seen is None:
+        return False
+    now = studio.pictured(project)
+    return studio.pictured(shown.project) == now == studio.pictured(screen.seen.project)
+
+
+def _enlarge(screen: Screen, shown: Picture, view: View, check: Check) -> None:
+    """Show the final picture once more, as large as the page has room for."""
+    if not studio.is_as_large(shown, screen.room):
+        shown = _final(screen, shown.project, view, check)
+        check()
+        screen.final_s = shown.seconds
+    screen.show(shown)
 
 
 def _look(screen: Screen, project: Project, grade: studio.Grade, check: Check) -> None:

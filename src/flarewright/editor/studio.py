@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from math import log
+from math import log, sqrt
 from typing import Literal
 
 import numpy as np
@@ -28,6 +28,8 @@ Levels = tuple[tuple[float, tuple[str, ...]], ...]
 
 # the viewport's picture fits into this
 WIDEST, HIGHEST = 960, 540
+# where it rests it is as large as a page shows it, and has no more pixels than this
+MOST_PX = 1920 * 1080
 DRAFT_WAVELENGTHS = 3
 # and those of a first traced picture, for eight bits; coatings tell the colours between them
 SOON_WAVELENGTHS = 5
@@ -83,7 +85,26 @@ def view_size(project: Project, scale: float = 1.0) -> tuple[int, int]:
     return max(16, round(width * zoom)), max(16, round(height * zoom))
 
 
-def staged(project: Project, grade: Grade, scale: float = 1.0) -> Project:
+def rest_size(project: Project, room: tuple[int, int]) -> tuple[int, int]:
+    """Return the size of a picture that rests: as large as it is seen, as its file and `MOST_PX` allow.
+
+    Parameters
+    ----------
+    project : Project
+    room : tuple of int
+        Pixels of the screen that its frame covers.
+
+    Returns
+    -------
+    tuple of int
+        No less than `view_size`, which is what a moving hand is shown.
+    """
+    width, height = project.camera.size_px
+    zoom = min(room[0] / width, room[1] / height, sqrt(MOST_PX / (width * height)), 1.0)
+    return max(view_size(project), (round(width * zoom), round(height * zoom)))
+
+
+def staged(project: Project, grade: Grade, scale: float = 1.0, room: tuple[int, int] | None = None) -> Project:
     """Return the project as the viewport draws it: its frame at another size, its quality as far as is needed.
 
     Parameters
@@ -92,6 +113,8 @@ def staged(project: Project, grade: Grade, scale: float = 1.0) -> Project:
     grade : {"moving", "draft", "soon", "final", "working"}
     scale : float
         Of the picture's sides.
+    room : tuple of int, optional
+        As of `rest_size`, of a picture that rests.
 
     Returns
     -------
@@ -99,7 +122,8 @@ def staged(project: Project, grade: Grade, scale: float = 1.0) -> Project:
     """
     if isinstance(project.lens, str):
         project = project.replace(lens=_loaded(project.lens, lens_path(project.lens).stat().st_mtime_ns))
-    camera = project.camera.replace(size_px=view_size(project, scale), sensor_mm=project.camera.sensor)
+    size = view_size(project, scale) if room is None else rest_size(project, room)
+    camera = project.camera.replace(size_px=size, sensor_mm=project.camera.sensor)
     own = project.quality
     if grade in ("soon", "final"):
         # reference quality is for files: it never ends
@@ -138,6 +162,7 @@ def take(
     look: View,
     *,
     scale: float = 1.0,
+    room: tuple[int, int] | None = None,
     levels: Levels = (),
     progress: Callable[[float, str], None] | None = None,
 ) -> Picture:
@@ -149,7 +174,8 @@ def take(
     grade : {"moving", "draft", "soon", "final", "working"}
         "working" draws what `look` asks for by `working_ghosts`.
     look : View
-    scale : float
+    scale, room
+        As of `staged`.
     levels : Levels
         `Match.levels` of a draft.
     progress : callable, optional
@@ -165,7 +191,7 @@ def take(
         When the project cannot be rendered.
     """
     begun = time.perf_counter()
-    stage = staged(project, grade, scale)
+    stage = staged(project, grade, scale, room)
     size = stage.camera.size_px
     if look.grey or look.unclipped:
         layer = working_ghosts(stage, grey=look.grey, unclipped=look.unclipped)
@@ -278,6 +304,12 @@ def _levelled(art: Art, levels: Levels) -> Art:
 def exposure_of(picture: Picture, match: Match | None = None) -> float:
     """Find an exposure that shows the ghosts of a picture."""
     return auto_exposure(ghosts_of(picture, match or Match()))
+
+
+def is_as_large(picture: Picture, room: tuple[int, int]) -> bool:
+    """Tell whether a picture has all the pixels that it could have where a page has so much room (`rest_size`)."""
+    height, width = picture.ghosts.shape[:2]
+    return (width, height) >= rest_size(picture.project, room)
 
 
 def is_dark(picture: Picture) -> bool:
