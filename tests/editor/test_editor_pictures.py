@@ -2,6 +2,7 @@
 
 import io
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from functools import partial
 from itertools import pairwise
 
@@ -14,6 +15,7 @@ from flarewright.editor.drawings import section
 from flarewright.editor.edit_shot import move_light
 from flarewright.editor.files import project_for_lens, save_project
 from flarewright.editor.hand import Hand
+from flarewright.editor.ladder import levels_at, measured, missing, with_rung
 from flarewright.editor.pictures import in_short
 from flarewright.editor.screen import Screen, packed, shown_pixels
 from flarewright.editor.seen import Seen, SeenGhost, alone, is_there, outline, see, under
@@ -176,6 +178,60 @@ def test_drafts_are_as_bright_as_final_pictures(project):
     assert np.abs(np.log2(blocks[0] / blocks[1])).mean() < 0.15
     # pictures of other projects tell nothing
     assert studio.matched(studio.take(moved, "draft", look), final, match) is match
+
+
+def test_drafts_are_as_bright_wherever_a_hand_takes_the_light(project):
+    """After jumps of 20 degrees they had been up to a stop off until the hand rested."""
+    look, far = View(), 0.0
+    seen = [{g.name: g.flux for g in see(project, grade).ghosts} for grade in ("draft", "final")]
+    levels = studio.levels_of(*seen)
+    draft, final = studio.take(project, "draft", look, levels=levels), studio.take(project, "final", look)
+    old = studio.matched(draft, final, studio.Match(), levels)
+    ladder = None
+    for angle in missing(None, project):
+        ladder = with_rung(ladder, measured(project, angle, lambda: None))
+    assert missing(ladder, project) == []
+    assert [rung.angle_deg for rung in ladder.rungs] == sorted(rung.angle_deg for rung in ladder.rungs)
+    match = replace(old, ladder=ladder)
+    for place in ((25.0, 10.0), (22.0, -12.0), (-30.0, 5.0), (0.0, 18.0)):
+        moved = project.replace(lights=(Light(field_deg=place),))
+        resting = studio.take(moved, "final", look).ghosts.mean()
+        off = [
+            abs(np.log2(studio.ghosts_of(studio.take(moved, "draft", look, levels=each), old).mean() / resting))
+            for each in (old.levels, levels_at(match, moved))
+        ]
+        assert off[1] < 0.2
+        far = max(far, off[0])
+    assert far > 0.5
+    # where the light rests, what was learned there holds
+    shown = [
+        studio.take(project, "draft", look, levels=each).ghosts for each in (old.levels, levels_at(match, project))
+    ]
+    assert shown[1] == pytest.approx(shown[0], rel=0.2, abs=0.02 * float(shown[0].max()))
+    assert shown[1].mean() == pytest.approx(shown[0].mean(), rel=0.01)
+    # nor is anything else on the way from there
+    for x in (8.0, 11.0, 14.0, 17.0):
+        moved = project.replace(lights=(Light(field_deg=(x, 0.5 * x)),))
+        way = studio.ghosts_of(studio.take(moved, "draft", look, levels=levels_at(match, moved)), match)
+        assert abs(np.log2(way.mean() / studio.take(moved, "final", look).ghosts.mean())) < 0.15
+
+
+def test_a_screen_learns_of_other_places_while_it_rests():
+    session, _ = begin(None)
+    screen = Screen(session)
+    screen.start()
+    assert screen.wait(60.0)
+    ladder = screen.match.ladder
+    assert missing(ladder, session.project) == []
+    # that holds while the lens does
+    session.do("move_light", {"light": 0, "x": -12.0, "y": 5.0})
+    assert screen.wait(60.0)
+    assert screen.match.ladder is ladder
+    assert screen.match.lights == session.project.lights
+    session.do("set_iris", {"values": {"blades": 9}})
+    assert screen.wait(60.0)
+    assert screen.match.ladder is not ladder
+    assert missing(screen.match.ladder, session.project) == []
 
 
 def test_levels_are_the_ratio_of_each_ghost():

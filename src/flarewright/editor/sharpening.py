@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from ..model import Project
 from . import studio
 from .jobs import Check
+from .ladder import levels_at, measured, missing, with_rung
 from .seen import Seen, see
 from .studio import Match, Picture
 from .view import View
@@ -43,6 +44,8 @@ def sharpen(screen: Screen, project: Project, view: View, check: Check) -> None:
     shown = screen.picture
     if shown is not None and _stands(screen, shown, project, view):
         _enlarge(screen, shown, view, check)
+        # a hand may have ended that
+        _climb(screen, project, check)
     else:
         _sharpen(screen, shown, project, view, check)
 
@@ -58,9 +61,11 @@ def _sharpen(screen: Screen, shown: Picture | None, project: Project, view: View
     working = view.grey or view.unclipped
     followed = screen.moved is not None and studio.same_scene(screen.moved, project)
     draft: Picture | None = None
+    levels: studio.Levels = ()
     if changed or working or (screen.final_s > SOON_S and not followed):
         room = screen.room if working else None
-        draft = studio.take(project, "draft", view, room=room, levels=() if changed else screen.match.levels)
+        levels = () if changed else levels_at(screen.match, project)
+        draft = studio.take(project, "draft", view, room=room, levels=levels)
         check()
         if other and shown is not None and screen.exposed:
             screen.leave(studio.pictured(shown.project))
@@ -73,7 +78,7 @@ def _sharpen(screen: Screen, shown: Picture | None, project: Project, view: View
             plain = studio.take(project, "draft", View()) if draft.grey else draft
             screen.match = Match(exposure_stops=_exposure(screen, plain))
         elif changed:
-            screen.match = replace(screen.match, levels=())
+            screen.match = replace(screen.match, levels=(), lights=(), ladder=None)
         if draft.grey and (fresh or shown is None or not shown.grey):
             stops = studio.exposure_of(draft, Match()) - screen.match.exposure_stops
             screen.match = replace(screen.match, grey=2.0**stops)
@@ -84,20 +89,7 @@ def _sharpen(screen: Screen, shown: Picture | None, project: Project, view: View
             _show_soon(screen, project, view, check)
         if seen_first:
             _look(screen, project, "final", check)
-        final = _final(screen, project, view, check)
-        check()
-        screen.final_s = final.seconds
-        if fresh:
-            screen.match = replace(screen.match, exposure_stops=_exposure(screen, final))
-            if screen.exposed:
-                screen.session.remember(screen.match.exposure_stops)
-        screen.show(final)
-        if draft is None:
-            # for the next hand; the picture does not wait for it
-            draft = studio.take(project, "draft", view, levels=screen.match.levels)
-            check()
-        screen.match = studio.matched(draft, final, screen.match)
-        screen.session.tell({"type": "matched"})
+        _show_final(screen, project, view, (draft, levels), fresh, check)
     if not seen_first:
         _look(screen, project, "draft" if working else "final", check)
     if not working and screen.seen is not None:
@@ -105,6 +97,8 @@ def _sharpen(screen: Screen, shown: Picture | None, project: Project, view: View
     check()
     if screen.idle is not None:
         screen.idle()
+    if not working:
+        _climb(screen, project, check)
 
 
 def _exposure(screen: Screen, picture: Picture) -> float:
@@ -119,6 +113,29 @@ def _show_soon(screen: Screen, project: Project, view: View, check: Check) -> No
     soon = studio.take(project, "soon", view, room=screen.room, progress=progress)
     check()
     screen.show(soon)
+
+
+def _show_final(
+    screen: Screen, project: Project, view: View, drafted: tuple[Picture | None, studio.Levels], fresh: bool,
+    check: Check,
+) -> None:  # fmt: skip
+    """Trace a project in full, and learn from it how bright drafts shall be."""
+    draft, levels = drafted
+    final = _final(screen, project, view, check)
+    check()
+    screen.final_s = final.seconds
+    if fresh:
+        screen.match = replace(screen.match, exposure_stops=_exposure(screen, final))
+        if screen.exposed:
+            screen.session.remember(screen.match.exposure_stops)
+    screen.show(final)
+    if draft is None:
+        # for the next hand; the picture does not wait for it
+        levels = levels_at(screen.match, project)
+        draft = studio.take(project, "draft", view, levels=levels)
+        check()
+    screen.match = studio.matched(draft, final, screen.match, levels)
+    screen.session.tell({"type": "matched"})
 
 
 def _final(screen: Screen, project: Project, view: View, check: Check) -> Picture:
@@ -159,8 +176,16 @@ def _match_ghosts(screen: Screen, project: Project, view: View, seen: Seen, chec
     check()
     final = screen.picture
     if final is not None:
-        screen.match = replace(studio.matched(draft, final, screen.match), levels=levels)
+        screen.match = studio.matched(draft, final, screen.match, levels)
         screen.session.tell({"type": "matched"})
+
+
+def _climb(screen: Screen, project: Project, check: Check) -> None:
+    """Learn, while nothing else is to be done, how bright ghosts shall be wherever a hand takes the light."""
+    for angle in missing(screen.match.ladder, project):
+        rung = measured(project, angle, check)
+        check()
+        screen.match = replace(screen.match, ladder=with_rung(screen.match.ladder, rung))
 
 
 def _progress(screen: Screen, what: str, check: Check) -> Any:

@@ -7,20 +7,23 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from math import log, sqrt
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import FlarewrightError
 from ..io.library import lens_path
-from ..model import Art, Layer, Lens, Output, Project, Quality, Rule
+from ..model import Art, Layer, Lens, Light, Output, Project, Quality, Rule
 from ..render.display import auto_exposure
 from ..render.edge_rings import untabled
 from ..render.prepare import load_lens
 from ..render.render import render
 from ..render.working import working_ghosts
 from .view import View
+
+if TYPE_CHECKING:
+    from .ladder import Ladder
 
 Floats = NDArray[np.float32]
 Grade = Literal["moving", "draft", "soon", "final", "working"]
@@ -234,6 +237,10 @@ class Match:
     ----------
     levels : tuple of (float, names)
         Gains of single ghosts, alike ones together.
+    lights : tuple of Light
+        Where `levels` and `gain` were learned.
+    ladder : Ladder or None
+        What is known of other places (`ladder.levels_at`).
     gain : tuple of float
         Of a draft's ghosts, R, G, B.
     exposure_stops : float
@@ -246,9 +253,11 @@ class Match:
     exposure_stops: float = 0.0
     grey: float = 1.0
     levels: Levels = ()
+    lights: tuple[Light, ...] = ()
+    ladder: Ladder | None = None
 
 
-def matched(draft: Picture | None, final: Picture, held: Match) -> Match:
+def matched(draft: Picture | None, final: Picture, held: Match, levels: Levels | None = None) -> Match:
     """Compare a draft with the final picture of the same project.
 
     Parameters
@@ -257,6 +266,8 @@ def matched(draft: Picture | None, final: Picture, held: Match) -> Match:
     final : Picture
     held : Match
         What holds until now; kept where there is nothing to compare.
+    levels : Levels, optional
+        That the draft was drawn with; None: those that hold.
 
     Returns
     -------
@@ -268,7 +279,8 @@ def matched(draft: Picture | None, final: Picture, held: Match) -> Match:
     if min(ours.min(), theirs.min()) <= 0.0:
         return held
     red, green, blue = (float(gain) for gain in np.clip(theirs / ours, 0.02, 4.0))
-    return replace(held, gain=(red, green, blue))
+    levels = held.levels if levels is None else levels
+    return replace(held, gain=(red, green, blue), levels=levels, lights=final.project.lights)
 
 
 def levels_of(drafted: Mapping[str, float], final: Mapping[str, float]) -> Levels:
