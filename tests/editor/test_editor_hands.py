@@ -2,7 +2,9 @@
 
 import json
 
+import numpy as np
 import pytest
+from PIL import Image
 
 from flarewright.io.project_file import read_project
 
@@ -238,3 +240,33 @@ def test_zoom_pan_and_wipe_are_reached_by_keys(tab):
     tab.page.keyboard.press("PageUp")
     assert tab.js("flarewright.view.frame()")["w"] == pytest.approx(fitted["w"])
     assert tab.state()["lights"][0]["field_deg"] == place
+
+
+def test_a_large_page_shows_a_sharp_picture(tab):
+    """On large windows the picture that rests was drawn 960 pixels wide, and stretched."""
+    small = tab.shown()
+    assert small.shape[1] == 960
+    tab.page.set_viewport_size({"width": 1900, "height": 1080})
+    tab.until("flarewright.view.image.width > 960")
+    assert tab.js("[flarewright.view.image.width, flarewright.view.image.height]") == tab.js(
+        "[flarewright.view.frame().w, flarewright.view.frame().h].map(side => Math.round(side * devicePixelRatio))"
+    )
+    # the picture is the same: neither its brightness nor its place has changed
+    large = np.asarray(Image.fromarray(tab.shown()).resize((96, 54), Image.Resampling.BOX), dtype=float)
+    both = np.asarray(Image.fromarray(small).resize((96, 54), Image.Resampling.BOX), dtype=float), large
+    assert np.abs(both[0] - both[1]).mean() < 0.5
+    # a hand is as fast as ever, and what it lets go of is sharp
+    x, y = tab.light()
+    mouse = tab.page.mouse
+    mouse.move(x, y)
+    mouse.down()
+    mouse.move(x - 90, y + 40, steps=6)
+    tab.until("flarewright.view.shownGrade === 'moving'")
+    assert tab.js("flarewright.view.image.width") <= 960
+    mouse.up()
+    tab.rest()
+    assert tab.js("flarewright.view.image.width === Math.round(flarewright.view.frame().w * devicePixelRatio)")
+    # who looks closer sees more, as far as the file goes, and 1:1 is one pixel of that to one of the screen
+    tab.page.keyboard.press("z")
+    tab.until("flarewright.view.image.width === 1920")
+    assert tab.js("Math.round(flarewright.view.frame().w * devicePixelRatio)") == 1920

@@ -2,6 +2,7 @@
 
 import io
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from functools import partial
 from itertools import pairwise
 
@@ -14,6 +15,7 @@ from flarewright.editor.drawings import section
 from flarewright.editor.edit_shot import move_light
 from flarewright.editor.files import project_for_lens, save_project
 from flarewright.editor.hand import Hand
+from flarewright.editor.ladder import levels_at, measured, missing, with_rung
 from flarewright.editor.pictures import in_short
 from flarewright.editor.screen import Screen, packed, shown_pixels
 from flarewright.editor.seen import Seen, SeenGhost, alone, is_there, outline, see, under
@@ -176,6 +178,60 @@ def test_drafts_are_as_bright_as_final_pictures(project):
     assert np.abs(np.log2(blocks[0] / blocks[1])).mean() < 0.15
     # pictures of other projects tell nothing
     assert studio.matched(studio.take(moved, "draft", look), final, match) is match
+
+
+def test_drafts_are_as_bright_wherever_a_hand_takes_the_light(project):
+    """After jumps of 20 degrees they had been up to a stop off until the hand rested."""
+    look, far = View(), 0.0
+    seen = [{g.name: g.flux for g in see(project, grade).ghosts} for grade in ("draft", "final")]
+    levels = studio.levels_of(*seen)
+    draft, final = studio.take(project, "draft", look, levels=levels), studio.take(project, "final", look)
+    old = studio.matched(draft, final, studio.Match(), levels)
+    ladder = None
+    for angle in missing(None, project):
+        ladder = with_rung(ladder, measured(project, angle, lambda: None))
+    assert missing(ladder, project) == []
+    assert [rung.angle_deg for rung in ladder.rungs] == sorted(rung.angle_deg for rung in ladder.rungs)
+    match = replace(old, ladder=ladder)
+    for place in ((25.0, 10.0), (22.0, -12.0), (-30.0, 5.0), (0.0, 18.0)):
+        moved = project.replace(lights=(Light(field_deg=place),))
+        resting = studio.take(moved, "final", look).ghosts.mean()
+        off = [
+            abs(np.log2(studio.ghosts_of(studio.take(moved, "draft", look, levels=each), old).mean() / resting))
+            for each in (old.levels, levels_at(match, moved))
+        ]
+        assert off[1] < 0.2
+        far = max(far, off[0])
+    assert far > 0.5
+    # where the light rests, what was learned there holds
+    shown = [
+        studio.take(project, "draft", look, levels=each).ghosts for each in (old.levels, levels_at(match, project))
+    ]
+    assert shown[1] == pytest.approx(shown[0], rel=0.2, abs=0.02 * float(shown[0].max()))
+    assert shown[1].mean() == pytest.approx(shown[0].mean(), rel=0.01)
+    # nor is anything else on the way from there
+    for x in (8.0, 11.0, 14.0, 17.0):
+        moved = project.replace(lights=(Light(field_deg=(x, 0.5 * x)),))
+        way = studio.ghosts_of(studio.take(moved, "draft", look, levels=levels_at(match, moved)), match)
+        assert abs(np.log2(way.mean() / studio.take(moved, "final", look).ghosts.mean())) < 0.15
+
+
+def test_a_screen_learns_of_other_places_while_it_rests():
+    session, _ = begin(None)
+    screen = Screen(session)
+    screen.start()
+    assert screen.wait(60.0)
+    ladder = screen.match.ladder
+    assert missing(ladder, session.project) == []
+    # that holds while the lens does
+    session.do("move_light", {"light": 0, "x": -12.0, "y": 5.0})
+    assert screen.wait(60.0)
+    assert screen.match.ladder is ladder
+    assert screen.match.lights == session.project.lights
+    session.do("set_iris", {"values": {"blades": 9}})
+    assert screen.wait(60.0)
+    assert screen.match.ladder is not ladder
+    assert missing(screen.match.ladder, session.project) == []
 
 
 def test_levels_are_the_ratio_of_each_ghost():
@@ -678,3 +734,51 @@ def test_undo_leads_back_to_the_exposure_of_the_lens_before(project):
     assert screen.wait(60.0)
     assert screen.exposure_stops == other
     session.keeper.close()
+
+
+def test_a_picture_that_rests_is_as_large_as_the_page_shows_it(project):
+    def size(room, **camera):
+        return studio.rest_size(project.replace(camera=Camera(**camera)), room)
+
+    full = {"size_px": (1920, 1080)}
+    assert size((1400, 788), **full) == (1400, 788)
+    # no larger than the file, nor than a screen; no smaller than what a hand is shown
+    assert size((9000, 5000), **full) == size((9000, 5000), size_px=(3840, 2160)) == (1920, 1080)
+    assert size((300, 200), **full) == (960, 540)
+    assert size((1400, 900), size_px=(640, 480)) == (720, 540)
+
+    session, _ = begin(None)
+    screen = Screen(session)
+    grades = []
+    show = screen.show
+    screen.show = lambda picture: (grades.append(picture.grade), show(picture))
+    screen.start()
+    assert screen.wait(60.0)
+    small, seen, match = screen.picture, screen.seen, screen.match
+    grades.clear()
+    screen.make_room((1440, 900))
+    assert screen.wait(60.0)
+    # at once, without a draft between, and what is known of it holds
+    large = screen.picture
+    assert grades == ["final"]
+    assert large.ghosts.shape == (810, 1440, 3)
+    assert (screen.seen, screen.match) == (seen, match)
+    # neither brightness nor place has changed
+    both = [
+        np.asarray(one.ghosts.reshape(27, -1, 48, one.ghosts.shape[1] // 48, 3).mean(axis=(1, 3)))
+        for one in (small, large)
+    ]
+    assert np.abs(both[0] - both[1]).max() < 0.03 * both[0].max()
+    assert both[1].sum() == pytest.approx(both[0].sum(), rel=2e-3)
+    # a page that has become smaller has all it needs
+    screen.make_room((1000, 600))
+    assert screen.wait(60.0)
+    assert screen.picture is large
+    # a hand is followed in small pictures, and what it lets go of is as large as the page again
+    hand = Hand(screen)
+    moved = partial(move_light, light=0, x=1.0, y=1.0)
+    found = hand.picture(moved, session.revision)
+    assert Image.open(io.BytesIO(found.jpeg)).width <= 960
+    session.do("move_light", {"light": 0, "x": 1.0, "y": 1.0})
+    assert screen.wait(60.0)
+    assert screen.picture.ghosts.shape == (562, 1000, 3)

@@ -223,3 +223,37 @@ def test_a_search_for_colours_is_stopped_at_once(project):
     assert time.perf_counter() - begun < 15.0
     assert not solver._thread.is_alive()
     assert len(solver.progress.found) == 1
+
+
+def test_from_scratch_is_judged_by_traced_rays(project, monkeypatch):
+    """Far off the axis matrices called lenses "met" whose ghosts no ray ever made."""
+    names = ["wish 0", "wish 1"]
+    asked = []
+
+    def found(state, problem, *, name, **_):
+        asked.append(problem.traced)
+        return (
+            SimpleNamespace(
+                lens=as_lens(project.lens), residuals=np.zeros((2, 2)), breaks=(), lost=(names[1],),
+            ),
+        )  # fmt: skip
+
+    monkeypatch.setattr(solving, "compile_kernels", lambda picture: None)
+    monkeypatch.setattr(solving, "solve", lambda *_, **__: SimpleNamespace(searches=3, seconds=0.1))
+    monkeypatch.setattr(solving, "outcomes", found)
+    wishes = (GhostWish(place_mm=5.0, radius_mm=1.5), GhostWish(place_mm=-6.0, radius_mm=2.5))
+    solver = Solver(_Session(project.replace(design=Design(wishes=wishes, own_ghosts=False))))
+    solver.start(0.1)
+    solver._thread.join(60.0)
+    assert asked == [True]
+    (one,) = solver.progress.found
+    assert "; not met; too few rays make added ghost 2" in one.words
+
+
+def test_a_lens_that_stays_black_says_so(project, monkeypatch):
+    """Its thumbnail had been black, and nothing had told why."""
+    drafted = solving._found(project, {"lens": as_lens("tessar-brendel"), "coating": AsLens()}, "Lens 1", Seeing())
+    monkeypatch.setattr(solving, "is_dark", lambda picture: picture.grade == "soon")
+    traced = solving._drawn(drafted, project, Seeing(), "soon", lambda: None)
+    assert traced.picture == drafted.picture
+    assert traced.words == f"Lens 1; {solving.UNSEEN}"

@@ -11,6 +11,7 @@ from scipy.special import fresnel
 from flarewright.model import D65, Art, Camera, Dirt, Iris, Light, Lines, Output, Project, Quality, Rule
 from flarewright.optics.paraxial import flare_matrices
 from flarewright.optics.paths import ghost_paths
+from flarewright.render import ringing as last_of
 from flarewright.render.edge_rings import edge_crossing
 from flarewright.render.prepare import settle
 from flarewright.render.render import render
@@ -184,6 +185,30 @@ def test_the_same_pixels_on_any_number_of_threads():
     )
     one, four = (picture(wanted, threads=n) for n in (1, 4))
     assert np.array_equal(one, four)
+
+
+def test_the_next_picture_of_an_iris_finds_its_patterns_and_looks_the_same(monkeypatch):
+    """A hand moves the light: patterns are made once, whatever was drawn before."""
+    lens = {"lens": "canon-28-80", "f_number": 8.0, "camera": Camera(size_px=(192, 108))}
+    quality = Quality(mode="final", wavelengths=3, ringing="collins")
+    here, there = (
+        Project(**lens, iris=Iris(blades=8), lights=(Light(field_deg=place),), quality=quality)
+        for place in ((9.0, 5.0), (10.0, 4.0))
+    )
+    monkeypatch.setattr(last_of, "_LAST", last_of._Last())
+    alone = render(there).layers[0].pixels
+    first = last_of._LAST.held
+    render(there)
+    assert last_of._LAST.held is first
+    # another iris has another pattern, and so has a stop of another size
+    for changed in ({"iris": Iris(blades=6)}, {"f_number": 11.0}):
+        render(here.replace(**changed))
+        assert last_of._LAST.held is not first
+        first = last_of._LAST.held
+    made = render(here).layers[0].pixels
+    after = render(there).layers[0].pixels
+    assert np.array_equal(after, alone)
+    assert not np.array_equal(after, made)
 
 
 def test_dirt_in_ghosts_diffracts_too():

@@ -6,6 +6,7 @@ import asyncio
 import json
 from typing import Any
 
+from starlette.concurrency import run_in_threadpool
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from .hand import Hand
@@ -26,7 +27,8 @@ class Desk:
         self.screen.idle = self.hand.prepare
         # the page whose hand moved last
         self.followed: WebSocket | None = None
-        self._tabs: set[asyncio.Queue[dict[str, Any]]] = set()
+        # of each tab how much room it has for a picture, as far as it has told
+        self._tabs: dict[asyncio.Queue[dict[str, Any]], tuple[int, int]] = {}
         self._loop: asyncio.AbstractEventLoop | None = None
         session.listeners.append(self._heard)
 
@@ -51,18 +53,21 @@ class Desk:
         self._loop = asyncio.get_running_loop()
         await socket.accept()
         tab: asyncio.Queue[dict[str, Any]] = asyncio.Queue()
-        self._tabs.add(tab)
+        self._tabs[tab] = (0, 0)
         if self.greeting:
             tab.put_nowait({"type": "message", "kind": "info", "text": self.greeting})
             self.greeting = ""
         sender = asyncio.create_task(_send(socket, tab))
         try:
             while True:
-                await socket.receive_text()
-        except WebSocketDisconnect:
+                width, height = json.loads(await socket.receive_text())["room"]
+                self._tabs[tab] = (int(width), int(height))
+                # the largest page has the say
+                await run_in_threadpool(self.screen.make_room, max(self._tabs.values()))
+        except (WebSocketDisconnect, ValueError, KeyError, TypeError):
             pass
         finally:
-            self._tabs.discard(tab)
+            del self._tabs[tab]
             sender.cancel()
 
     def state(self) -> dict[str, Any]:

@@ -17,6 +17,7 @@ from ..render.display import view_sum
 from ..render.moving import Sheet, Still, moving_picture
 from . import studio
 from .edit_wishes import target_project
+from .ladder import levels_at
 from .screen import Screen, pixels_of_picture
 from .shown import jpeg
 from .studio import Picture
@@ -148,7 +149,7 @@ class Hand:
             self._drawn(project, self.screen.session.view)
 
     def _drawn(self, project: Project, view: View) -> Picture | Still:
-        scale, levels = SCALES[self._scale], self.screen.match.levels
+        scale, levels = SCALES[self._scale], levels_at(self.screen.match, project)
         if not view.grey and not view.unclipped:
             still = moving_picture(studio.moving_stage(project, scale, levels), self._sheets)
             if still is not None:

@@ -54,6 +54,8 @@ class Screen:
         self.number = 0
         # the picture as it is sent, of this number
         self.packed: tuple[int, bytes] = (-1, b"")
+        # pixels that the page has for a picture
+        self.room = (studio.WIDEST, studio.HIGHEST)
         # what a hand was shown last, until a picture of the screen's own takes its place
         self.moved: Project | None = None
         # called when all is drawn and measured
@@ -189,6 +191,15 @@ class Screen:
                 self._work(project, view, check)
 
             self._lane.submit(work)
+
+    def make_room(self, room: tuple[int, int]) -> None:
+        """Draw pictures that rest as large as the page shows them; one that is larger already stays."""
+        with self.session.lock:
+            self.room = room
+            # what a hand lets go of is drawn anew as it is
+            if self.picture is not None and self.moved is None and not studio.is_as_large(self.picture, room):
+                self._busy = None
+                self._heard({"type": "changed"})
 
     def rest(self) -> None:
         """Go on with the final picture after a drag that changed nothing."""

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from ..model import Project
 from . import studio
 from .jobs import Check
+from .ladder import levels_at, measured, missing, with_rung
 from .seen import Seen, see
 from .studio import Match, Picture
 from .view import View
@@ -41,6 +42,15 @@ def sharpen(screen: Screen, project: Project, view: View, check: Check) -> None:
         Raises when something newer waits.
     """
     shown = screen.picture
+    if shown is not None and _stands(screen, shown, project, view):
+        _enlarge(screen, shown, view, check)
+        # a hand may have ended that
+        _climb(screen, project, check)
+    else:
+        _sharpen(screen, shown, project, view, check)
+
+
+def _sharpen(screen: Screen, shown: Picture | None, project: Project, view: View, check: Check) -> None:
     # another lens has an exposure of its own; while one is worked on it is held, so that brightness can be compared
     if shown is None and view.found_stops is not None:
         screen.match = Match(exposure_stops=view.found_stops)
@@ -51,8 +61,11 @@ def sharpen(screen: Screen, project: Project, view: View, check: Check) -> None:
     working = view.grey or view.unclipped
     followed = screen.moved is not None and studio.same_scene(screen.moved, project)
     draft: Picture | None = None
+    levels: studio.Levels = ()
     if changed or working or (screen.final_s > SOON_S and not followed):
-        draft = studio.take(project, "draft", view, levels=() if changed else screen.match.levels)
+        room = screen.room if working else None
+        levels = () if changed else levels_at(screen.match, project)
+        draft = studio.take(project, "draft", view, room=room, levels=levels)
         check()
         if other and shown is not None and screen.exposed:
             screen.leave(studio.pictured(shown.project))
@@ -65,7 +78,7 @@ def sharpen(screen: Screen, project: Project, view: View, check: Check) -> None:
             plain = studio.take(project, "draft", View()) if draft.grey else draft
             screen.match = Match(exposure_stops=_exposure(screen, plain))
         elif changed:
-            screen.match = replace(screen.match, levels=())
+            screen.match = replace(screen.match, levels=(), lights=(), ladder=None)
         if draft.grey and (fresh or shown is None or not shown.grey):
             stops = studio.exposure_of(draft, Match()) - screen.match.exposure_stops
             screen.match = replace(screen.match, grey=2.0**stops)
@@ -76,20 +89,7 @@ def sharpen(screen: Screen, project: Project, view: View, check: Check) -> None:
             _show_soon(screen, project, view, check)
         if seen_first:
             _look(screen, project, "final", check)
-        final = studio.take(project, "final", view, progress=_progress(screen, "final picture", check))
-        check()
-        screen.final_s = final.seconds
-        if fresh:
-            screen.match = replace(screen.match, exposure_stops=_exposure(screen, final))
-            if screen.exposed:
-                screen.session.remember(screen.match.exposure_stops)
-        screen.show(final)
-        if draft is None:
-            # for the next hand; the picture does not wait for it
-            draft = studio.take(project, "draft", view, levels=screen.match.levels)
-            check()
-        screen.match = studio.matched(draft, final, screen.match)
-        screen.session.tell({"type": "matched"})
+        _show_final(screen, project, view, (draft, levels), fresh, check)
     if not seen_first:
         _look(screen, project, "draft" if working else "final", check)
     if not working and screen.seen is not None:
@@ -97,6 +97,8 @@ def sharpen(screen: Screen, project: Project, view: View, check: Check) -> None:
     check()
     if screen.idle is not None:
         screen.idle()
+    if not working:
+        _climb(screen, project, check)
 
 
 def _exposure(screen: Screen, picture: Picture) -> float:
@@ -107,9 +109,56 @@ def _exposure(screen: Screen, picture: Picture) -> float:
 
 def _show_soon(screen: Screen, project: Project, view: View, check: Check) -> None:
     """Trace a project as well as a screen can show it, unless something newer waits by then."""
-    soon = studio.take(project, "soon", view, progress=_progress(screen, "traced picture", check))
+    progress = _progress(screen, "traced picture", check)
+    soon = studio.take(project, "soon", view, room=screen.room, progress=progress)
     check()
     screen.show(soon)
+
+
+def _show_final(
+    screen: Screen, project: Project, view: View, drafted: tuple[Picture | None, studio.Levels], fresh: bool,
+    check: Check,
+) -> None:  # fmt: skip
+    """Trace a project in full, and learn from it how bright drafts shall be."""
+    draft, levels = drafted
+    final = _final(screen, project, view, check)
+    check()
+    screen.final_s = final.seconds
+    if fresh:
+        screen.match = replace(screen.match, exposure_stops=_exposure(screen, final))
+        if screen.exposed:
+            screen.session.remember(screen.match.exposure_stops)
+    screen.show(final)
+    if draft is None:
+        # for the next hand; the picture does not wait for it
+        levels = levels_at(screen.match, project)
+        draft = studio.take(project, "draft", view, levels=levels)
+        check()
+    screen.match = studio.matched(draft, final, screen.match, levels)
+    screen.session.tell({"type": "matched"})
+
+
+def _final(screen: Screen, project: Project, view: View, check: Check) -> Picture:
+    return studio.take(
+        project, "final", view, room=screen.room, progress=_progress(screen, "final picture", check)
+    )  # fmt: skip
+
+
+def _stands(screen: Screen, shown: Picture, project: Project, view: View) -> bool:
+    """Tell whether all is drawn and measured already: a hand came back, or the page has another size."""
+    if view.grey or view.unclipped or shown.grade != "final" or screen.seen is None:
+        return False
+    now = studio.pictured(project)
+    return studio.pictured(shown.project) == now == studio.pictured(screen.seen.project)
+
+
+def _enlarge(screen: Screen, shown: Picture, view: View, check: Check) -> None:
+    """Show the final picture once more, as large as the page has room for."""
+    if not studio.is_as_large(shown, screen.room):
+        shown = _final(screen, shown.project, view, check)
+        check()
+        screen.final_s = shown.seconds
+    screen.show(shown)
 
 
 def _look(screen: Screen, project: Project, grade: studio.Grade, check: Check) -> None:
@@ -127,8 +176,16 @@ def _match_ghosts(screen: Screen, project: Project, view: View, seen: Seen, chec
     check()
     final = screen.picture
     if final is not None:
-        screen.match = replace(studio.matched(draft, final, screen.match), levels=levels)
+        screen.match = studio.matched(draft, final, screen.match, levels)
         screen.session.tell({"type": "matched"})
+
+
+def _climb(screen: Screen, project: Project, check: Check) -> None:
+    """Learn, while nothing else is to be done, how bright ghosts shall be wherever a hand takes the light."""
+    for angle in missing(screen.match.ladder, project):
+        rung = measured(project, angle, check)
+        check()
+        screen.match = replace(screen.match, ladder=with_rung(screen.match.ladder, rung))
 
 
 def _progress(screen: Screen, what: str, check: Check) -> Any:

@@ -17,7 +17,7 @@ from .history import History, before_mask, design_before_added, design_before_sc
 from .screen import Screen
 from .shown import FALSE_COLOURS, aces_available
 from .solving import Solver
-from .studio import pictured, same_ghosts, view_size
+from .studio import pictured, rest_size, same_ghosts, view_size
 
 
 def state_of(screen: Screen, solver: Solver) -> dict[str, Any]:
@@ -61,7 +61,11 @@ def state_of(screen: Screen, solver: Solver) -> dict[str, Any]:
         "by_hand": len(project.art.rules) + len(project.art.gain),
         "design": _design(project, history),
         "view": session.view.model_dump(mode="json") | {"stops": round(screen.exposure_stops, 2)},
-        "frame": {"size": list(view_size(project)), "sensor": list(project.camera.sensor)},
+        "frame": {
+            "size": list(view_size(project)),
+            "full": list(rest_size(project, project.camera.size_px)),
+            "sensor": list(project.camera.sensor),
+        },
         "picture": _picture(screen),
         "remarks": list(shown.remarks) if shown is not None else [],
         "solve": solve_of(solver),

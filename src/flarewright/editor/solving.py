@@ -31,12 +31,14 @@ from .edit_wishes import clear_wishes, wish_names
 from .jobs import Check, Lane
 from .session import Session
 from .shown import jpeg, pixels_of
-from .studio import Grade, exposure_of, light_of, take
+from .studio import Grade, exposure_of, is_dark, light_of, take
 from .studio import Match as Held
 from .view import View
 
 CANDIDATES = 5
 LOOK_EVERY_S = 1.0
+# part of the time in which lenses are finished with traced rays
+FINISHING = 0.25
 THUMB_SCALE = 0.4
 # of a ghost's place or size
 UNSEEN_MM = 1e-3
@@ -44,6 +46,7 @@ UNSEEN_MM = 1e-3
 UNSEEN_COLOR, NEAR_COLOR = 0.02, 0.1
 
 GETTING_READY = "Getting ready; the first search of a machine takes a minute more"
+UNSEEN = "drawn by matrices, for no traced ray of its ghosts comes to the picture at this angle"
 HOW_WELL = {"met": "met", "nearly": "nearly met"}
 # a wish as messages of design count it
 _COUNTED = re.compile(r"design\.wishes\[(\d+)\]|\bwish (\d+)\b")
@@ -229,9 +232,11 @@ class Solver:
             best = self._found(project, problem, state, 1, name, stop.is_set)
             self._tell(True, "Searching", state.seconds, best)
 
-        state = solve(problem, time_limit=seconds, progress=look, cancelled=stop.is_set)
+        rest = FINISHING * seconds
+        state = solve(problem, time_limit=seconds - rest, progress=look, cancelled=stop.is_set)
         over = until(seconds - state.seconds, stop.is_set)
-        found = self._found(project, problem, state, CANDIDATES, name, over)
+        # how well they do is told by traced rays, as they are drawn: far off the axis matrices flatter
+        found = self._found(project, replace(problem, traced=True), state, CANDIDATES, name, over)
         told = f"{len(found)} lenses of {state.searches} tries" if found else "No lens was found; search longer"
         proven = obstacles(problem, project)
         if proven:
@@ -392,7 +397,9 @@ def judged(one: Outcome, problem: Problem) -> str:
     ghost = target if target.startswith("wish") else f"ghost {target}"
     words = HOW_WELL.get(verdict(one), "not met")
     # what nobody can see is rounding, not an error
-    return words if _worst(one) < UNSEEN_MM else f"{words}, {ghost} is farthest off, by {_worst(one):.3g} mm"
+    told = words if _worst(one) < UNSEEN_MM else f"{words}, {ghost} is farthest off, by {_worst(one):.3g} mm"
+    gone = ", ".join(name if name.startswith("wish") else f"ghost {name}" for name in one.lost)
+    return f"{told}; too few rays make {gone}" if gone else told
 
 
 def _worst(one: Outcome) -> float:
@@ -414,6 +421,9 @@ def _drawn(found: Found, project: Project, seeing: Seeing, grade: Grade, check: 
         if found.picture:
             return found
         raise
+    if found.picture and is_dark(picture):
+        # a black picture tells nothing: that of before stays, and what it is worth is said
+        return replace(found, words=f"{found.words}; {UNSEEN}")
     # another lens is shown at an exposure of its own, as it will be
     stops = seeing.held_stops if taken.lens == project.lens else None
     chosen = seeing.view.exposure_stops

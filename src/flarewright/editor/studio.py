@@ -6,15 +6,15 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from math import log
-from typing import Literal
+from math import log, sqrt
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import FlarewrightError
 from ..io.library import lens_path
-from ..model import Art, Layer, Lens, Output, Project, Quality, Rule
+from ..model import Art, Layer, Lens, Light, Output, Project, Quality, Rule
 from ..render.display import auto_exposure
 from ..render.edge_rings import untabled
 from ..render.prepare import load_lens
@@ -22,12 +22,17 @@ from ..render.render import render
 from ..render.working import working_ghosts
 from .view import View
 
+if TYPE_CHECKING:
+    from .ladder import Ladder
+
 Floats = NDArray[np.float32]
 Grade = Literal["moving", "draft", "soon", "final", "working"]
 Levels = tuple[tuple[float, tuple[str, ...]], ...]
 
 # the viewport's picture fits into this
 WIDEST, HIGHEST = 960, 540
+# where it rests it is as large as a page shows it, and has no more pixels than this
+MOST_PX = 1920 * 1080
 DRAFT_WAVELENGTHS = 3
 # and those of a first traced picture, for eight bits; coatings tell the colours between them
 SOON_WAVELENGTHS = 5
@@ -83,7 +88,26 @@ def view_size(project: Project, scale: float = 1.0) -> tuple[int, int]:
     return max(16, round(width * zoom)), max(16, round(height * zoom))
 
 
-def staged(project: Project, grade: Grade, scale: float = 1.0) -> Project:
+def rest_size(project: Project, room: tuple[int, int]) -> tuple[int, int]:
+    """Return the size of a picture that rests: as large as it is seen, as its file and `MOST_PX` allow.
+
+    Parameters
+    ----------
+    project : Project
+    room : tuple of int
+        Pixels of the screen that its frame covers.
+
+    Returns
+    -------
+    tuple of int
+        No less than `view_size`, which is what a moving hand is shown.
+    """
+    width, height = project.camera.size_px
+    zoom = min(room[0] / width, room[1] / height, sqrt(MOST_PX / (width * height)), 1.0)
+    return max(view_size(project), (round(width * zoom), round(height * zoom)))
+
+
+def staged(project: Project, grade: Grade, scale: float = 1.0, room: tuple[int, int] | None = None) -> Project:
     """Return the project as the viewport draws it: its frame at another size, its quality as far as is needed.
 
     Parameters
@@ -92,6 +116,8 @@ def staged(project: Project, grade: Grade, scale: float = 1.0) -> Project:
     grade : {"moving", "draft", "soon", "final", "working"}
     scale : float
         Of the picture's sides.
+    room : tuple of int, optional
+        As of `rest_size`, of a picture that rests.
 
     Returns
     -------
@@ -99,7 +125,8 @@ def staged(project: Project, grade: Grade, scale: float = 1.0) -> Project:
     """
     if isinstance(project.lens, str):
         project = project.replace(lens=_loaded(project.lens, lens_path(project.lens).stat().st_mtime_ns))
-    camera = project.camera.replace(size_px=view_size(project, scale), sensor_mm=project.camera.sensor)
+    size = view_size(project, scale) if room is None else rest_size(project, room)
+    camera = project.camera.replace(size_px=size, sensor_mm=project.camera.sensor)
     own = project.quality
     if grade in ("soon", "final"):
         # reference quality is for files: it never ends
@@ -138,6 +165,7 @@ def take(
     look: View,
     *,
     scale: float = 1.0,
+    room: tuple[int, int] | None = None,
     levels: Levels = (),
     progress: Callable[[float, str], None] | None = None,
 ) -> Picture:
@@ -149,7 +177,8 @@ def take(
     grade : {"moving", "draft", "soon", "final", "working"}
         "working" draws what `look` asks for by `working_ghosts`.
     look : View
-    scale : float
+    scale, room
+        As of `staged`.
     levels : Levels
         `Match.levels` of a draft.
     progress : callable, optional
@@ -165,7 +194,7 @@ def take(
         When the project cannot be rendered.
     """
     begun = time.perf_counter()
-    stage = staged(project, grade, scale)
+    stage = staged(project, grade, scale, room)
     size = stage.camera.size_px
     if look.grey or look.unclipped:
         layer = working_ghosts(stage, grey=look.grey, unclipped=look.unclipped)
@@ -208,6 +237,10 @@ class Match:
     ----------
     levels : tuple of (float, names)
         Gains of single ghosts, alike ones together.
+    lights : tuple of Light
+        Where `levels` and `gain` were learned.
+    ladder : Ladder or None
+        What is known of other places (`ladder.levels_at`).
     gain : tuple of float
         Of a draft's ghosts, R, G, B.
     exposure_stops : float
@@ -220,9 +253,11 @@ class Match:
     exposure_stops: float = 0.0
     grey: float = 1.0
     levels: Levels = ()
+    lights: tuple[Light, ...] = ()
+    ladder: Ladder | None = None
 
 
-def matched(draft: Picture | None, final: Picture, held: Match) -> Match:
+def matched(draft: Picture | None, final: Picture, held: Match, levels: Levels | None = None) -> Match:
     """Compare a draft with the final picture of the same project.
 
     Parameters
@@ -231,6 +266,8 @@ def matched(draft: Picture | None, final: Picture, held: Match) -> Match:
     final : Picture
     held : Match
         What holds until now; kept where there is nothing to compare.
+    levels : Levels, optional
+        That the draft was drawn with; None: those that hold.
 
     Returns
     -------
@@ -242,7 +279,8 @@ def matched(draft: Picture | None, final: Picture, held: Match) -> Match:
     if min(ours.min(), theirs.min()) <= 0.0:
         return held
     red, green, blue = (float(gain) for gain in np.clip(theirs / ours, 0.02, 4.0))
-    return replace(held, gain=(red, green, blue))
+    levels = held.levels if levels is None else levels
+    return replace(held, gain=(red, green, blue), levels=levels, lights=final.project.lights)
 
 
 def levels_of(drafted: Mapping[str, float], final: Mapping[str, float]) -> Levels:
@@ -278,6 +316,12 @@ def _levelled(art: Art, levels: Levels) -> Art:
 def exposure_of(picture: Picture, match: Match | None = None) -> float:
     """Find an exposure that shows the ghosts of a picture."""
     return auto_exposure(ghosts_of(picture, match or Match()))
+
+
+def is_as_large(picture: Picture, room: tuple[int, int]) -> bool:
+    """Tell whether a picture has all the pixels that it could have where a page has so much room (`rest_size`)."""
+    height, width = picture.ghosts.shape[:2]
+    return (width, height) >= rest_size(picture.project, room)
 
 
 def is_dark(picture: Picture) -> bool:

@@ -23,7 +23,8 @@ LOOKED_AT = 6
 def target_jpeg(screen: Screen) -> bytes:
     """Draw the fictional target: the picture as the wishes would have it."""
     project = screen.session.project
-    return packed_target(screen, project, studio.take(target_project(project), "draft", screen.session.view), QUALITY)
+    drawn = studio.take(target_project(project), "draft", screen.session.view, room=screen.room)
+    return packed_target(screen, project, drawn, QUALITY)
 
 
 def packed_target(screen: Screen, project: Project, drawn: Picture, quality: int) -> bytes:

@@ -120,9 +120,9 @@ def render(
         dirty = soiled_opening(opening, settled.order.stop_semi_diameter, soil)
         seen = tuple(replace(shot, opening=dirty) for shot in shots)
     if project.quality.ringing != "off" and project.quality.mode == "final":
-        from .ringing import Ringing
+        from .ringing import ringing_for
 
-        rings = Ringing(
+        rings = ringing_for(
             project.quality.ringing, seen[0].opening, settled.order.stop_semi_diameter, settled.order.f_number
         )
         seen = tuple(replace(shot, ringing=rings) for shot in seen)

@@ -448,7 +448,7 @@ addEventListener('keydown', (event) => {
   if (event.key === ' ' && onPage) { event.preventDefault(); app.view.space = true; return; }
   const looks = ['srgb', 'filmic', ...(app.state.aces ? ['aces'] : []), 'false-colour'];
   const work = {
-    f: () => app.view.fit(), z: () => app.view.fit(app.state.frame.size[0] / app.view.frame().w * app.view.zoom / (devicePixelRatio || 1)), a: () => app.ask('/api/expose'),
+    f: () => app.view.fit(), z: () => app.view.fit(app.state.frame.full[0] / app.view.frame().w * app.view.zoom / (devicePixelRatio || 1)), a: () => app.ask('/api/expose'),
     '+': () => app.setView({ exposure_stops: view.stops + 0.5 }), '=': () => app.setView({ exposure_stops: view.stops + 0.5 }), '-': () => app.setView({ exposure_stops: view.stops - 0.5 }),
     v: () => app.setView({ look: looks[(looks.indexOf(view.look) + 1) % looks.length] }), g: () => app.setView({ grey: !view.grey }),
     e: () => app.setView({ unclipped: !view.unclipped }), h: () => app.setView({ safe_frame: !view.safe_frame }),
@@ -484,7 +484,8 @@ addEventListener('drop', async (event) => {
 // ---------------------------------------------------------------------------------------------------------- listening
 function listen() {
   const socket = new WebSocket(`${location.protocol === 'https:' ? 'wss' : 'ws'}://${location.host}/ws`);
-  socket.onopen = () => { hush('lost'); if (listen.lost) { toast('The editor is back.', 'good'); listen.lost = false; app.state = null; app.view.shownNumber = -1; } reload(); loadGhosts(); };
+  app.tell = (words) => { if (socket.readyState === WebSocket.OPEN) socket.send(JSON.stringify(words)); };
+  socket.onopen = () => { if (app.view.room) app.tell({ room: app.view.room }); hush('lost'); if (listen.lost) { toast('The editor is back.', 'good'); listen.lost = false; app.state = null; app.view.shownNumber = -1; } reload(); loadGhosts(); };
   socket.onmessage = (message) => hear(JSON.parse(message.data));
   socket.onclose = () => {
     if (!listen.lost) toast(LOST, 'error', Infinity, 'lost');

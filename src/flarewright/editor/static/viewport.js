@@ -15,6 +15,8 @@ const TARGET = 'target, by matrices';
 const FOLLOW_MS = 160;
 const FOLLOW_PART = 6;
 const FOLLOW_MOST_MS = 400;
+// a window that changes its size, or a wheel that zooms, is waited for
+const ROOM_MS = 250;
 
 export function viewport(canvas, app) {
   const hint = document.getElementById('hint');
@@ -26,6 +28,7 @@ export function viewport(canvas, app) {
   let wanted = false;
   // where words stand in the picture that is being drawn
   let taken = null;
+  let telling = 0;
 
   // ------------------------------------------------------------------------------------------------------ geometry
   const box = () => ({ w: canvas.clientWidth, h: canvas.clientHeight });
@@ -115,7 +118,16 @@ export function viewport(canvas, app) {
       lights();
     });
     if (app.state.view.look === 'false-colour') legend(w);
+    tellRoom(f, ratio);
     if (self.measure) { self.measure(now); }
+  }
+  // A picture that rests is drawn with the pixels that it has on the screen.
+  function tellRoom(f, ratio) {
+    const room = [f.w, f.h].map((side) => Math.round(side * ratio));
+    if (String(room) === String(self.room)) return;
+    self.room = room;
+    clearTimeout(telling);
+    telling = setTimeout(() => app.tell({ room: self.room }), ROOM_MS);
   }
   // Nothing of one half spills over into the other.
   function within(from, to, paint) {
