@@ -24,6 +24,7 @@ from ..design.report import verdict
 from ..design.search import State, solve
 from ..design.target import problem_of
 from ..errors import FlarewrightError, ProjectError
+from ..io.sentences import count
 from ..model import AsLens, CoatingChoice, Design, Everywhere, Lens, PerRow, Project, Surface
 from ..optics.pack import resolve_coatings
 from ..render.prepare import as_lens, first_order, settle
@@ -239,7 +240,11 @@ class Solver:
         state = solve(problem, time_limit=seconds - rest, progress=look, cancelled=stop.is_set)
         over = until(seconds - state.seconds, stop.is_set)
         found = self._found(project, finished, state, CANDIDATES, name, over)
-        told = f"{len(found)} lenses of {state.searches} tries" if found else "No lens was found; search longer"
+        told = (
+            f"{count(len(found), 'lens', 'lenses')} of {state.searches} tries"
+            if found
+            else "No lens was found; search longer"
+        )
         proven = obstacles(problem, project)
         if proven:
             why = " ".join(f"{one.target}: {one.reason}" for one in proven)
