@@ -155,3 +155,13 @@ def download(tab, entry, path):
         tab.page.click(f"[role=menuitem]:has-text('{entry}')")
     waiting.value.save_as(path)
     return path
+
+
+def drop(tab, name, data):
+    """Drop a file on the page, as the system's file manager does."""
+    tab.page.evaluate(
+        "([name, bytes]) => { const box = new DataTransfer();"
+        "box.items.add(new File([new Uint8Array(bytes)], name));"
+        "document.body.dispatchEvent(new DragEvent('drop', {dataTransfer: box, bubbles: true, cancelable: true})); }",
+        [name, list(data)],
+    )

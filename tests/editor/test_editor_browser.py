@@ -18,7 +18,7 @@ from flarewright.render.render import render
 pytest.importorskip("playwright", reason="the extra e2e is not installed")
 pytest.importorskip("starlette", reason="the extra ui is not installed")
 
-from chromium import Tab, chromium, download
+from chromium import Tab, chromium, download, drop
 
 pytestmark = [
     pytest.mark.browser,
@@ -356,16 +356,6 @@ def test_import_export_and_a_wrong_file(tab, tmp_path):
 
 def told(words):
     return f"[...document.querySelectorAll('.toast')].some(t => t.textContent.includes({json.dumps(words)}))"
-
-
-def drop(tab, name, data):
-    """Drop a file on the page, as the system's file manager does."""
-    tab.page.evaluate(
-        "([name, bytes]) => { const box = new DataTransfer();"
-        "box.items.add(new File([new Uint8Array(bytes)], name));"
-        "document.body.dispatchEvent(new DragEvent('drop', {dataTransfer: box, bubbles: true, cancelable: true})); }",
-        [name, list(data)],
-    )
 
 
 def test_the_exported_exr_is_a_render_of_the_project(tab, tmp_path):

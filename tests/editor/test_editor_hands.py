@@ -11,7 +11,7 @@ from flarewright.io.project_file import read_project
 pytest.importorskip("playwright", reason="the extra e2e is not installed")
 pytest.importorskip("starlette", reason="the extra ui is not installed")
 
-from chromium import chromium, download
+from chromium import chromium, download, drop
 
 pytestmark = [
     pytest.mark.browser,
@@ -270,3 +270,32 @@ def test_a_large_page_shows_a_sharp_picture(tab):
     tab.page.keyboard.press("z")
     tab.until("flarewright.view.image.width === 1920")
     assert tab.js("Math.round(flarewright.view.frame().w * devicePixelRatio)") == 1920
+
+
+def doublet(name):
+    """Return a lens of a format whose repairs are told."""
+    rows = [("0.01627", "6", "N-BK7"), ("-0.0224", "2.5", "SF5"), ("-0.0077", "90", "")]
+    lines = ["MODE SEQ", f"NAME {name}", "UNIT MM", "ENPD 20", "SURF 0", "  DISZ INFINITY"]
+    for number, (curvature, gap, glass) in enumerate(rows, start=1):
+        lines += [f"SURF {number}", f"  CURV {curvature}", f"  DISZ {gap}", "  DIAM 12.5 1"]
+        lines += ["  STOP"] * (number == 1) + [f"  GLAS {glass}"] * bool(glass)
+    return "\n".join([*lines, "SURF 4", "  DISZ 0"])
+
+
+def test_what_was_noticed_in_a_file_goes_with_it_and_words_are_no_files(tab):
+    """Notes of the file before had covered the light, and dragging their words had opened the sheet for files."""
+    for name in ("one", "two"):
+        drop(tab, f"{name}.zmx", doublet(name).encode())
+        tab.until(f"flarewright.state.lens.name === '{name}'")
+        tab.until("document.querySelector('.toast[data-about=noticed]')")
+    tab.rest()
+    assert tab.js("document.querySelectorAll('.toast[data-about=noticed]').length") == 1
+    assert tab.js("[...document.querySelectorAll('.toast[data-about=opened]')].map(each => each.textContent)") == [
+        "Opened two.zmx"
+    ]
+    note = tab.page.locator(".toast[data-about=noticed] li").first
+    box = note.bounding_box()
+    tab.js("getSelection().selectAllChildren(document.querySelector('.toast[data-about=noticed]'))")
+    x, y = box["x"] + 12, box["y"] + 8
+    tab.drag((x, y), (x - 150, y - 60), hold_ms=40)
+    assert tab.js("document.getElementById('drop').hidden")

@@ -13,6 +13,7 @@ from PIL import Image
 from flarewright.editor import studio
 from flarewright.editor.drawings import section
 from flarewright.editor.edit_shot import move_light
+from flarewright.editor.edit_wishes import target_project
 from flarewright.editor.files import project_for_lens, save_project
 from flarewright.editor.hand import Hand
 from flarewright.editor.ladder import levels_at, measured, missing, with_rung
@@ -501,6 +502,27 @@ def test_the_target_follows_a_hand_and_is_that_of_its_place(project):
         assert np.abs(pixels(draft) - pixels(there)).mean() < 1.0
         assert np.abs(pixels(draft) - pixels(before)).mean() > 4.0
     assert [Image.open(io.BytesIO(each)).width for each in (*drafts, there)] == [480, 960, 960]
+    assert screen.wait(60.0)
+
+
+def test_the_target_is_as_bright_as_the_picture_and_from_scratch_has_new_ghosts_alone():
+    session, _ = begin(None)
+    session.do("choose_lens", {"lens": "flektogon-35"})
+    screen = Screen(session)
+    screen.start()
+    assert screen.wait(60.0)
+
+    def mean(data):
+        return float(np.asarray(Image.open(io.BytesIO(data)).convert("L"), dtype=float).mean())
+
+    assert mean(target_jpeg(screen)) == pytest.approx(mean(packed(screen)), rel=0.1)
+    session.do("add_ghost", {"place_mm": -6.0, "radius_mm": 2.0})
+    both = mean(target_jpeg(screen))
+    session.do("set_design", {"values": {"own_ghosts": False, "structure": "any"}})
+    # the lens' own had stayed, though nothing is searched for them
+    rules = target_project(session.project).art.rules
+    assert [(rule.select, rule.enable) for rule in rules] == [("all", False)]
+    assert 1.0 < mean(target_jpeg(screen)) < 0.7 * both
     assert screen.wait(60.0)
 
 

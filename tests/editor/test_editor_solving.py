@@ -248,6 +248,13 @@ def test_from_scratch_is_judged_by_traced_rays(project, monkeypatch):
     assert asked == [True]
     (one,) = solver.progress.found
     assert "; not met; too few rays make added ghost 2" in one.words
+    # what is wished of a lens' own ghosts is told as the target is drawn
+    wishes = (GhostWish(ghost="8-6", move_mm=1.0),)
+    names[:] = ["8-6", "wish 0"]
+    solver.session.project = project.replace(design=Design(wishes=wishes))
+    solver.start(0.1)
+    solver._thread.join(60.0)
+    assert asked == [True, False]
 
 
 def test_a_lens_that_stays_black_says_so(project, monkeypatch):

@@ -149,7 +149,8 @@ def target_project(project: Project) -> Project:
     if design is None:
         return bare
     x, y = direction(project)
-    rules = []
+    # from scratch only those count that are new
+    rules = [] if design.own_ghosts else [Rule(select="all", enable=False)]
     for wish in design.wishes:
         if wish.ghost is None or wish.action == "ignore":
             continue

@@ -129,11 +129,12 @@ class Hand:
             project = moved(session.project)
             view, scale = session.view, 1.0 if held else TARGET_SCALE
             bare = target_project(project)
-            still = None
+            still, levels = None, levels_at(self.screen.match, project)
             if not view.grey and not view.unclipped:
-                still = moving_picture(studio.moving_stage(bare, scale, ()), (*self._target_sheets, *self._sheets))
+                stage = studio.moving_stage(bare, scale, levels)
+                still = moving_picture(stage, (*self._target_sheets, *self._sheets))
             if still is None:
-                drawn = studio.take(bare, "moving", view, scale=scale)
+                drawn = studio.take(bare, "moving", view, scale=scale, levels=levels)
             else:
                 self._target_sheets = still.sheets
                 drawn = Picture(bare, "moving", still.ghosts, still.rest, 0.0)

@@ -24,6 +24,7 @@ from ..design.report import verdict
 from ..design.search import State, solve
 from ..design.target import problem_of
 from ..errors import FlarewrightError, ProjectError
+from ..io.sentences import count
 from ..model import AsLens, CoatingChoice, Design, Everywhere, Lens, PerRow, Project, Surface
 from ..optics.pack import resolve_coatings
 from ..render.prepare import as_lens, first_order, settle
@@ -232,12 +233,18 @@ class Solver:
             best = self._found(project, problem, state, 1, name, stop.is_set)
             self._tell(True, "Searching", state.seconds, best)
 
-        rest = FINISHING * seconds
+        # places that a person has chosen are those of rays; a lens' own ghosts are compared as matrices have both
+        scratch = project.design is not None and not project.design.own_ghosts
+        finished = replace(problem, traced=problem.traced or scratch)
+        rest = FINISHING * seconds if finished.traced else 0.0
         state = solve(problem, time_limit=seconds - rest, progress=look, cancelled=stop.is_set)
         over = until(seconds - state.seconds, stop.is_set)
-        # how well they do is told by traced rays, as they are drawn: far off the axis matrices flatter
-        found = self._found(project, replace(problem, traced=True), state, CANDIDATES, name, over)
-        told = f"{len(found)} lenses of {state.searches} tries" if found else "No lens was found; search longer"
+        found = self._found(project, finished, state, CANDIDATES, name, over)
+        told = (
+            f"{count(len(found), 'lens', 'lenses')} of {state.searches} tries"
+            if found
+            else "No lens was found; search longer"
+        )
         proven = obstacles(problem, project)
         if proven:
             why = " ".join(f"{one.target}: {one.reason}" for one in proven)
@@ -250,8 +257,8 @@ class Solver:
     ) -> tuple[Found, ...]:  # fmt: skip
         best = outcomes(state, problem, count=count, name=f"After {name}", iris=project.iris, over=over)
         out = []
-        # a person judges them by the error that is told
-        for number, one in enumerate(sorted(best, key=_worst), 1):
+        # a person judges them by the error that is told, and most by ghosts that are not there
+        for number, one in enumerate(sorted(best, key=lambda one: (len(one.lost), _worst(one))), 1):
             lens = one.lens.replace(name=f"After {name} {number}")
             coating = _kept(project, lens)
             bare = "" if coating is not None else "; without the coatings, which do not fit it"

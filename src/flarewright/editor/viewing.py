@@ -10,6 +10,7 @@ from ..model import Project
 from . import studio
 from .edit_ghosts import is_shown
 from .edit_wishes import new_discs, target_project
+from .ladder import levels_at
 from .screen import QUALITY, Screen, pixels_of_picture
 from .seen import alone, is_there, outline, under
 from .shown import jpeg, png
@@ -23,7 +24,9 @@ LOOKED_AT = 6
 def target_jpeg(screen: Screen) -> bytes:
     """Draw the fictional target: the picture as the wishes would have it."""
     project = screen.session.project
-    drawn = studio.take(target_project(project), "draft", screen.session.view, room=screen.room)
+    # its ghosts are as bright as those of the picture beside it
+    levels = levels_at(screen.match, project)
+    drawn = studio.take(target_project(project), "draft", screen.session.view, room=screen.room, levels=levels)
     return packed_target(screen, project, drawn, QUALITY)
 
 

@@ -1,7 +1,7 @@
 // The page: one state from the server, drawn by panels; every change is a deed that the server does or refuses.
 import { LOST, complain, get, inLine, inWords, latest, post, sentence, under } from './api.js';
 import { fitted } from './section.js';
-import { button, dialog, h, hush, menu, stroke, tips, toast, slider } from './ui.js';
+import { button, dialog, forget, h, hush, menu, stroke, tips, toast, slider } from './ui.js';
 import { viewport } from './viewport.js';
 import { coatingPanel } from './panel_coating.js';
 import { ghostPanel } from './panel_ghosts.js';
@@ -465,13 +465,18 @@ addEventListener('keydown', (event) => {
 export async function importFile(file, as = '', light = null) {
   const answer = await app.ask(`/api/import?name=${encodeURIComponent(file.name)}${as ? `&as=${as}` : ''}${light === null ? '' : `&light=${light}`}`, file);
   if (!answer) return;
-  toast(`Opened ${file.name}`, 'good');
+  // what was noticed in the file before is of no use beside this one
+  forget('noticed');
+  toast(`Opened ${file.name}`, 'good', 4500, 'opened');
   // beside the picture, for it must stop nobody
-  if (answer.told?.length) toast(h('ul', { class: 'remarks' }, ...answer.told.map((words) => h('li', {}, sentence(words)))), 'info', 20000);
+  if (answer.told?.length) toast(h('ul', { class: 'remarks' }, ...answer.told.map((words) => h('li', {}, sentence(words)))), 'info', 20000, 'noticed');
 }
 app.importFile = importFile;
 let over = 0;
-addEventListener('dragenter', (event) => { event.preventDefault(); over += 1; $('drop').hidden = false; });
+// files alone are taken: words that are chosen and dragged are none
+const carriesFiles = (event) => [...event.dataTransfer?.types ?? []].includes('Files');
+addEventListener('dragstart', (event) => event.preventDefault());
+addEventListener('dragenter', (event) => { event.preventDefault(); if (!carriesFiles(event)) return; over += 1; $('drop').hidden = false; });
 addEventListener('dragleave', () => { over -= 1; if (over <= 0) $('drop').hidden = true; });
 addEventListener('dragover', (event) => event.preventDefault());
 addEventListener('drop', async (event) => {

@@ -36,6 +36,10 @@ export function toast(text, kind = 'info', lasting = kind === 'error' ? 9000 : 4
 }
 
 // What was refused before has been done by now.
+// What was told of something that is no more goes, whatever kind it was.
+export function forget(about) {
+  for (const each of [...document.getElementById('toasts').children]) if (each.dataset.about === about) each.remove();
+}
 export function hush(about) {
   for (const each of [...document.getElementById('toasts').children]) if (each.dataset.about === about && each.classList.contains('error')) each.remove();
 }
