@@ -87,7 +87,7 @@ def true_ghosts(setup: Setup, pose: Pose, scale: float, sigma: NDArray[np.float3
     """Return the truth of every ghost that noise does not hide, brightest first."""
     images = {name: image[..., 1] for name, image in ghost_layers(setup, pose, scale)}
     total = sum(images.values(), np.zeros(setup.size_px[::-1]))
-    forms = _forms(setup, pose)
+    forms = forms_of(setup, pose)
     found = []
     for name, green in images.items():
         seen = footprint(green)
@@ -100,18 +100,25 @@ def true_ghosts(setup: Setup, pose: Pose, scale: float, sigma: NDArray[np.float3
             continue
         others = (total[inside] - green[inside])[mask] > CROSSING_LIGHT * green[inside][mask]
         fold, cut = forms.get(name, (False, False))
-        at_edge = left == 0 or top == 0 or left + width == setup.size_px[0] or top + height == setup.size_px[1]
+        at_edge = cut_by_frame(seen[0], setup.size_px)
         crossing = bool(others.mean() > CROSSING_PART)
         light = (green[inside][::2, ::2] / level).astype(np.float16)
         found.append(TrueGhost(name, seen[0], mask, light, level, snr, fold, cut, at_edge, crossing))
     return sorted(found, key=lambda one: -one.level)
 
 
-def _forms(setup: Setup, pose: Pose) -> dict[str, tuple[bool, bool]]:
-    """Tell of every path whether it folds, and whether several rims bound it."""
+def cut_by_frame(window: tuple[int, int, int, int], size_px: tuple[int, int]) -> bool:
+    """Tell whether a footprint ends at the border of the picture."""
+    left, top, width, height = window
+    return left == 0 or top == 0 or left + width == size_px[0] or top + height == size_px[1]
+
+
+def forms_of(setup: Setup, pose: Pose) -> dict[str, tuple[bool, bool]]:
+    """Tell of every path, or of the setup's own, whether it folds, and whether several rims bound it."""
     settled = settle(project_of(setup, pose, "passes"))
     shot = make_shots(settled, make_opening(settled, None))[0]
-    return {path.name: form for path in ghost_paths(settled.lens) if (form := _form(shot, path)) is not None}
+    paths = [path for path in ghost_paths(settled.lens) if not setup.paths or path.name in setup.paths]
+    return {path.name: form for path in paths if (form := _form(shot, path)) is not None}
 
 
 def _form(shot: Shot, path: LightPath) -> tuple[bool, bool] | None:
