@@ -131,8 +131,8 @@ class Tab:
             self.page.wait_for_timeout(hold_ms)
         mouse.up()
 
-    def shown(self):
-        """Return the pixels that the page shows, as the canvas holds them: shape (H, W, 3)."""
+    def shown(self, image="flarewright.view.image"):
+        """Return the pixels that the page shows, or of another of its pictures: shape (H, W, 3)."""
         import base64
         import io
 
@@ -140,7 +140,7 @@ class Tab:
         from PIL import Image
 
         data = self.js(
-            "(() => { const i = flarewright.view.image, c = new OffscreenCanvas(i.width, i.height);"
+            f"(() => {{ const i = {image}, c = new OffscreenCanvas(i.width, i.height);"
             "c.getContext('2d').drawImage(i, 0, 0); return c.convertToBlob({type: 'image/png'}).then(b => new Promise("
             "done => { const r = new FileReader(); r.onload = () => done(r.result.split(',')[1]);"
             "r.readAsDataURL(b); })); })()"

@@ -80,9 +80,9 @@ def test_the_light_goes_out_of_the_frame_and_keys_move_it(tab):
 
 
 def test_drafts_do_not_jump_in_brightness(tab):
-    def level():
+    def level(image="flarewright.view.image"):
         # beside the direct image, which moves
-        shown = tab.shown()
+        shown = tab.shown(image)
         return shown[:, : shown.shape[1] * 2 // 5].astype(float).mean()
 
     first = tab.light()
@@ -91,8 +91,12 @@ def test_drafts_do_not_jump_in_brightness(tab):
     mouse.down()
     mouse.move(first[0] - 20, first[1] + 10)
     mouse.move(first[0] - 40, first[1] + 20)
-    tab.until("flarewright.view.shownGrade === 'moving' && !flarewright.view.mover.busy()")
-    moving, grade = level(), tab.js("flarewright.view.shownGrade")
+    # kept as it is seen: where a machine is slow, the final one is there before it has been looked at
+    tab.until(
+        "flarewright.view.shownGrade === 'moving' && !flarewright.view.mover.busy()"
+        " && (window.kept = flarewright.view.image)"
+    )
+    moving = level("window.kept")
     # a hand that holds still sees what it would when letting go
     tab.until("flarewright.view.shownGrade === 'final'")
     held = level()
@@ -116,7 +120,6 @@ def test_drafts_do_not_jump_in_brightness(tab):
     tab.until("flarewright.view.shownGrade === 'final'")
     mouse.up()
     tab.rest()
-    assert grade == "moving"
     assert moving == pytest.approx(held, rel=0.08)
     assert held == pytest.approx(level(), rel=0.03)
 

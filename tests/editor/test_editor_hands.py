@@ -155,7 +155,7 @@ def test_that_the_editor_is_gone_is_said_until_it_is_back(tab):
     tab.page.locator(".toast.good", has_text="is back").wait_for(timeout=20000)
     assert gone.count() == 0
     # the browser tells of it too
-    tab.said[:] = [said for said in tab.said if "ERR_CONNECTION" not in said]
+    tab.said[:] = [said for said in tab.said if "net::ERR_" not in said]
 
 
 def test_ghosts_of_the_lens_before_are_none_of_the_next(tab):

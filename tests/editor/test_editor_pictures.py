@@ -204,7 +204,11 @@ def test_drafts_are_as_bright_wherever_a_hand_takes_the_light(project):
         assert off[1] < 0.2
         far = max(far, off[0])
     assert far > 0.5
-    # where the light rests, what was learned there holds
+    # where the light rests, what was learned there holds, also before any other place is known
+    first = with_rung(None, measured(project, 60.0, lambda: None))
+    for known in (ladder, first):
+        found = {name: gain for gain, names in levels_at(replace(old, ladder=known), project) for name in names}
+        assert found == pytest.approx({name: gain for gain, names in old.levels for name in names})
     shown = [
         studio.take(project, "draft", look, levels=each).ghosts for each in (old.levels, levels_at(match, project))
     ]

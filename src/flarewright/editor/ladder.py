@@ -147,16 +147,18 @@ def levels_at(match: Match, project: Project) -> Levels:
         return match.levels
     parts, total = _at(ladder, project.lights)
     near = _nearness(match, project.lights)
+    held = {name: gain for gain, names in match.levels for name in names}
+    every = held.pop(EVERY[0], 1.0)
+    # a ghost that no angle has shown yet is known from where the light rests alone
+    lone = {name: (every * gain) ** near for name, gain in held.items() if name not in ladder.names}
     if near > 0.0:
-        held = {name: gain for gain, names in match.levels for name in names}
-        every = held.get(EVERY[0], 1.0)
         there, _ = _at(ladder, match.lights)
         learned = np.array([every * held.get(name, 1.0) for name in ladder.names])
         parts = np.exp2(np.log2(parts) + near * (np.log2(learned) - np.log2(there)))
     # the gain of all has been learned with the levels where the lights rest
     total = (total / (sum(match.gain) / 3.0)) ** (1.0 - near)
     groups: dict[int, list[str]] = {}
-    for name, part in zip(ladder.names, parts.tolist(), strict=True):
+    for name, part in (*zip(ladder.names, parts.tolist(), strict=True), *lone.items()):
         groups.setdefault(round(log(part, STEP)), []).append(name)
     found = tuple((STEP**step, tuple(names)) for step, names in sorted(groups.items()) if step != 0)
     return found if total == 1.0 else (*found, (total, EVERY))
