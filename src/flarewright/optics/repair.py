@@ -12,6 +12,7 @@ from math import isfinite, sqrt
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import LensError
 from ..model import Coating, Lens, QuarterWave, Row, Stop, Surface
@@ -372,6 +373,12 @@ def _axial_blur(lens: Lens, order: FirstOrder, rays: int = 64) -> float:
     return sqrt(float((weight * (at_sensor[:, 1] + shift * slope) ** 2).sum()))
 
 
+def _axial_beam(lens: Lens, order: FirstOrder) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return heights across the entrance pupil, shape (50,), and where rays of these heights meet each row."""
+    y = np.linspace(0.02, 1.0, 50) * order.entrance_pupil_diameter / 2.0
+    return y, trace_polylines(lens, None, np.zeros_like(y), y, 0.0, sensor_distance=order.bfl)
+
+
 def axial_opening(lens: Lens, order: FirstOrder) -> tuple[float, int]:
     """Tell how far a lens opens for the beam on the axis.
 
@@ -387,8 +394,7 @@ def axial_opening(lens: Lens, order: FirstOrder) -> tuple[float, int]:
     int
         The row at which the most of it ends: beyond the rim, or beside the surface. 0 where all comes through.
     """
-    y = np.linspace(0.02, 1.0, 50) * order.entrance_pupil_diameter / 2.0
-    hits = trace_polylines(lens, None, np.zeros_like(y), y, 0.0, sensor_distance=order.bfl)
+    y, hits = _axial_beam(lens, order)
     opening, where, through = 1.0, 0, np.ones(len(y), dtype=np.bool_)
     for k, row in enumerate(lens.rows):
         if isinstance(row, Surface):
@@ -402,8 +408,7 @@ def axial_opening(lens: Lens, order: FirstOrder) -> tuple[float, int]:
 
 def _tell_rims(raw: RawLens, rows: list[RawRow], lens: Lens, order: FirstOrder, remarks: list[str]) -> None:
     """Tell when a rim cuts the axial beam, so that the lens is slower than stated."""
-    y = np.linspace(0.02, 1.0, 50) * order.entrance_pupil_diameter / 2.0
-    hits = trace_polylines(lens, None, np.zeros_like(y), y, 0.0, sensor_distance=order.bfl)
+    y, hits = _axial_beam(lens, order)
     tightest, where = 1.0, 0
     for k, row in enumerate(lens.rows):
         if not isinstance(row, Surface) or row.semi_diameter is None:

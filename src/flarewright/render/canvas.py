@@ -37,11 +37,16 @@ class Canvas:
     size_px: tuple[int, int]
     planes: list[Plane | None]
 
+    def size(self, detail: int) -> tuple[int, int]:
+        """Return width and height with the resolution halved so often."""
+        width, height = (-(-side // 2**detail) for side in self.size_px)
+        return width, height
+
     def plane(self, detail: int = 0) -> Plane:
         """Return the plane to draw on; `detail` halves the resolution."""
         plane = self.planes[detail]
         if plane is None:
-            plane = self.planes[detail] = blank_plane(*(-(-side // 2**detail) for side in self.size_px))
+            plane = self.planes[detail] = blank_plane(*self.size(detail))
         return plane
 
     def add(self, pixels: Plane, detail: int = 0) -> None:

@@ -282,12 +282,12 @@ def draw_final(
     fine_nm = np.interp([w + part for w, part in steps], np.arange(count), shot.packed.wavelengths_nm)
     patterns, flux = None, None
     if rings is not None:
+        # as the patterns: what has no rings needs none of it
         from .ring_flux import ring_flux
 
-        plane = canvas.plane(detail)
         patterns = rings.textures(fine_nm, _seen(item, rings, bundle, traced, to_pixels, canvas, detail))
-        middle, size_px = steps.index((count // 2, 0.0)), (plane.shape[1] * plane.shape[3], plane.shape[0])
-        flux = ring_flux(shot, patterns, sharp, bundle, middle, to_pixels, size_px)
+        middle = steps.index((count // 2, 0.0))
+        flux = ring_flux(shot, patterns, sharp, bundle, middle, to_pixels, canvas.size(detail))
     for k, ((w, part), color) in enumerate(zip(steps, shot.weights(fine_nm, bend) * item.art.rgb, strict=True)):
         if stop is not None and stop.is_set():
             return
@@ -385,9 +385,8 @@ def _seen(
     from .seen_stop import seen_in_stop
 
     places = [place for w in range(len(traced)) for place, _ in _places(item, to_pixels, w, 0.0)]
-    size = tuple(-(-side // 2**detail) for side in canvas.size_px)
-    crossings = item.path.stop_crossings
-    return seen_in_stop(item.shot, bundle, traced, crossings, places if item.orders else places[:1], (size[0], size[1]))
+    crossings, shown = item.path.stop_crossings, places if item.orders else places[:1]
+    return seen_in_stop(item.shot, bundle, traced, crossings, shown, canvas.size(detail))
 
 
 def draw_alone(
@@ -418,7 +417,7 @@ def draw_alone(
     kernel = None if source is None else shape_kernel(source, 0.5**detail)
     if kernel is not None:
         mx, my = mx + kernel.shape[1] // 2, my + kernel.shape[0] // 2
-    width, height = (-(-side // 2**detail) for side in canvas.size_px)
+    width, height = canvas.size(detail)
     sheet = blank((width + 2 * mx, height + 2 * my))
     beside = None if around is None else around.moved((mx, my), detail)
     small = None if source is None else mapped(source, 0.5**detail * np.eye(2))

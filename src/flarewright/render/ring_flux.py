@@ -49,20 +49,18 @@ class RingFlux:
     patterns : Textures
     place : ndarray, shape (4,)
         Column and row of the axis, pixels per mm.
-    box : tuple of float, or None
-        Left, top, right and bottom of what is compared, pixels; None: nothing is.
-    sharp : ndarray, shape (W,)
-        Flux without rings at the traced wavelengths, where the ghost is small.
     middle : float
-        What others are multiplied by.
+        What the ghost is multiplied by at all wavelengths, unless it is small.
+    small : tuple of (Box, ndarray), or None
+        Of a small ghost left, top, right and bottom, pixels, and its flux without rings at the traced wavelengths,
+        shape (W,).
     """
 
     shot: Shot
     patterns: Textures
     place: Floats
-    box: Box | None
-    sharp: Floats
-    middle: float
+    middle: float = 1.0
+    small: tuple[Box, Floats] | None = None
 
     def kept(self, k: int, at: float, whole: Bundle, data: Floats, densities: Floats) -> float:
         """Return what the ghost has to be multiplied by at the k-th drawn wavelength.
@@ -75,10 +73,11 @@ class RingFlux:
         whole, data, densities
             The ghost as it is about to be drawn.
         """
-        if self.box is None or not self.sharp.size:
+        if self.small is None:
             return self.middle
-        sharp = float(np.interp(at, np.arange(self.sharp.size), self.sharp))
-        return _over(sharp, _ringed(self.shot, self.patterns, self.place, self.box, k, whole, data, densities))
+        box, fluxes = self.small
+        sharp = float(np.interp(at, np.arange(fluxes.size), fluxes))
+        return _over(sharp, _ringed(self.shot, self.patterns, self.place, box, k, whole, data, densities))
 
 
 def ring_flux(
@@ -110,19 +109,17 @@ def ring_flux(
     count, tilt = len(shot.packed.wavelengths_nm), shot.incidence.tilt
     box = _compared(_box(shot, patterns, ringed, place), size_px)
     if box is None:
-        return RingFlux(shot, patterns, place, None, np.empty(0), 1.0)
+        return RingFlux(shot, patterns, place)
+
+    def without(w: int) -> float:
+        return _sharp(shot, place, box, *mended(sharp, trace_bundle(shot.packed, w, sharp, tilt)))
+
     if max(box[2] - box[0], box[3] - box[1]) <= SMALL_PX:
-        fluxes = [
-            _sharp(shot, place, box, *mended(sharp, trace_bundle(shot.packed, w, sharp, tilt))) for w in range(count)
-        ]
-        return RingFlux(shot, patterns, place, box, np.array(fluxes), 1.0)
+        return RingFlux(shot, patterns, place, small=(box, np.array([without(w) for w in range(count)])))
     whole, data = mended(ringed, trace_bundle(shot.packed, count // 2, ringed, tilt))
     densities = node_densities(data, whole.pupil, whole.triangles)
-    found = _over(
-        _sharp(shot, place, box, *mended(sharp, trace_bundle(shot.packed, count // 2, sharp, tilt))),
-        _ringed(shot, patterns, place, box, middle, whole, data, densities),
-    )
-    return RingFlux(shot, patterns, place, box, np.empty(0), found)
+    ringed_flux = _ringed(shot, patterns, place, box, middle, whole, data, densities)
+    return RingFlux(shot, patterns, place, middle=_over(without(count // 2), ringed_flux))
 
 
 def _over(sharp: float, ringed: float) -> float:
