@@ -20,6 +20,7 @@ from .carried import carried
 from .glow import halo_at, offsets, star_at
 from .numbers import bezier_numbers, field, frame, visible
 from .packed import Packed, pack, posed_numbers
+from .specks_drawn import draw_specks
 from .sprites import draw_sprites, sprite_at
 
 Floats = NDArray[np.float64]
@@ -104,6 +105,8 @@ def replay(
         light = gain * halo_at(model.halo, constellation_deg, x, y)
         layers.append(Layer("halo", light.astype(np.float32), (0, 0, *size)))
     if model.sprites:
+        specks = [one for one in model.sprites if one.follows == "speck"]
+        standing = [one for one in model.sprites if one.follows != "speck"]
         axis = model.axis_px[0] * scale, model.axis_px[1] * scale + top
         side = np.sign(constellation_deg) or 1.0
         turn = np.radians(roll_deg)
@@ -113,9 +116,11 @@ def replay(
             carried(one, packed, model, constellation_deg)
             if one.follows == "ghosts"
             else sprite_at(one, constellation_deg)
-            for one in model.sprites
+            for one in standing
         ]
-        rest = gain * draw_sprites(model.sprites, pictures, place, axis, toward, size, scale)
+        rest = draw_sprites(standing, pictures, place, axis, toward, size, scale)
+        placed = _frame(model, constellation_deg, roll_deg, size)
+        rest = gain * (rest + draw_specks(specks, packed, model, constellation_deg, placed, size))
         layers.append(Layer("residual", np.asarray(rest, dtype=np.float32), (0, 0, *size)))
     whole = beauty(layers, size)
     singles = _single(model, constellation_deg, roll_deg, size, gain) if single else []

@@ -29,6 +29,7 @@ from .pointing import candidate, kept, tell_pointed
 from .pursuit import pursue
 from .replay import draw, light_px
 from .settle import Settling, settle, to_model
+from .speck_sprites import covered, hidden, speck_sprites, specks_of
 from .spike_fit import spike_sprites
 from .sprite_fit import axis_sprite, drawn, light_sprites
 from .views import Pixels, View, halved, views_of
@@ -265,11 +266,17 @@ def with_rest(model: GhostModel, views: Sequence[View]) -> GhostModel:
         known = np.where(np.isfinite(view.variance), view.pixels, np.nan)
         placed.append(replace(view, light_px=_light_of(model, view, roll)))
         left.append((known - ghosts - _light(model.halo, model.star, placed[-1])).astype(np.float32))
-    spikes = spike_sprites(placed, left, model.star)
-    left = [each - drawn(spikes, view) for each, view in zip(left, placed, strict=True)]
-    going = light_sprites(placed, left)
-    left = [each - drawn(going, view) for each, view in zip(left, placed, strict=True)]
-    out: GhostModel = model.replace(sprites=(*spikes, *going, axis_sprite(placed, left)))
+    specks = specks_of(model, placed)
+    # a speck is so much brighter than what is around it that coarse cells would spread its errors over that
+    seen = [hidden(each, mask) for each, mask in zip(left, covered(specks, placed), strict=True)]
+    spikes = spike_sprites(placed, seen, model.star)
+    seen = [each - drawn(spikes, view) for each, view in zip(seen, placed, strict=True)]
+    going = light_sprites(placed, seen)
+    seen = [each - drawn(going, view) for each, view in zip(seen, placed, strict=True)]
+    standing = (*spikes, *going, axis_sprite(placed, seen))
+    if specks:
+        left = [each - drawn(standing, view) for each, view in zip(left, placed, strict=True)]
+    out: GhostModel = model.replace(sprites=(*standing, *speck_sprites(specks, placed, left, masks_of(placed))))
     return out
 
 

@@ -6,7 +6,7 @@ import base64
 import zlib
 from functools import cached_property
 from math import prod
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,22 +23,28 @@ class Sprite(Frozen):
 
     Attributes
     ----------
-    follows : {"light", "axis", "ghosts"}
+    follows : {"light", "axis", "ghosts", "speck"}
         "light": it goes where the light's image goes and stays upright, as the star does. "axis": it stays about the
         optical axis and turns with the direction of the light, as ghosts do. "ghosts": as with "axis", and between two
-        of its constellations what lies at a ghost's borders goes where these go.
+        of its constellations what lies at a ghost's borders goes where these go. "speck": it goes and grows with one
+        small ghost.
     grain_px : float
         Side of a cell, pixels.
     corner_px : tuple of float
-        Where the first cell begins, from the light or the axis: "light": along the rows' direction and at right angles
-        to it, down when that is right; else: towards the light and at right angles to it, down when the light is
-        right.
+        Where the first cell begins, from the light, the axis or the middle of the speck. "light": along the rows'
+        direction and at right angles to it, down when that is right; else: towards the light and at right angles to it,
+        down when the light is right.
     turn_deg : float
         "light" only: direction in which rows run, counterclockwise from the right in the upright picture.
     stretch : float
         Length of a cell along its row over `grain_px`.
     constellation_deg : tuple of float
-        Of each picture, rising; linear between them, and beyond as at the ends.
+        Of each picture, rising; linear between them, and beyond as at the ends; "speck": nothing beyond.
+    ghost : str or None
+        "speck" only: name of the ghost. Without that ghost it is not drawn.
+    spread_px : tuple of float
+        "speck" only: standard deviation of the ghost's lit area, towards the light and at right angles to it, where a
+        cell is as large as `grain_px`; elsewhere cells are larger or smaller as these are.
     rows, columns : int
         Cells of each picture.
     unit : float
@@ -48,11 +54,13 @@ class Sprite(Frozen):
         byte of each, then the lower byte of each. They may be below 0.
     """
 
-    follows: Literal["light", "axis", "ghosts"]
+    follows: Literal["light", "axis", "ghosts", "speck"]
     grain_px: float = Field(gt=0.0)
     corner_px: tuple[float, float]
     turn_deg: float = 0.0
     stretch: float = Field(default=1.0, gt=0.0)
+    ghost: str | None = None
+    spread_px: tuple[Annotated[float, Field(gt=0.0)], Annotated[float, Field(gt=0.0)]] = (1.0, 1.0)
     constellation_deg: tuple[float, ...] = Field(min_length=1)
     rows: int = Field(ge=1)
     columns: int = Field(ge=1)
@@ -63,6 +71,8 @@ class Sprite(Frozen):
     def _fits(self) -> Sprite:
         if any(b <= a for a, b in zip(self.constellation_deg, self.constellation_deg[1:], strict=False)):
             raise ValueError("the constellations of a sprite must rise")
+        if (self.follows == "speck") != (self.ghost is not None):
+            raise ValueError('a sprite names a ghost if it follows "speck", and only then')
         size = 2 * prod(self._shape)
         try:
             # a few bytes can stand for more than any memory holds

@@ -1,0 +1,288 @@
+"""Learn what is left at specks: small bright ghosts, each in pictures finer than a pixel that go with it.
+
+Every view shows a speck in other places of the pixels' grid, so that all together tell more than one: least squares
+for cells that are finer than pixels. What is left of it is taken, so that the ghost stays what explains the light.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import groupby
+from math import ceil, floor
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..kernels.measure_speck import gather_cells, read_cells, square_cells
+from ..model.ghost_model import GhostModel
+from ..model.sprite import Sprite, packed
+from .numbers import Floats, visible
+from .packed import Packed, pack
+from .specks_drawn import Grid, Outline, outline, reading, speck_at
+from .sprite_fit import DIGIT, darkest_noise
+from .sprites import sprite_at
+from .views import Pixels, View
+
+Mask = NDArray[np.bool_]
+
+# half the sides of the largest speck, part of the picture's width
+_LARGEST = 12.0 / 720.0
+# a speck's light over the noise of the darkest pixels; what is fainter, coarse pictures hold as well
+_BRIGHT = 100.0
+# fewer views in a row are interpolated as well
+_FEWEST = 3
+# side of a cell, and how far beyond the lit box cells go, pixels
+_CELL_PX, _BESIDE_PX = 0.5, 3.0
+# nothing else is learned so near to the lit box, pixels
+_AROUND_PX = 1.0
+# views for each picture
+_VIEWS = 3
+# how stiff cells are against what one view tells of them: over the constellation, and towards 0
+_BEND, _DAMP = 0.1, 0.05
+# part of its light by which a pixel may be off beside its noise
+_OFF = 0.01
+# steps of the solver, and the part of the first residual at which it ends
+_STEPS, _GOOD = 150, 1e-4
+# part of the brightest cell below which a cell tells of the surroundings; none is kept that is beside no brighter one
+_LEAST = 0.01
+
+
+@dataclass(frozen=True)
+class Speck:
+    """A small bright ghost in the views that show it so.
+
+    Attributes
+    ----------
+    name : str
+    first : int
+        Index of the first view.
+    outlines : tuple of Outline
+        In it and the ones that follow.
+    beyond : tuple of (int, Outline)
+        Other views in whose pictures it would be, though the model does not show it: it may be there all the same.
+    """
+
+    name: str
+    first: int
+    outlines: tuple[Outline, ...]
+    beyond: tuple[tuple[int, Outline], ...]
+
+
+@dataclass(frozen=True)
+class _Told:
+    """What pixels of all views tell of cells, as `kernels.measure_speck` takes it; values, shape (P, 3)."""
+
+    cells: NDArray[np.int64]
+    weights: Floats
+    before: NDArray[np.int64]
+    part: Floats
+    sure: Floats
+    values: Floats
+
+
+def specks_of(model: GhostModel, views: Sequence[View]) -> tuple[Speck, ...]:
+    """Return the ghosts of a model that are small and bright, each in its longest row of views.
+
+    Parameters
+    ----------
+    model : GhostModel
+    views : sequence of View
+        By rising constellation.
+
+    Returns
+    -------
+    tuple of Speck
+    """
+    drawn = pack(model)
+    least = _BRIGHT * darkest_noise(views)
+    found = []
+    for ghost in drawn[0]:
+        placed = {k: at for k, view in enumerate(views) if (at := _small(drawn, model, ghost.name, view)) is not None}
+        shown = [k for k in placed if visible([ghost], views[k].constellation_deg)[0] > 0.0]
+        rows = [[k for _, k in group] for _, group in groupby(enumerate(shown), lambda pair: pair[1] - pair[0])]
+        longest = max(rows, key=len, default=[])
+        if len(longest) >= _FEWEST and max(placed[k].peak for k in longest) > least:
+            beyond = tuple((k, at) for k, at in placed.items() if k not in longest)
+            found.append(Speck(ghost.name, longest[0], tuple(placed[k] for k in longest), beyond))
+    return tuple(found)
+
+
+def _small(drawn: Packed, model: GhostModel, name: str, view: View) -> Outline | None:
+    """Return the outline of a ghost whose place is in a view, if it is small there."""
+    at = outline(drawn, model, name, view.constellation_deg)
+    if at is None or max(at.half) > _LARGEST * view.size_px[0]:
+        return None
+    ax, ay, cosine, sine, _ = view.frame
+    place = ax + cosine * at.along, ay - sine * at.along
+    return at if all(0.0 <= each <= side for each, side in zip(place, view.size_px, strict=True)) else None
+
+
+def covered(specks: Sequence[Speck], views: Sequence[View]) -> list[Mask]:
+    """Return where specks are in each view, shape (H, W) each; nothing else can be told there."""
+    masks = [np.zeros(view.pixels.shape[:2], dtype=np.bool_) for view in views]
+    for speck in specks:
+        for k, at in (*enumerate(speck.outlines, start=speck.first), *speck.beyond):
+            ax, ay, cosine, sine, _ = views[k].frame
+            x, y = ax + cosine * at.along, ay - sine * at.along
+            reach = float(np.hypot(*at.half)) + _AROUND_PX
+            top, left = max(floor(y - reach), 0), max(floor(x - reach), 0)
+            part = masks[k][top : floor(y + reach) + 1, left : floor(x + reach) + 1]
+            row, column = np.mgrid[: part.shape[0], : part.shape[1]]
+            dx, dy = left + column + 0.5 - x, top + row + 0.5 - y
+            part |= (np.abs(cosine * dx - sine * dy) < at.half[0] + _AROUND_PX) & (
+                np.abs(sine * dx + cosine * dy) < at.half[1] + _AROUND_PX
+            )
+    return masks
+
+
+def speck_sprites(
+    specks: Sequence[Speck], views: Sequence[View], pixels: Sequence[Pixels], masks: Sequence[Mask]
+) -> tuple[Sprite, ...]:
+    """Learn what is left at specks.
+
+    Parameters
+    ----------
+    specks : sequence of Speck
+        From `specks_of`.
+    views : sequence of View
+    pixels : sequence of ndarray, shape (H, W, 3)
+        What they show beside everything else.
+    masks : sequence of ndarray, shape (H, W)
+        Where that may be believed.
+
+    Returns
+    -------
+    tuple of Sprite
+        Those whose pictures hold anything.
+    """
+    step = DIGIT * darkest_noise(views) / _CELL_PX
+    left = list(pixels)
+    found = []
+    for speck in specks:
+        sprite = _learned(speck, views, left, masks, step)
+        if sprite is None:
+            continue
+        found.append(sprite)
+        grid = Grid(sprite.grain_px, sprite.corner_px, sprite.rows, sprite.columns, sprite.spread_px)
+        for k, at in enumerate(speck.outlines, start=speck.first):
+            picture = sprite_at(sprite, views[k].constellation_deg)
+            left[k] = left[k] - speck_at(grid, at, views[k].frame, views[k].size_px, picture)
+    return tuple(found)
+
+
+def _between(knots: Floats, angle: float) -> tuple[int, float]:
+    """Return the knot below an angle, and how far it is to the next one."""
+    k = int(np.clip(np.searchsorted(knots, angle) - 1, 0, knots.size - 2))
+    return k, float(np.clip((angle - knots[k]) / (knots[k + 1] - knots[k]), 0.0, 1.0))
+
+
+def _grid(speck: Speck) -> Grid:
+    """Return cells that hold a speck where it is largest."""
+    largest = max(speck.outlines, key=lambda one: one.half[0] * one.half[1])
+    columns, rows = (2 * ceil((half + _BESIDE_PX) / _CELL_PX) for half in largest.half)
+    corner = (-0.5 * columns * _CELL_PX, -0.5 * rows * _CELL_PX)
+    return Grid(_CELL_PX, corner, rows, columns, largest.spread)
+
+
+def _learned(
+    speck: Speck, views: Sequence[View], pixels: Sequence[Pixels], masks: Sequence[Mask], step: float
+) -> Sprite | None:
+    """Solve for one speck's pictures; None where nothing of it is left."""
+    grid = _grid(speck)
+    shown = views[speck.first : speck.first + len(speck.outlines)]
+    angles = np.linspace(
+        shown[0].constellation_deg, shown[-1].constellation_deg, max(2, ceil(len(shown) / _VIEWS))
+    )  # fmt: skip
+    told = _told(grid, angles, shown, speck, pixels, masks)
+    if told is None:
+        return None
+    solved = _solved(told, angles.size, grid.rows * grid.columns)
+    pictures = _bright(solved.reshape(angles.size, grid.rows, grid.columns, 3))
+    if not np.abs(pictures).max() > step:
+        return None
+    unit, packed_cells = packed(pictures, step)
+    return Sprite(
+        follows="speck", ghost=speck.name, spread_px=grid.spread_px, grain_px=grid.grain_px, corner_px=grid.corner_px,
+        constellation_deg=tuple(map(float, angles)), rows=grid.rows, columns=grid.columns, unit=unit,
+        cells=packed_cells,
+    )  # fmt: skip
+
+
+def _told(
+    grid: Grid, angles: Floats, shown: Sequence[View], speck: Speck, pixels: Sequence[Pixels], masks: Sequence[Mask]
+) -> _Told | None:
+    """Gather what views tell of a speck's cells; None where too few do."""
+    parts = []
+    for k, (view, at) in enumerate(zip(shown, speck.outlines, strict=True), start=speck.first):
+        read = reading(grid, at, view.frame, view.size_px)
+        value = pixels[k][read.rows, read.columns].astype(np.float64)
+        known = masks[k][read.rows, read.columns] & np.isfinite(value).all(axis=1) & read.weights.any(axis=1)
+        if not known.any():
+            continue
+        own, light = (each[read.rows[known], read.columns[known]].mean(axis=1) for each in (view.variance, view.pixels))
+        k_before, far = _between(angles, view.constellation_deg)
+        count = int(known.sum())
+        parts.append((
+            read.cells[known], read.weights[known], np.full(count, k_before), np.full(count, far),
+            1.0 / np.sqrt(own + (_OFF * light) ** 2).astype(np.float64), value[known],
+        ))  # fmt: skip
+    if len(parts) < _FEWEST:
+        return None
+    taps = max(part[0].shape[1] for part in parts)
+    wide = [[np.pad(each, ((0, 0), (0, taps - each.shape[1]))) for each in part[:2]] for part in parts]
+    cells, weights = (np.concatenate([pair[n] for pair in wide]) for n in (0, 1))
+    return _Told(cells, weights, *(np.concatenate([part[n] for part in parts]) for n in (2, 3, 4, 5)))
+
+
+def _solved(told: _Told, count: int, cells: int) -> Floats:
+    """Solve for pictures, shape (count, cells, 3), by conjugate gradients on the normal equations.
+
+    Hestenes and Stiefel (1952), Methods of conjugate gradients for solving linear systems; the system has the form of
+    Tikhonov's. Colours are solved side by side.
+    """
+    how = told.cells, told.weights, told.before, told.part, told.sure
+    squares = np.zeros((count, cells))
+    square_cells(*how, squares)
+    # so that every cell is as stiff, whether it is bright and little known or dark and well known
+    size = np.sqrt(np.maximum(squares.mean(axis=0), 1e-12 * squares.max()))[None, :, None]
+    bend = np.diff(np.eye(count), min(2, count - 1), axis=0)
+    stiff = _BEND**2 * bend.T @ bend + _DAMP**2 * np.eye(count)
+
+    def back(values: Floats) -> Floats:
+        out = np.zeros((count, cells, 3))
+        gather_cells(*how, values, out)
+        return np.asarray(out / size)
+
+    def normal(scaled: Floats) -> Floats:
+        out = np.zeros((len(told.sure), 3))
+        read_cells(*how, scaled / size, out)
+        return back(out) + np.tensordot(stiff, scaled, axes=1)
+
+    rest = back(told.values * told.sure[:, None])
+    found, way = np.zeros_like(rest), rest
+    power = (rest**2).sum(axis=(0, 1))
+    enough = _GOOD**2 * power
+    for _ in range(_STEPS):
+        if (power <= enough).all():
+            break
+        turned = normal(way)
+        step = power / np.maximum((way * turned).sum(axis=(0, 1)), 1e-300)
+        found, rest = found + step * way, rest - step * turned
+        now = (rest**2).sum(axis=(0, 1))
+        way = rest + now / np.maximum(power, 1e-300) * way
+        power = now
+    return np.asarray(found / size)
+
+
+def _bright(pictures: Floats) -> Pixels:
+    """Leave out cells that tell of a speck's surroundings, which do not go with it."""
+    largest = np.abs(pictures).max(axis=(0, 3))
+    around = np.lib.stride_tricks.sliding_window_view(np.pad(largest, 1), (3, 3)).max(axis=(2, 3))
+    kept = around > _LEAST * largest.max()
+    return np.asarray(pictures * kept[:, :, None], dtype=np.float32)
+
+
+def hidden(pixels: Pixels, mask: Mask) -> Pixels:
+    """Return a picture with what is in a mask not measured."""
+    return np.where(mask[..., None], np.float32(np.nan), pixels)

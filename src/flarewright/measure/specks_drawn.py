@@ -1,0 +1,240 @@
+"""Draw what is left at specks: pictures finer than a pixel that go, and grow, with one small ghost.
+
+An image of the light a few pixels wide can be a thousand times as bright as what is around it. Errors of a tenth of it
+are then larger than all else in a picture, and cells of some pixels cannot hold them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import ceil
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..kernels.measure_mesh import draw_ghosts, window_of
+from ..kernels.measure_speck import read_cells
+from ..model.ghost_model import GhostModel
+from ..model.sprite import Sprite
+from .numbers import field, visible
+from .packed import Packed, posed_numbers
+from .sprites import Pixels, sprite_at
+
+Floats = NDArray[np.float64]
+
+# how many times finer than the model's pixels an outline is drawn, and what part of its brightest is within it
+_FINER, _WITHIN = 8.0, 0.02
+# pixels that no ghost reaches; one larger than this to each side is no speck
+_FAR, _LARGEST = 20000, 64
+# pixels of margin around the lit box
+_MARGIN = 2
+
+
+@dataclass(frozen=True)
+class Outline:
+    """Where a ghost's green is lit at a constellation, pixels of the model.
+
+    Attributes
+    ----------
+    along : float
+        Middle of the lit area from the axis, towards the light.
+    spread : tuple of float
+        Standard deviation of the lit area, towards the light and at right angles to it.
+    half : tuple of float
+        Half the sides of the box around it.
+    peak : float
+        Radiance.
+    """
+
+    along: float
+    spread: tuple[float, float]
+    half: tuple[float, float]
+    peak: float
+
+
+@dataclass(frozen=True)
+class Grid:
+    """The cells of a speck's pictures.
+
+    Attributes
+    ----------
+    grain_px : float
+        Side of a cell where the ghost is as large as `spread_px` tells.
+    corner_px : tuple of float
+        Where the first cell begins, from the middle of the ghost.
+    rows, columns : int
+    spread_px : tuple of float
+        As `Outline.spread`.
+    """
+
+    grain_px: float
+    corner_px: tuple[float, float]
+    rows: int
+    columns: int
+    spread_px: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Reading:
+    """What a speck's cells count in the pixels around it.
+
+    Attributes
+    ----------
+    rows, columns : ndarray, shape (P,)
+        The pixels.
+    cells : ndarray, shape (P, T)
+        Indices of cells, rows one after the other; some may come twice.
+    weights : ndarray, shape (P, T)
+    """
+
+    rows: NDArray[np.int64]
+    columns: NDArray[np.int64]
+    cells: NDArray[np.int64]
+    weights: Floats
+
+
+def outline(packed: Packed, model: GhostModel, name: str, constellation_deg: float) -> Outline | None:
+    """Return where a ghost is lit, also beyond the picture's border; None where it is shut, large or not there.
+
+    Parameters
+    ----------
+    packed : Packed
+        The model's ghosts, from `pack`.
+    model : GhostModel
+    name : str
+    constellation_deg : float
+
+    Returns
+    -------
+    Outline or None
+    """
+    meshes, numbers, counts, _ = packed
+    k = next((k for k, ghost in enumerate(meshes) if ghost.name == name), None)
+    if k is None:
+        return None
+    one = slice(k, k + 1)
+    sigma = abs(field(constellation_deg, model.largest_deg))
+    green = posed_numbers(meshes[one], numbers[:, one], constellation_deg, sigma)[1]
+    frame = np.array([_FAR, _FAR, 1.0, 0.0, 1.0])
+    left, top, width, height = window_of(green[0], counts[1, k], sigma, frame, 2 * _FAR, 2 * _FAR)
+    if not (0 < width < 2 * _LARGEST and 0 < height < 2 * _LARGEST):
+        return None
+    left, top = left - _FAR - _MARGIN, top - _FAR - _MARGIN
+    columns, rows = (int((side + 2 * _MARGIN) * _FINER) for side in (width, height))
+    plane = np.zeros((rows, columns + 1))
+    fine = np.array([-left * _FINER, -top * _FINER, 1.0, 0.0, _FINER])
+    draw_ghosts(green, counts[1, one], np.ones(1), sigma, fine, plane)
+    light = plane.cumsum(axis=1)[:, :-1]
+    peak = float(light.max())
+    if not peak > 0.0:
+        return None
+    lit = light > _WITHIN * peak
+    middles, spreads = [], []
+    for start, axis in ((left, 0), (top, 1)):
+        counted = lit.sum(axis=axis)
+        places = start + (np.arange(counted.size) + 0.5) / _FINER
+        middles.append(float(counted @ places / counted.sum()))
+        spreads.append(float(np.sqrt(counted @ (places - middles[-1]) ** 2 / counted.sum())))
+    return Outline(middles[0], (spreads[0], spreads[1]), (0.5 * width, 0.5 * height), peak)
+
+
+def reading(grid: Grid, at: Outline, frame: Floats, size_px: tuple[int, int]) -> Reading:
+    """Tell what each cell counts in each pixel: its mean over the pixel's square, linear between cells' middles.
+
+    Parameters
+    ----------
+    grid : Grid
+    at : Outline
+    frame : ndarray, shape (5,)
+        From `numbers.frame`.
+    size_px : tuple of int
+        Width and height of the picture.
+
+    Returns
+    -------
+    Reading
+        Of the pixels that cells may reach.
+    """
+    ax, ay, cosine, sine, scale = frame
+    x0, y0 = ax + scale * cosine * at.along, ay - scale * sine * at.along
+    stretch = [now / then for now, then in zip(at.spread, grid.spread_px, strict=True)]
+    sides = (-2.0 * grid.corner_px[0] * stretch[0], -2.0 * grid.corner_px[1] * stretch[1])
+    reach = 0.5 * scale * float(np.hypot(*sides)) + 1.0
+    spans = [
+        np.arange(max(int(middle - reach), 0), min(int(middle + reach) + 1, side))
+        for middle, side in zip((x0, y0), size_px, strict=True)
+    ]
+    x, y = (each.ravel() for each in np.meshgrid(*spans))
+    # parts of a pixel's side, so that no cell is passed over
+    parts = max(1, ceil(1.0 / (scale * grid.grain_px * min(stretch))))
+    cells, weights = [], []
+    for across in range(parts):
+        for down in range(parts):
+            dx, dy = x + (across + 0.5) / parts - x0, y + (down + 0.5) / parts - y0
+            along = (cosine * dx - sine * dy) / (scale * stretch[0])
+            aside = (sine * dx + cosine * dy) / (scale * stretch[1])
+            column, row = (
+                (value - corner) / grid.grain_px - 0.5
+                for value, corner in zip((along, aside), grid.corner_px, strict=True)
+            )
+            left, top = np.floor(column).astype(np.int64), np.floor(row).astype(np.int64)
+            for r, near_r in ((top, top + 1.0 - row), (top + 1, row - top)):
+                for c, near_c in ((left, left + 1.0 - column), (left + 1, column - left)):
+                    inside = (r >= 0) & (r < grid.rows) & (c >= 0) & (c < grid.columns)
+                    cells.append(np.where(inside, r * grid.columns + c, 0))
+                    weights.append(np.where(inside, near_r * near_c, 0.0) / parts**2)
+    return Reading(y, x, np.stack(cells, axis=1), np.stack(weights, axis=1))
+
+
+def speck_at(grid: Grid, at: Outline, frame: Floats, size_px: tuple[int, int], picture: Pixels) -> Pixels:
+    """Draw a speck's picture, shape (rows, columns, 3), as `reading` tells; shape (H, W, 3)."""
+    read = reading(grid, at, frame, size_px)
+    count = read.rows.size
+    light = np.zeros((count, 3))
+    twice = np.repeat(picture.reshape(1, -1, 3).astype(np.float64), 2, axis=0)
+    read_cells(
+        read.cells, read.weights, np.zeros(count, np.int64), np.zeros(count), np.ones(count), twice, light
+    )  # fmt: skip
+    out = np.zeros((size_px[1], size_px[0], 3), np.float32)
+    out[read.rows, read.columns] = light
+    return out
+
+
+def draw_specks(
+    sprites: Sequence[Sprite],
+    packed: Packed,
+    model: GhostModel,
+    constellation_deg: float,
+    frame: Floats,
+    size_px: tuple[int, int],
+) -> Pixels:
+    """Draw the sprites that follow specks; one whose ghost the model does not have is left out, as its ghost is.
+
+    Parameters
+    ----------
+    sprites : sequence of Sprite
+    packed, model
+        As `outline` takes them.
+    constellation_deg : float
+    frame, size_px
+        As `reading` takes them.
+
+    Returns
+    -------
+    ndarray, shape (H, W, 3), float32
+        Radiance.
+    """
+    out = np.zeros((size_px[1], size_px[0], 3), np.float32)
+    for sprite in sprites:
+        first, last = sprite.constellation_deg[0], sprite.constellation_deg[-1]
+        if sprite.ghost is None or not first <= constellation_deg <= last:
+            continue
+        at = outline(packed, model, sprite.ghost, constellation_deg)
+        if at is None:
+            continue
+        there = visible([ghost for ghost in packed[0] if ghost.name == sprite.ghost], constellation_deg)[0]
+        grid = Grid(sprite.grain_px, sprite.corner_px, sprite.rows, sprite.columns, sprite.spread_px)
+        picture = sprite_at(sprite, constellation_deg)
+        out += np.float32(there) * speck_at(grid, at, frame, size_px, picture)
+    return out
