@@ -26,15 +26,17 @@ from .views import Pixels, View
 
 Mask = NDArray[np.bool_]
 
-# half the sides of the largest speck, part of the picture's width
-_LARGEST = 12.0 / 720.0
+# lengths below are pixels of pictures no wider than this, and grow with wider ones
+_WIDTH = 720.0
+# half the longer side of the largest speck
+_LARGEST_PX = 12.0
 # a speck's light over the noise of the darkest pixels; what is fainter, coarse pictures hold as well
 _BRIGHT = 100.0
 # fewer views in a row are interpolated as well
 _FEWEST = 3
-# side of a cell, and how far beyond the lit box cells go, pixels
-_CELL_PX, _BESIDE_PX = 0.5, 3.0
-# nothing else is learned so near to the lit box, pixels
+# side of a cell, and how far beyond the lit box cells go
+_CELL_PX, _BESIDE_PX = 1.0 / 3.0, 3.0
+# nothing else is learned so near to the lit box
 _AROUND_PX = 1.0
 # views for each picture
 _VIEWS = 3
@@ -108,10 +110,14 @@ def specks_of(model: GhostModel, views: Sequence[View]) -> tuple[Speck, ...]:
     return tuple(found)
 
 
+def _unit(view: View) -> float:
+    return max(1.0, view.size_px[0] / _WIDTH)
+
+
 def _small(drawn: Packed, model: GhostModel, name: str, view: View) -> Outline | None:
     """Return the outline of a ghost whose place is in a view, if it is small there."""
-    at = outline(drawn, model, name, view.constellation_deg)
-    if at is None or max(at.half) > _LARGEST * view.size_px[0]:
+    at = outline(drawn, model, name, view.constellation_deg, _LARGEST_PX * _unit(view))
+    if at is None:
         return None
     ax, ay, cosine, sine, _ = view.frame
     place = ax + cosine * at.along, ay - sine * at.along
@@ -125,13 +131,14 @@ def covered(specks: Sequence[Speck], views: Sequence[View]) -> list[Mask]:
         for k, at in (*enumerate(speck.outlines, start=speck.first), *speck.beyond):
             ax, ay, cosine, sine, _ = views[k].frame
             x, y = ax + cosine * at.along, ay - sine * at.along
-            reach = float(np.hypot(*at.half)) + _AROUND_PX
+            around = _AROUND_PX * _unit(views[k])
+            reach = float(np.hypot(*at.half)) + around
             top, left = max(floor(y - reach), 0), max(floor(x - reach), 0)
             part = masks[k][top : floor(y + reach) + 1, left : floor(x + reach) + 1]
             row, column = np.mgrid[: part.shape[0], : part.shape[1]]
             dx, dy = left + column + 0.5 - x, top + row + 0.5 - y
-            part |= (np.abs(cosine * dx - sine * dy) < at.half[0] + _AROUND_PX) & (
-                np.abs(sine * dx + cosine * dy) < at.half[1] + _AROUND_PX
+            part |= (np.abs(cosine * dx - sine * dy) < at.half[0] + around) & (
+                np.abs(sine * dx + cosine * dy) < at.half[1] + around
             )
     return masks
 
@@ -156,7 +163,7 @@ def speck_sprites(
     tuple of Sprite
         Those whose pictures hold anything.
     """
-    step = DIGIT * darkest_noise(views) / _CELL_PX
+    step = DIGIT * darkest_noise(views) / (_CELL_PX * _unit(views[0]))
     left = list(pixels)
     found = []
     for speck in specks:
@@ -177,19 +184,19 @@ def _between(knots: Floats, angle: float) -> tuple[int, float]:
     return k, float(np.clip((angle - knots[k]) / (knots[k + 1] - knots[k]), 0.0, 1.0))
 
 
-def _grid(speck: Speck) -> Grid:
+def _grid(speck: Speck, unit: float) -> Grid:
     """Return cells that hold a speck where it is largest."""
     largest = max(speck.outlines, key=lambda one: one.half[0] * one.half[1])
-    columns, rows = (2 * ceil((half + _BESIDE_PX) / _CELL_PX) for half in largest.half)
-    corner = (-0.5 * columns * _CELL_PX, -0.5 * rows * _CELL_PX)
-    return Grid(_CELL_PX, corner, rows, columns, largest.spread)
+    grain = _CELL_PX * unit
+    columns, rows = (2 * ceil((half + _BESIDE_PX * unit) / grain) for half in largest.half)
+    return Grid(grain, (-0.5 * columns * grain, -0.5 * rows * grain), rows, columns, largest.spread)
 
 
 def _learned(
     speck: Speck, views: Sequence[View], pixels: Sequence[Pixels], masks: Sequence[Mask], step: float
 ) -> Sprite | None:
     """Solve for one speck's pictures; None where nothing of it is left."""
-    grid = _grid(speck)
+    grid = _grid(speck, _unit(views[0]))
     shown = views[speck.first : speck.first + len(speck.outlines)]
     angles = np.linspace(
         shown[0].constellation_deg, shown[-1].constellation_deg, max(2, ceil(len(shown) / _VIEWS))

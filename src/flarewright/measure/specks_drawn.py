@@ -23,10 +23,11 @@ from .sprites import Pixels, sprite_at
 
 Floats = NDArray[np.float64]
 
-# how many times finer than the model's pixels an outline is drawn, and what part of its brightest is within it
-_FINER, _WITHIN = 8.0, 0.02
-# pixels that no ghost reaches; one larger than this to each side is no speck
-_FAR, _LARGEST = 20000, 64
+# how many times finer than the model's pixels an outline is drawn, how many samples across it are enough, and what
+# part of its brightest is within it
+_FINER, _SAMPLES, _WITHIN = 8.0, 512.0, 0.02
+# pixels that no ghost reaches
+_FAR = 20000
 # pixels of margin around the lit box
 _MARGIN = 2
 
@@ -94,7 +95,9 @@ class Reading:
     weights: Floats
 
 
-def outline(packed: Packed, model: GhostModel, name: str, constellation_deg: float) -> Outline | None:
+def outline(
+    packed: Packed, model: GhostModel, name: str, constellation_deg: float, largest_px: float = float(_FAR)
+) -> Outline | None:
     """Return where a ghost is lit, also beyond the picture's border; None where it is shut, large or not there.
 
     Parameters
@@ -104,6 +107,8 @@ def outline(packed: Packed, model: GhostModel, name: str, constellation_deg: flo
     model : GhostModel
     name : str
     constellation_deg : float
+    largest_px : float
+        Half the longer side of the largest box around one that is wanted.
 
     Returns
     -------
@@ -118,12 +123,13 @@ def outline(packed: Packed, model: GhostModel, name: str, constellation_deg: flo
     green = posed_numbers(meshes[one], numbers[:, one], constellation_deg, sigma)[1]
     frame = np.array([_FAR, _FAR, 1.0, 0.0, 1.0])
     left, top, width, height = window_of(green[0], counts[1, k], sigma, frame, 2 * _FAR, 2 * _FAR)
-    if not (0 < width < 2 * _LARGEST and 0 < height < 2 * _LARGEST):
+    if not 0 < min(width, height) <= max(width, height) <= 2.0 * min(largest_px, 0.5 * _FAR):
         return None
     left, top = left - _FAR - _MARGIN, top - _FAR - _MARGIN
-    columns, rows = (int((side + 2 * _MARGIN) * _FINER) for side in (width, height))
+    finer = min(_FINER, _SAMPLES / max(width, height))
+    columns, rows = (ceil((side + 2 * _MARGIN) * finer) for side in (width, height))
     plane = np.zeros((rows, columns + 1))
-    fine = np.array([-left * _FINER, -top * _FINER, 1.0, 0.0, _FINER])
+    fine = np.array([-left * finer, -top * finer, 1.0, 0.0, finer])
     draw_ghosts(green, counts[1, one], np.ones(1), sigma, fine, plane)
     light = plane.cumsum(axis=1)[:, :-1]
     peak = float(light.max())
@@ -133,7 +139,7 @@ def outline(packed: Packed, model: GhostModel, name: str, constellation_deg: flo
     middles, spreads = [], []
     for start, axis in ((left, 0), (top, 1)):
         counted = lit.sum(axis=axis)
-        places = start + (np.arange(counted.size) + 0.5) / _FINER
+        places = start + (np.arange(counted.size) + 0.5) / finer
         middles.append(float(counted @ places / counted.sum()))
         spreads.append(float(np.sqrt(counted @ (places - middles[-1]) ** 2 / counted.sum())))
     return Outline(middles[0], (spreads[0], spreads[1]), (0.5 * width, 0.5 * height), peak)

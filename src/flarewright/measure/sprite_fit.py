@@ -18,9 +18,9 @@ from .numbers import Floats
 from .sprites import draw_sprites, samples, sprite_at
 from .views import Pixels, View
 
-# cells across the picture of the coarsest pictures that go with the light, and cells of finer ones to each side of it:
-# fine ones far from the light would learn borders of ghosts, which do not go with it
-_COARSE, _AROUND = 22, 24
+# cells of the coarsest pictures that go with the light, across a picture, and how many there are to each side of it:
+# far from the light they would learn ghosts' borders, which do not go with it
+_COARSE, _AROUND = 44, 24
 # of what follows ghosts: pixels a cell; cells across a large picture, whose cells are larger, and across a small one
 _CELL_PX, _MOST_CELLS, _LEAST_CELLS = 3.0, 240, 90
 # cells that reading between cells looks beyond the last one that was seen; they are as that one
@@ -53,7 +53,7 @@ def light_sprites(views: Sequence[View], pixels: Sequence[Pixels]) -> tuple[Spri
     Returns
     -------
     tuple of Sprite
-        Coarse ones that cover the picture first; their pictures add up.
+        Coarse ones that reach far first; their pictures add up.
     """
     width = views[0].size_px[0]
     finest = max(0, int(np.floor(np.log2(max(width / _COARSE, 1.0)))))
@@ -63,8 +63,7 @@ def light_sprites(views: Sequence[View], pixels: Sequence[Pixels]) -> tuple[Spri
     for level in range(finest, -1, -1):
         grain = 2.0**level
         side = _AROUND * grain
-        box = _whole_box(views) if level == finest else (-side, -side, side, side)
-        sprite = _fitted(views, left, grain, box, angles, level < finest)
+        sprite = _fitted(views, left, grain, side, angles)
         found.append(sprite)
         left = [each - drawn((sprite,), view) for each, view in zip(left, views, strict=True)]
     return tuple(found)
@@ -133,13 +132,6 @@ def even_knots(views: Sequence[View], count: int) -> tuple[float, ...]:
     return tuple(map(float, np.linspace(angles[0], angles[-1], count)))
 
 
-def _whole_box(views: Sequence[View]) -> tuple[float, float, float, float]:
-    """Return left, top, right and bottom of all pixels from the light in its place, views all together."""
-    width, height = views[0].size_px
-    x, y = np.array([view.light_px for view in views]).T
-    return -float(x.max()), -float(y.max()), width - float(x.min()), height - float(y.min())
-
-
 def _turned(offsets: Floats, view: View) -> Floats:
     """Turn offsets (right, down) to (towards the light, at right angles)."""
     cosine, sine = view.frame[2], view.frame[3]
@@ -152,13 +144,11 @@ def _middles(left: float, top: float, grain: float, rows: int, columns: int) -> 
 
 
 def _fitted(
-    views: Sequence[View], pixels: Sequence[Pixels], grain: float, box: tuple[float, float, float, float],
-    angles: tuple[float, ...], fade: bool,
-) -> Sprite:  # fmt: skip
-    """Fit the pictures of one grain, cell by cell."""
-    left, top = grain * np.floor(box[0] / grain), grain * np.floor(box[1] / grain)
-    columns, rows = int(np.ceil((box[2] - left) / grain)), int(np.ceil((box[3] - top) / grain))
-    right, down = _middles(left, top, grain, rows, columns)
+    views: Sequence[View], pixels: Sequence[Pixels], grain: float, side: float, angles: tuple[float, ...]
+) -> Sprite:
+    """Fit the pictures of one grain, cell by cell, as far as `side` to each side of the light."""
+    columns = rows = 2 * round(side / grain)
+    right, down = _middles(-side, -side, grain, rows, columns)
     values = np.zeros((len(views), rows, columns, 3), np.float32)
     weights, noise = np.zeros_like(values), np.zeros_like(values[0])
     for k, (view, picture) in enumerate(zip(views, pixels, strict=True)):
@@ -174,12 +164,11 @@ def _fitted(
     noise = np.where(known, noise * len(angles) / np.maximum(total, 1e-9) ** 2, 0.0)
     pictures = np.where(known, found.reshape(len(angles), rows, columns, 3), np.nan)
     pictures = beside(sure(pictures, np.broadcast_to(noise, pictures.shape)))
-    if fade:
-        # beyond its border a fine picture is 0, and the coarse ones go on
-        pictures *= np.outer(_window(rows), _window(columns))[..., None]
+    # beyond its border a fine picture is 0, and the coarse ones go on
+    pictures *= np.outer(_window(rows), _window(columns))[..., None]
     unit, cells = packed(pictures, DIGIT * darkest_noise(views) / grain)
     return Sprite(
-        follows="light", grain_px=grain, corner_px=(float(left), float(top)), constellation_deg=angles, rows=rows,
+        follows="light", grain_px=grain, corner_px=(-side, -side), constellation_deg=angles, rows=rows,
         columns=columns, unit=unit, cells=cells,
     )  # fmt: skip
 
