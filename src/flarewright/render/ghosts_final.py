@@ -267,9 +267,10 @@ def draw_final(
         nearness = shot.packed.nearness / shot.incidence.tilt_cosine
         rings = shot.ringing.of(shot.packed, path, shot.light, bundle, pixels_per_mm, nearness)
         # only here: what has no rings need not know how they are seen
-        from .ripples import ripples_seen
+        from .ripples import LEAST_RIPPLE, SCREEN_RIPPLE, ripples_seen
 
-        rings = rings if rings is not None and ripples_seen(item, rings, bundle, around, 2.0**detail) else None
+        least = SCREEN_RIPPLE if quality.screen else LEAST_RIPPLE
+        rings = rings if rings is not None and ripples_seen(item, rings, bundle, around, 2.0**detail, least) else None
     if rings is not None:
         if _is_soft(bundle, opening.radius):
             step_px = max(BRIDGE_PX, BRIDGE_FRINGES * rings.fringe_px)

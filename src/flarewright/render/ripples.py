@@ -24,13 +24,17 @@ Floats = NDArray[np.float64]
 LEAST_RIPPLE = 0.01
 """A ripple less high than this part of the light that it lies in is not seen: Weber's fraction at its best."""
 
+SCREEN_RIPPLE = 0.03
+"""And of the light on a screen: a step or two of its 255 codes, where rings are a line of a pixel or two."""
+
 # directions in which the width of a light's spread is measured, over half a turn
 _DIRECTIONS = 16
 
 
 def ripples_seen(
-    item: FinalPass, rings: Rings, bundle: Bundle, around: Surroundings | None, pixel_px: float = 1.0
-) -> bool:
+    item: FinalPass, rings: Rings, bundle: Bundle, around: Surroundings | None, pixel_px: float = 1.0,
+    least: float = LEAST_RIPPLE,
+) -> bool:  # fmt: skip
     """Tell whether any ripple of a ghost's rings can be seen.
 
     Parameters
@@ -43,6 +47,8 @@ def ripples_seen(
         None: the ghost is looked at by itself.
     pixel_px : float
         Side of the pixels that it is drawn on, in those of `item`.
+    least : float
+        A ripple less high than this part of the light that it lies in is not seen.
 
     Returns
     -------
@@ -52,9 +58,9 @@ def ripples_seen(
     height = ripple_height(pixel_px / fringe)
     if item.source is not None:
         height = min(height, ripple_height(narrowest(item.source) / fringe))
-    if height < LEAST_RIPPLE:
+    if height < least:
         return False
-    return around is None or height * _largest_part(item, rings, bundle, around) >= LEAST_RIPPLE
+    return around is None or height * _largest_part(item, rings, bundle, around) >= least
 
 
 def narrowest(border: Floats) -> float:
