@@ -2,8 +2,9 @@
 
 A hand drags the light in circles at 60 moves a second for some seconds. Shown pictures are counted when the browser has
 painted them; latency runs from the pointer's move to the picture of that place. Processor time is that of the server
-and of all processes of the browser, which tells more than the clock where other programs run too (Linux). Needs the
-extra e2e and Chromium.
+and of all processes of the browser, which tells more than the clock where other programs run too (Linux). Of a lens
+that is traced for the screen before it is traced in full, a second line tells how far that picture is from the full
+one: in codes of 255, as the page shows both. Needs the extra e2e and Chromium.
 """
 
 from __future__ import annotations
@@ -17,7 +18,14 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "editor"))
 
+import numpy as np
 from chromium import Editor, Tab, browser
+
+from flarewright.editor import studio
+from flarewright.editor.files import project_for_lens
+from flarewright.editor.session import begin
+from flarewright.editor.shown import pixels_of
+from flarewright.editor.view import View
 
 SECONDS = 4.0
 # what comes first is not counted: pictures find their size
@@ -48,6 +56,21 @@ def processor_s(pids):
             continue
         total += (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
     return total
+
+
+def screen_apart(lens):
+    """Say how far the picture that is final for the screen is from the full one."""
+    project = project_for_lens(lens) if lens else begin(None)[0].project
+    screen, full = (studio.take(project, grade, View()) for grade in ("soon", "final"))
+    exposure = studio.exposure_of(full)
+    codes = (pixels_of(each.ghosts + each.rest, exposure, View()).astype(int) for each in (screen, full))
+    apart = np.abs(np.subtract(*codes))
+    light = screen.ghost_light.sum() / full.ghost_light.sum() - 1.0
+    return (
+        f"for the screen {screen.seconds:.2f} s, in full {full.seconds:.2f} s; apart by {apart.mean():.2f} codes of "
+        f"255 on average, 999 of 1000 by {np.percentile(apart, 99.9):.0f} at most, all by {apart.max()}; "
+        f"light of the ghosts {100.0 * light:+.2f} %"
+    )
 
 
 def measure(chrome, lens):
@@ -90,15 +113,17 @@ def measure(chrome, lens):
         final = tab.js("flarewright.view.stats.final")
         # what is quickly drawn needs no traced picture in between
         soon = tab.js("flarewright.view.stats.soon ?? null")
-        soon_told = "" if soon is None else f"traced for the screen {soon:.0f} ms and "
+        soon_told = "" if soon is None else f"final for the screen {soon:.0f} ms and "
         print(
             f"{lens or 'sample'}: {count / (now - begun_at):.0f} frames/s of {width} px, latency "
             f"{median(stats['latency']):.0f} ms (9 of 10 below {median(stats['latency'], 0.9):.0f}), processor time a "
-            f"frame {server_ms:.0f} ms in the server, {browser_ms:.0f} ms in the browser, {soon_told}final "
+            f"frame {server_ms:.0f} ms in the server, {browser_ms:.0f} ms in the browser, {soon_told}full picture "
             f"{final:.0f} ms after letting go, start to first picture {first:.1f} s; load {os.getloadavg()[0]:.0f}"
         )
         page.close()
         editor.end()
+        if soon is not None:
+            print(f"  {screen_apart(lens)}")
 
 
 if __name__ == "__main__":

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -135,3 +137,13 @@ def test_a_shape_is_as_narrow_as_its_least_width():
     turn = np.array([[0.0, -1.0], [1.0, 0.0]])
     assert narrowest(closed(corners)) == pytest.approx(2.0)
     assert narrowest(closed(corners @ turn)) == pytest.approx(2.0)
+
+
+def test_a_screen_shows_higher_ripples_only(monkeypatch):
+    """Of 2 %: a file has them, eight bits do not."""
+    monkeypatch.setattr(ripples, "ripple_height", lambda blur: 0.02 / blur)
+    item, rings = SimpleNamespace(source=None), SimpleNamespace(widest_px=1.0)
+    assert ripples.ripples_seen(item, rings, None, None)
+    assert not ripples.ripples_seen(item, rings, None, None, least=ripples.SCREEN_RIPPLE)
+    rings = SimpleNamespace(widest_px=2.0)
+    assert ripples.ripples_seen(item, rings, None, None, least=ripples.SCREEN_RIPPLE)

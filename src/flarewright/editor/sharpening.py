@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 SOON_S = 0.35
 # one whose final picture takes more is first traced as well as a screen can show, which takes a third of the time
 LATE_S = 0.4
+# of one that takes more than this a third is too long: without rings it takes half of that
+RINGS_S = 1.6
 # and one that takes so long is not waited for by whoever clicks on a ghost
 SEEN_FIRST_S = 2.5
 # what is done sooner than WAIT_S needs no progress told
@@ -30,8 +32,8 @@ WAIT_S, TELL_S = 0.6, 0.12
 def sharpen(screen: Screen, project: Project, view: View, check: Check) -> None:
     """Draw a project for the screen: a draft, the final picture, then what lies where in it.
 
-    A hand's last picture is as good as a draft. A final picture that takes long is first traced at few wavelengths,
-    with the detail that eight bits show.
+    A hand's last picture is as good as a draft. A final picture that takes long is first traced with the detail that
+    eight bits show.
 
     Parameters
     ----------
@@ -109,8 +111,8 @@ def _exposure(screen: Screen, picture: Picture) -> float:
 
 def _show_soon(screen: Screen, project: Project, view: View, check: Check) -> None:
     """Trace a project as well as a screen can show it, unless something newer waits by then."""
-    progress = _progress(screen, "traced picture", check)
-    soon = studio.take(project, "soon", view, room=screen.room, progress=progress)
+    progress, rings = _progress(screen, "traced picture", check), screen.final_s <= RINGS_S
+    soon = studio.take(project, "soon", view, room=screen.room, rings=rings, progress=progress)
     check()
     screen.show(soon)
 

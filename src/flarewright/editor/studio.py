@@ -34,11 +34,9 @@ WIDEST, HIGHEST = 960, 540
 # where it rests it is as large as a page shows it, and has no more pixels than this
 MOST_PX = 1920 * 1080
 DRAFT_WAVELENGTHS = 3
-# and those of a first traced picture, for eight bits; coatings tell the colours between them
-SOON_WAVELENGTHS = 5
-# its faintest ghosts are left out that carry together no more than this part of all ghost light
-SOON_CULL = 3e-3
-SOON_TOLERANCE_PX = 1.0
+# and the most of a picture that is final for the screen; coatings tell the colours between them
+SOON_WAVELENGTHS = 7
+SOON_TOLERANCE_PX = 0.5
 NO_RINGS = (
     "the screen leaves out rings inside ghosts, which are slow through an image, dirt or cylinders and for spectral "
     "lines; files have them"
@@ -107,7 +105,9 @@ def rest_size(project: Project, room: tuple[int, int]) -> tuple[int, int]:
     return max(view_size(project), (round(width * zoom), round(height * zoom)))
 
 
-def staged(project: Project, grade: Grade, scale: float = 1.0, room: tuple[int, int] | None = None) -> Project:
+def staged(
+    project: Project, grade: Grade, scale: float = 1.0, room: tuple[int, int] | None = None, rings: bool = True
+) -> Project:
     """Return the project as the viewport draws it: its frame at another size, its quality as far as is needed.
 
     Parameters
@@ -118,6 +118,8 @@ def staged(project: Project, grade: Grade, scale: float = 1.0, room: tuple[int, 
         Of the picture's sides.
     room : tuple of int, optional
         As of `rest_size`, of a picture that rests.
+    rings : bool
+        False: a picture that is traced soon has none, however well they would be seen.
 
     Returns
     -------
@@ -135,8 +137,9 @@ def staged(project: Project, grade: Grade, scale: float = 1.0, room: tuple[int, 
             quality = quality.replace(ringing="off")
         if grade == "soon":
             few = min(quality.wavelengths, SOON_WAVELENGTHS)
-            quality = quality.replace(wavelengths=few, bridge=True, ringing="off", cull=max(quality.cull, SOON_CULL))
-            quality = quality.replace(tolerance_px=max(quality.tolerance_px, SOON_TOLERANCE_PX), screen=True)
+            coarse = max(quality.tolerance_px, SOON_TOLERANCE_PX)
+            quality = quality.replace(wavelengths=few, bridge=True, tolerance_px=coarse, screen=True)
+            quality = quality if rings else quality.replace(ringing="off")
     else:
         quality = Quality(mode="draft", wavelengths=DRAFT_WAVELENGTHS, paths=own.paths)
     output = Output(layers="passes", starburst=project.output.starburst)
@@ -166,6 +169,7 @@ def take(
     *,
     scale: float = 1.0,
     room: tuple[int, int] | None = None,
+    rings: bool = True,
     levels: Levels = (),
     progress: Callable[[float, str], None] | None = None,
 ) -> Picture:
@@ -177,7 +181,7 @@ def take(
     grade : {"moving", "draft", "soon", "final", "working"}
         "working" draws what `look` asks for by `working_ghosts`.
     look : View
-    scale, room
+    scale, room, rings
         As of `staged`.
     levels : Levels
         `Match.levels` of a draft.
@@ -194,7 +198,7 @@ def take(
         When the project cannot be rendered.
     """
     begun = time.perf_counter()
-    stage = staged(project, grade, scale, room)
+    stage = staged(project, grade, scale, room, rings)
     size = stage.camera.size_px
     if look.grey or look.unclipped:
         layer = working_ghosts(stage, grey=look.grey, unclipped=look.unclipped)

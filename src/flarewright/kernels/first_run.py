@@ -85,6 +85,19 @@ ROOTS = {
         "i8[::1], i8[::1], f8[::1], f8[::1], f8[::1], f8[::1], f8, f8, f8, f8[::1], f8[::1], f8[:,::1]",
         0.7,
     ),
+    "reached edges": ("lit_edge.reached_edges", "f8[:,::1], f8, f8, b1[::1]", 0.1),
+    "bounded by iris": ("lit_edge.bounded_by_iris", "f8[:,::1], i8[:,::1], f8", 0.2),
+    "ghost's box": ("lit_edge.widen_box", "f8[:,::1], f8, f8[:,::1], f8, f8[::1]", 0.1),
+    "seen stop": (
+        "lit_edge.widen_stops",
+        "f8[:,::1], i8[:,::1], f8[:,:,::1], f8[::1], f8, f8[:,::1], f8[:,::1]",
+        0.3,
+    ),
+    "edge's part": (
+        "lit_edge.largest_part",
+        "f8[:,::1], i8[:,::1], f8[::1], b1[::1], f8, f8, f8[:,::1], f8[:,::1], f8, f8[:,::1]",
+        0.3,
+    ),
     "shifts": ("standing.wide_shift", "f8[:,::1], f8[:,::1], f8, f8, f8", 0.3),
     "path curves": (
         "path_curves.multiply_mirrors",

@@ -18,14 +18,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernels import matrix
+from ..kernels.matrix import path_matrices
 from .pack import PackedLens
 from .paths import LightPath
 
 Floats = NDArray[np.float64]
-
-# a few dozen steps: Python has them done before a compiled kernel would be loaded
-_path_matrices = getattr(matrix.path_matrices, "py_func", matrix.path_matrices)
 
 RIPPLES = (
     (0.1, 0.25, 0.5, 0.8, 1.0, 1.4, 2.0, 3.0, 4.0, 6.0, 8.0),
@@ -80,12 +77,13 @@ def stop_to_sensor(packed: PackedLens, path: LightPath, nearness: float = 0.0) -
     sides = [packed.curvature] if packed.curvature_x is None else [packed.curvature_x, packed.curvature]
     count, crossings = len(packed.wavelengths_nm), path.stop_crossings
     found = np.empty((2, crossings, count, 2))
-    to_stop = np.empty((crossings, 2, 2, count))
+    to_stops, system = np.empty((count, crossings, 2, 2)), np.empty((count, 4))
     for side, curvature in enumerate(sides):
-        # indices as (K + 1, W): every step is done for all colours at once
-        S00, S01, _, _ = _path_matrices(
-            path.rows, path.actions, curvature, packed.z_vertex, packed.n_gap.T, packed.sensor_z, to_stop
-        )
+        for w in range(count):
+            system[w] = path_matrices(
+                path.rows, path.actions, curvature, packed.z_vertex, packed.n_gap[w], packed.sensor_z, to_stops[w]
+            )
+        to_stop, (S00, S01, _, _) = to_stops.transpose(1, 2, 3, 0), system.T
         a, s = to_stop[:, 0, 0] + nearness * to_stop[:, 0, 1], S00 + nearness * S01
         B = S01 * to_stop[:, 0, 0] - S00 * to_stop[:, 0, 1]
         with np.errstate(divide="ignore", invalid="ignore"):

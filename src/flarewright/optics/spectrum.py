@@ -252,7 +252,12 @@ def band_contents(spectrum: Spectrum, wavelengths_nm: ArrayLike) -> tuple[tuple[
         For each of the N: the wavelengths in its band, and their shares of the sum of X, Y and Z, which is 1 in all.
         A wavelength that stands for no light has itself.
     """
-    nodes = np.atleast_1d(np.asarray(wavelengths_nm, dtype=np.float64))
+    return _band_contents(spectrum, tuple(np.atleast_1d(np.asarray(wavelengths_nm, dtype=np.float64)).tolist()))
+
+
+@lru_cache(maxsize=256)
+def _band_contents(spectrum: Spectrum, nodes_nm: tuple[float, ...]) -> tuple[tuple[Floats, Floats], ...]:
+    nodes = np.array(nodes_nm)
     wave, xyz = _stimulus(spectrum)
     power = xyz.sum(axis=1)
     found = []

@@ -41,13 +41,12 @@ def compile_for_render(project: Project, threads: int | None = None) -> None:
         if project.quality.bridge and project.quality.wavelengths > 1:
             names += ["shifts", "seen", "standing"]
             names += ["traced mirrors", "path curves", "bends"] if coated else []
-        # wide open, and with lights that have a size, rings are rarely seen: then it is compiled when it is called
-        if (
-            project.quality.ringing != "off"
-            and project.f_number is not None
-            and not all(light.extended for light in project.lights)
-        ):
-            names += ["draw ringing"]
+        if project.quality.ringing != "off":
+            names += ["path matrices", "reached edges", "edge's part"]
+            # wide open, and with lights that have a size, rings are rarely seen: what draws them is compiled when it
+            # is called
+            if project.f_number is not None and not all(light.extended for light in project.lights):
+                names += ["draw ringing", "bounded by iris", "ghost's box"]
     elif project.quality.mode == "draft" and iris.mask is None:
         # a draft through a mask is rare: its kernel is compiled when it is called
         # only here: what the ghost analysis starts with need not know how ghosts are drawn

@@ -18,8 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..kernels.bundle import draw_bundle, measure_bundle, node_densities
+from ..kernels.lit_edge import bounded_by_iris
 from ..kernels.standing import wide_shift
-from ..kernels.trace import ALIVE, REL, STOP_X, X, Y
+from ..kernels.trace import ALIVE
 from ..model import Quality
 from ..optics.border import mapped, points
 from ..optics.bundle import Bundle, trace_bundle, trace_grid
@@ -266,9 +267,10 @@ def draw_final(
         nearness = shot.packed.nearness / shot.incidence.tilt_cosine
         rings = shot.ringing.of(shot.packed, path, shot.light, bundle, pixels_per_mm, nearness)
         # only here: what has no rings need not know how they are seen
-        from .ripples import ripples_seen
+        from .ripples import LEAST_RIPPLE, SCREEN_RIPPLE, ripples_seen
 
-        rings = rings if rings is not None and ripples_seen(item, rings, bundle, around, 2.0**detail) else None
+        least = SCREEN_RIPPLE if quality.screen else LEAST_RIPPLE
+        rings = rings if rings is not None and ripples_seen(item, rings, bundle, around, 2.0**detail, least) else None
     if rings is not None:
         if _is_soft(bundle, opening.radius):
             step_px = max(BRIDGE_PX, BRIDGE_FRINGES * rings.fringe_px)
@@ -344,18 +346,7 @@ def _drawn_in_few(
 
 def _is_soft(bundle: Bundle, iris_radius: float) -> bool:
     """Tell whether nothing but the iris bounds a bundle: no rim cuts it, and it does not fold."""
-    for data in bundle.traced.values():
-        radius = np.hypot(data[:, STOP_X::2], data[:, STOP_X + 1 :: 2])
-        within = (data[:, ALIVE] > 0.0) & (radius <= iris_radius).all(axis=1)
-        if (data[within, REL] > 1.0).any():
-            return False
-        corners = np.ascontiguousarray(bundle.triangles.T)
-        nodes = corners[:, within[corners].all(axis=0)]
-        x, y = data[nodes, X], data[nodes, Y]
-        area = (x[1] - x[0]) * (y[2] - y[0]) - (y[1] - y[0]) * (x[2] - x[0])
-        if area.size and area.min() * area.max() < 0.0:
-            return False
-    return True
+    return all(bounded_by_iris(data, bundle.triangles, iris_radius) for data in bundle.traced.values())
 
 
 def _with_shadow(item: FinalPass, rings: Rings, quality: Quality, scale: float) -> Bundle:

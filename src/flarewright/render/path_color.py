@@ -22,7 +22,7 @@ RAYS = 12
 # and these are looked for among so many triangles of its grid
 TRIANGLES = 512
 
-__all__ = ["direct_bend", "direct_flux", "draft_weights", "places_of", "seen_of", "spread_rays", "traced_bend"]
+__all__ = ["direct_bend", "direct_flux", "draft_weights", "place_of", "seen_of", "spread_rays", "traced_bend"]
 
 
 def traced_bend(shot: Shot, path: LightPath, bundle: Bundle, to_pixels: Floats) -> Floats | None:
@@ -100,9 +100,7 @@ def seen_of(shot: Shot, to_pixels: Floats) -> Callable[[Floats], Bools]:
     callable
         From rays as in `optics.bundle.trace_points`, shape (N, 5 + 2 C), to a mask of shape (N,).
     """
-    place = np.empty((2, 3))
-    place[:, 0], place[:, 1:] = to_pixels[:2], _turned(shot, to_pixels)
-    return _seen(shot, place, shot.size_px)
+    return _seen(shot, place_of(shot, to_pixels), shot.size_px)
 
 
 def _seen(shot: Shot, place: Floats, size_px: tuple[float, float]) -> Callable[[Floats], Bools]:
@@ -116,30 +114,24 @@ def _seen(shot: Shot, place: Floats, size_px: tuple[float, float]) -> Callable[[
     return seen
 
 
-def _turned(shot: Shot, to_pixels: Floats) -> Floats:
-    """Tell how columns and rows grow with x and y in the meridional frame, shape (2, 2), pixels per mm."""
-    # the upright picture is the meridional frame's, turned and upside down
-    turned: Floats = (-shot.incidence.axes * [to_pixels[2], -to_pixels[3]]).T
-    return turned
-
-
-def places_of(shot: Shot, to_pixels: Floats, x: Floats, y: Floats) -> tuple[Floats, Floats]:
-    """Tell the columns and rows of places on the sensor.
+def place_of(shot: Shot, to_pixels: Floats) -> Floats:
+    """Tell where the meridional frame lies in the picture, as kernels read it.
 
     Parameters
     ----------
     shot : Shot
     to_pixels : ndarray, shape (4,)
         The shot's, or a ghost's own.
-    x, y : ndarray
-        Meridional frame, mm.
 
     Returns
     -------
-    columns, rows : ndarray
+    ndarray, shape (2, 3)
+        Column and row of the axis, and how they grow with x and with y, pixels per mm.
     """
-    turned = _turned(shot, to_pixels)
-    return to_pixels[0] + turned[0, 0] * x + turned[0, 1] * y, to_pixels[1] + turned[1, 0] * x + turned[1, 1] * y
+    place = np.empty((2, 3))
+    # the upright picture is the meridional frame's, turned and upside down
+    place[:, 0], place[:, 1:] = to_pixels[:2], (-shot.incidence.axes * [to_pixels[2], -to_pixels[3]]).T
+    return place
 
 
 def direct_bend(shot: Shot, lens: Lens) -> Floats | None:

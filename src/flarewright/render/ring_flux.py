@@ -15,12 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..kernels.bundle import draw_bundle, node_densities
-from ..kernels.raster import blank_plane, to_pixels
-from ..kernels.trace import ALIVE, REL, STOP_X, X, Y
+from ..kernels.lit_edge import widen_box
+from ..kernels.raster import blank_plane
 from ..optics.bundle import Bundle, trace_bundle
 from ..optics.tears import mended
+from .path_color import place_of
 
 if TYPE_CHECKING:
+    from .canvas import Plane
     from .ringing import Textures
     from .shot import Shot
 
@@ -128,17 +130,12 @@ def _over(sharp: float, ringed: float) -> float:
 
 def _box(shot: Shot, patterns: Textures, ringed: Bundle, place: Floats) -> Box | None:
     """Return left, top, right and bottom of a ghost, pixels of the picture; None where no ray passes."""
-    ends = []
+    at, box = place_of(shot, place), np.array([np.inf, -np.inf, np.inf, -np.inf])
     for data in ringed.traced.values():
-        radius = np.hypot(data[:, STOP_X::2], data[:, STOP_X + 1 :: 2])
-        lit = data[(data[:, ALIVE] > 0.0) & (data[:, REL] <= 1.0) & (radius <= patterns.rings.reach).all(axis=1)]
-        for side in (1.0, -1.0)[: ringed.halves]:
-            ends.append(place[:2] + place[2:] * (-1.0, 1.0) * ((lit[:, [X, Y]] * (side, 1.0)) @ shot.incidence.axes))
-    at = np.concatenate(ends)
-    if not len(at):
-        return None
-    (left, top), (right, bottom) = at.min(axis=0), at.max(axis=0)
-    return float(left), float(top), float(right), float(bottom)
+        for mirror in (1.0, -1.0)[: ringed.halves]:
+            widen_box(data, patterns.rings.reach, at, mirror, box)
+    left, right, top, bottom = box.tolist()
+    return (left, top, right, bottom) if right >= left else None
 
 
 def _compared(box: Box | None, size_px: tuple[int, int]) -> Box | None:
@@ -173,7 +170,7 @@ def _sharp(shot: Shot, place: Floats, box: Box, whole: Bundle, data: Floats) -> 
         whole.path.stop_crossings, opening.blades, opening.levels, shot.incidence.axes, at, shot.gain, np.ones(3),
         plane, whole.halves,
     )  # fmt: skip
-    return float(to_pixels(plane, width).sum(dtype=np.float64))
+    return _light(plane, width)
 
 
 def _ringed(
@@ -183,4 +180,9 @@ def _ringed(
     at, width, height = _scratch(place, box)
     plane = blank_plane(width, height)
     patterns.draw(k, whole, data, densities, shot.incidence.axes, at, shot.gain, np.ones(3), plane)
-    return float(to_pixels(plane, width).sum(dtype=np.float64))
+    return _light(plane, width)
+
+
+def _light(plane: Plane, width: int) -> float:
+    """Add up a white picture: each of its colours says the same."""
+    return float(plane[:, :, 0].reshape(len(plane), -1)[:, :width].sum(dtype=np.float64))

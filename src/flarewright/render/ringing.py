@@ -18,9 +18,9 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from ..kernels.lit_edge import reached_edges
 from ..kernels.pattern import EDGE, FIRST
 from ..kernels.ringing import draw_ringing
-from ..kernels.trace import ALIVE, REL, STOP_X
 from ..model import Light
 from ..model.light import Lines
 from ..optics.blade_form import BladeForm, blade_form
@@ -356,10 +356,15 @@ class Rings:
         """How far out in the stop light is looked for, mm."""
         return max(item.reach for item in self.crossings if not isinstance(item, Piece))
 
-    def lit_nodes(self, data: Floats) -> NDArray[np.bool_]:
-        """Tell which rays of a traced bundle come to an edge that has rings."""
-        ringed = [c for c, item in enumerate(self.crossings) if not isinstance(item, Piece)]
-        return np.asarray(_near_edge(data, len(self.crossings), self.ringing.opening)[:, ringed].any(axis=1))
+    @property
+    def ringed(self) -> NDArray[np.bool_]:
+        """At which crossings the edge has rings, shape (C,)."""
+        return np.array([not isinstance(item, Piece) for item in self.crossings])
+
+    @property
+    def edges(self) -> tuple[float, float]:
+        """Between which radii a ray is near the edge of the iris, the larger one first, mm."""
+        return _edges(self.ringing.opening)
 
     @property
     def white(self) -> bool:
@@ -499,17 +504,14 @@ def _lit(traced: Sequence[Floats], crossings: int, opening: Opening) -> list[boo
     """Tell for each crossing whether light that passes everything else comes to the edge of the iris."""
     lit = np.zeros(crossings, dtype=np.bool_)
     for data in traced:
-        lit |= _near_edge(data, crossings, opening).any(axis=0)
-    return [bool(shines) for shines in lit]
+        reached_edges(data, *_edges(opening), lit)
+    return lit.tolist()
 
 
-def _near_edge(data: Floats, crossings: int, opening: Opening) -> NDArray[np.bool_]:
-    """Tell which rays pass everything near the edge of the iris, at which crossing: shape (N, C)."""
+def _edges(opening: Opening) -> tuple[float, float]:
+    """Return between which radii a ray is near the edge of the iris, the larger one first, mm."""
     # an image may have edges anywhere
-    inner = 0.0 if opening.mask is not None else LIT * opening.inner
-    radius = np.hypot(data[:, STOP_X::2], data[:, STOP_X + 1 :: 2])[:, :crossings]
-    passing = (data[:, ALIVE] > 0.0) & (data[:, REL] <= 1.0) & (radius <= opening.radius * (1.0 + 1e-9)).all(axis=1)
-    return np.asarray(passing[:, None] & (radius >= inner), dtype=np.bool_)
+    return opening.radius * (1.0 + 1e-9), 0.0 if opening.mask is not None else LIT * opening.inner
 
 
 def _crossing(

@@ -8,12 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..kernels.bundle import node_densities
-from ..kernels.trace import ALIVE, X, Y
+from ..kernels.lit_edge import largest_part
 from ..optics.border import points
 from ..optics.bundle import Bundle
 from ..optics.ringing import ripple_height
-from .path_color import places_of
-from .seen_stop import touching
+from .path_color import place_of
 from .surroundings import Surroundings, unit
 
 if TYPE_CHECKING:
@@ -25,13 +24,17 @@ Floats = NDArray[np.float64]
 LEAST_RIPPLE = 0.01
 """A ripple less high than this part of the light that it lies in is not seen: Weber's fraction at its best."""
 
+SCREEN_RIPPLE = 0.03
+"""And of the light on a screen: a step or two of its 255 codes, where rings are a line of a pixel or two."""
+
 # directions in which the width of a light's spread is measured, over half a turn
 _DIRECTIONS = 16
 
 
 def ripples_seen(
-    item: FinalPass, rings: Rings, bundle: Bundle, around: Surroundings | None, pixel_px: float = 1.0
-) -> bool:
+    item: FinalPass, rings: Rings, bundle: Bundle, around: Surroundings | None, pixel_px: float = 1.0,
+    least: float = LEAST_RIPPLE,
+) -> bool:  # fmt: skip
     """Tell whether any ripple of a ghost's rings can be seen.
 
     Parameters
@@ -44,6 +47,8 @@ def ripples_seen(
         None: the ghost is looked at by itself.
     pixel_px : float
         Side of the pixels that it is drawn on, in those of `item`.
+    least : float
+        A ripple less high than this part of the light that it lies in is not seen.
 
     Returns
     -------
@@ -53,9 +58,9 @@ def ripples_seen(
     height = ripple_height(pixel_px / fringe)
     if item.source is not None:
         height = min(height, ripple_height(narrowest(item.source) / fringe))
-    if height < LEAST_RIPPLE:
+    if height < least:
         return False
-    return around is None or height * _largest_part(item, rings, bundle, around) >= LEAST_RIPPLE
+    return around is None or height * _largest_part(item, rings, bundle, around) >= least
 
 
 def narrowest(border: Floats) -> float:
@@ -69,17 +74,9 @@ def _largest_part(item: FinalPass, rings: Rings, bundle: Bundle, around: Surroun
     """Compare a ghost's irradiance at its lit edge with all light there, where it is in the picture."""
     data = bundle.traced[len(item.shot.packed.wavelengths_nm) // 2]
     own = node_densities(data, bundle.pupil, bundle.triangles) * unit(item, bundle, data)
-    lit = rings.lit_nodes(data)
-    # corner by corner: three long rows are compared many times faster than many rows of three
-    corners = np.ascontiguousarray(bundle.triangles.T)
-    near = corners[:, lit[corners].any(axis=0) & (data[:, ALIVE] > 0.0)[corners].all(axis=0)]
-    largest = 0.0
-    for mirror in (1.0, -1.0)[: bundle.halves]:
-        # what a ray that ended holds may be infinite, so only of those that live is anything computed
-        c, r = places_of(item.shot, item.to_pixels, mirror * data[near, X], data[near, Y])
-        seen = touching(c, r, around.corners_px)
-        if seen.any():
-            bright = own[near[:, seen]].max(axis=0)
-            there = np.maximum(around.at(c[:, seen], r[:, seen]).min(axis=0), bright)
-            largest = max(largest, float((bright / np.maximum(there, 1e-300)).max()))
-    return largest
+    place, edges = place_of(item.shot, item.to_pixels), rings.edges
+    parts = [
+        largest_part(data, bundle.triangles, own, rings.ringed, *edges, place, around.corners_px, mirror, around.least)
+        for mirror in (1.0, -1.0)[: bundle.halves]
+    ]
+    return float(max(parts))

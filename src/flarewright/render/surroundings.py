@@ -46,18 +46,6 @@ class Surroundings:
         """Return the same for a sheet of lower resolution, whose halvings are counted, with margins on each side."""
         return Surroundings(self.least, self.corners_px / 2.0**detail + np.array(margins))
 
-    def at(self, columns: Floats, rows: Floats) -> Floats:
-        """Return what there is at least around some places, in pixels; those beside the picture take the nearest."""
-        shape = self.least.shape[::-1]
-        first, last = self.corners_px
-        per_px = np.array(shape) / (last - first)
-        c, r = (
-            np.clip((place - first[k]) * per_px[k], 0, shape[k] - 1).astype(np.intp)
-            for k, place in enumerate((columns, rows))
-        )
-        found: Floats = self.least[r, c]
-        return found
-
 
 def surroundings(
     items: Sequence[FinalPass], run: Callable[[Sketch, Sequence[FinalPass]], Iterable[Singles]]

@@ -342,7 +342,7 @@ function working(words, part) {
   bar.style.width = `${100 * part}%`;
 }
 app.status = status;
-const GRADES = { moving: 'moving, by matrices', draft: 'draft, by matrices', soon: 'by traced rays, getting sharper', final: 'final, by traced rays', working: 'working view, by matrices' };
+const GRADES = { moving: 'moving, by matrices', draft: 'draft, by matrices', soon: 'final for the screen, by traced rays', final: 'final, by traced rays', working: 'working view, by matrices' };
 const FIRST = 'drawing the first picture; the very first on a machine takes some ten seconds';
 function gradeWords({ grade: drawn, seconds, number, current, problem }) {
   const { mover, shownGrade, shownNumber } = app.view;
