@@ -15,7 +15,7 @@ from flarewright.io.ghost_model_file import read_ghost_model, write_ghost_model
 from flarewright.measure.glow import offsets
 from flarewright.measure.numbers import frame
 from flarewright.measure.replay import light_px, replay
-from flarewright.measure.sprite_fit import axis_sprite, drawn, light_sprites
+from flarewright.measure.sprite_fit import axis_sprite, drawn, light_sprites, seen_near
 from flarewright.measure.sprites import draw_sprites, sprite_at
 from flarewright.measure.stages import light_law, with_rest
 from flarewright.measure.views import View
@@ -199,3 +199,14 @@ def test_a_broken_sprite_is_told_in_a_sentence(tmp_path):
         path.write_text(json.dumps(said))
         with pytest.raises(FlarewrightError, match=words):
             read_ghost_model(path)
+
+
+def test_what_no_view_shows_about_a_constellation_is_not_told_from_afar():
+    told, knots = np.arange(10.0), np.array([0.0, 3.0, 6.0, 9.0])
+    weights = np.ones((10, 3), np.float32)
+    weights[5:, 1] = 0.0
+    weights[:, 2] = 0.0
+    near = seen_near(weights, told, knots)
+    assert near[:, 0].all()
+    assert near[:, 1].tolist() == [True, True, False, False]
+    assert not near[:, 2].any()

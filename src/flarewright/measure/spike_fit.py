@@ -25,6 +25,7 @@ from .sprite_fit import (
     even_knots,
     over_angles,
     points,
+    seen_near,
     sure,
 )
 from .views import Pixels, View
@@ -109,7 +110,8 @@ def _strip(
     total = weights.sum(axis=0)
     known = total >= ENOUGH * len(views) / max(len(angles), VIEWS)
     noise = np.where(known, noise * len(angles) / np.maximum(total, 1e-9) ** 2, 0.0)
-    pictures = np.where(known, fitted.reshape(len(angles), rows, columns, 3), np.nan)
+    near = seen_near(weights.reshape(shape), told, np.array(angles)).reshape(len(angles), rows, columns, 3)
+    pictures = np.where(known & near, fitted.reshape(len(angles), rows, columns, 3), np.nan)
     pictures = _above_sides(beside(sure(pictures, np.broadcast_to(noise, pictures.shape))))
     unit, cells = packed(pictures, DIGIT * darkest_noise(views) / stretch**0.5)
     return Sprite(

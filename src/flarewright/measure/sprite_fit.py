@@ -162,7 +162,8 @@ def _fitted(
     total = weights.sum(axis=0)
     known = total >= ENOUGH * len(views) / max(len(angles), VIEWS)
     noise = np.where(known, noise * len(angles) / np.maximum(total, 1e-9) ** 2, 0.0)
-    pictures = np.where(known, found.reshape(len(angles), rows, columns, 3), np.nan)
+    near = seen_near(weights.reshape(shape), told, np.array(angles)).reshape(len(angles), rows, columns, 3)
+    pictures = np.where(known & near, found.reshape(len(angles), rows, columns, 3), np.nan)
     pictures = beside(sure(pictures, np.broadcast_to(noise, pictures.shape)))
     # beyond its border a fine picture is 0, and the coarse ones go on
     pictures *= np.outer(_window(rows), _window(columns))[..., None]
@@ -203,6 +204,16 @@ def over_angles(values: Pixels, weights: Pixels, told: Floats, knots: Floats) ->
             weight = own / (1.0 + np.where(off > 0.0, off, 0.5 * off) ** 2)
         out[:, part] = solved.T
     return out
+
+
+def seen_near(weights: Pixels, told: Floats, knots: Floats) -> NDArray[np.bool_]:
+    """Tell which cells views show about each constellation; elsewhere a fit only goes on; shape (K, cells).
+
+    Where the light rolls these come into pictures that no view was: right of a light that was always on the right.
+    """
+    hats = _hats(told, knots)
+    least = np.minimum(ENOUGH, 0.5 * hats.sum(axis=0))
+    return np.asarray(hats.T @ weights >= least[:, None])
 
 
 def _hats(told: Floats, knots: Floats) -> Floats:
