@@ -61,7 +61,8 @@ def processor_s(pids):
 def screen_apart(lens):
     """Say how far the picture that is final for the screen is from the full one."""
     project = project_for_lens(lens) if lens else begin(None)[0].project
-    screen, full = (studio.take(project, grade, View()) for grade in ("soon", "final"))
+    # the first of each only to have everything loaded
+    *_, screen, full = (studio.take(project, grade, View()) for grade in ("soon", "final", "soon", "final"))
     exposure = studio.exposure_of(full)
     codes = (pixels_of(each.ghosts + each.rest, exposure, View()).astype(int) for each in (screen, full))
     apart = np.abs(np.subtract(*codes))
