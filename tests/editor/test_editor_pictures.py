@@ -494,6 +494,8 @@ def test_what_would_be_late_with_rings_is_traced_for_the_screen_without_them(mon
     screen = Screen(session)
     screen.start()
     assert screen.wait(60.0)
+    # the first of all says nothing of the next: it also loads what draws it
+    assert screen.final_s == pytest.approx(0.5 * screen.picture.seconds)
     told, real = [], studio.take
 
     def watched(project, grade, *words, **more):
@@ -507,6 +509,7 @@ def test_what_would_be_late_with_rings_is_traced_for_the_screen_without_them(mon
         screen.final_s = seconds
         session.do("move_light", {"light": 0, "x": light[0] + step, "y": light[1]})
         assert screen.wait(60.0)
+    assert screen.final_s == screen.picture.seconds
     quick, slow = told
     assert quick.ringing == session.project.quality.ringing == "collins"
     assert slow == quick.replace(ringing="off")

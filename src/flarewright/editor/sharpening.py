@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -22,7 +23,9 @@ SOON_S = 0.35
 # one whose final picture takes more is first traced as well as a screen can show, which takes a third of the time
 LATE_S = 0.4
 # of one that takes more than this a third is too long: without rings it takes half of that
-RINGS_S = 1.6
+RINGS_S = 2.0
+# the first final picture of all also loads what draws it: it takes so many times as long as the next
+LOADING = 2.0
 # and one that takes so long is not waited for by whoever clicks on a ghost
 SEEN_FIRST_S = 2.5
 # what is done sooner than WAIT_S needs no progress told
@@ -125,7 +128,7 @@ def _show_final(
     draft, levels = drafted
     final = _final(screen, project, view, check)
     check()
-    screen.final_s = final.seconds
+    screen.final_s = final.seconds / (LOADING if screen.final_s == math.inf else 1.0)
     if fresh:
         screen.match = replace(screen.match, exposure_stops=_exposure(screen, final))
         if screen.exposed:
