@@ -14,7 +14,7 @@ from flarewright.measure.packed import pack
 from flarewright.measure.replay import replay
 from flarewright.measure.settle import to_model
 from flarewright.measure.speck_sprites import covered, speck_sprites, specks_of
-from flarewright.measure.specks_drawn import Grid, Outline, draw_specks, outline, reading, speck_at
+from flarewright.measure.specks_drawn import Grid, Outline, add_speck, draw_specks, outline, reading
 from flarewright.model.ghost_model import GhostModel
 from flarewright.model.sprite import Sprite, packed
 
@@ -111,7 +111,8 @@ def test_a_picture_keeps_its_light_wherever_it_lies(roll, scale):
     picture = np.zeros((12, 16, 3), np.float32)
     picture[3:9, 4:12] = np.random.default_rng(1).random((6, 8, 3))
     size = (round(140 * scale), round(140 * scale))
-    out = speck_at(grid, at, frame((70.0, 70.0), roll, 5.0, scale), size, picture)
+    out = np.zeros((size[1], size[0], 3), np.float32)
+    add_speck(out, grid, at, frame((70.0, 70.0), roll, 5.0, scale), picture)
     # cells are half a pixel, half as large again where the ghost is
     area = (0.5 * 1.5 * scale) ** 2
     assert out.sum(axis=(0, 1)) == pytest.approx(picture.sum(axis=(0, 1)) * area, rel=0.02)

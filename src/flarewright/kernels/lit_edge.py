@@ -3,14 +3,8 @@
 import numpy as np
 
 from ._jit import borrowing, compiled
-from .standing import _crosses
+from .standing import crosses, landed, passes
 from .trace import ALIVE, REL, STOP_X, X, Y
-
-
-@borrowing
-def _passes(rays, k, iris_radius):
-    """Tell whether a ray meets no rim and crosses the stop in a circle, each time."""
-    return rays[k, ALIVE] > 0.0 and rays[k, REL] <= 1.0 and _crosses(rays, k, iris_radius)
 
 
 @borrowing
@@ -26,7 +20,7 @@ def _land(rays, triangles, t, place, mirror):
     left, right, top, bottom = np.inf, -np.inf, np.inf, -np.inf
     for m in range(3):
         x, y = mirror * rays[triangles[t, m], X], rays[triangles[t, m], Y]
-        column, row = place[0, 0] + place[0, 1] * x + place[0, 2] * y, place[1, 0] + place[1, 1] * x + place[1, 2] * y
+        column, row = landed(place, x, y)
         left, right, top, bottom = min(left, column), max(right, column), min(top, row), max(bottom, row)
     return left, right, top, bottom
 
@@ -51,7 +45,7 @@ def reached_edges(rays, iris_radius, inner, reached):
         True is written where it is; the rest is left.
     """
     for k in range(rays.shape[0]):
-        if _passes(rays, k, iris_radius):
+        if passes(rays, k, iris_radius):
             for c in range(reached.size):
                 reached[c] = reached[c] or _comes_near(rays, k, c, inner)
 
@@ -73,7 +67,7 @@ def bounded_by_iris(rays, triangles, iris_radius):
     """
     within = np.empty(rays.shape[0], dtype=np.bool_)
     for k in range(rays.shape[0]):
-        within[k] = rays[k, ALIVE] > 0.0 and _crosses(rays, k, iris_radius)
+        within[k] = rays[k, ALIVE] > 0.0 and crosses(rays, k, iris_radius)
         if within[k] and rays[k, REL] > 1.0:
             return False
     low, high = np.inf, -np.inf
@@ -103,10 +97,9 @@ def widen_box(rays, reach, place, mirror, box):
         Left, right, top and bottom, pixels.
     """
     for k in range(rays.shape[0]):
-        if _passes(rays, k, reach):
+        if passes(rays, k, reach):
             x, y = mirror * rays[k, X], rays[k, Y]
-            column = place[0, 0] + place[0, 1] * x + place[0, 2] * y
-            row = place[1, 0] + place[1, 1] * x + place[1, 2] * y
+            column, row = landed(place, x, y)
             box[0], box[1] = min(box[0], column), max(box[1], column)
             box[2], box[3] = min(box[2], row), max(box[3], row)
 
@@ -180,7 +173,7 @@ def largest_part(rays, triangles, own, ringed, iris_radius, inner, place, corner
     lit = np.empty(rays.shape[0], dtype=np.bool_)
     for k in range(rays.shape[0]):
         lit[k] = False
-        if _passes(rays, k, iris_radius):
+        if passes(rays, k, iris_radius):
             for c in range(ringed.size):
                 lit[k] = lit[k] or (ringed[c] and _comes_near(rays, k, c, inner))
     height, width = least.shape
@@ -197,8 +190,8 @@ def largest_part(rays, triangles, own, ringed, iris_radius, inner, place, corner
             k = triangles[t, m]
             bright = max(bright, own[k])
             x, y = mirror * rays[k, X], rays[k, Y]
-            c = (place[0, 0] + place[0, 1] * x + place[0, 2] * y - corners_px[0, 0]) * across
-            r = (place[1, 0] + place[1, 1] * x + place[1, 2] * y - corners_px[0, 1]) * down
+            c, r = landed(place, x, y)
+            c, r = (c - corners_px[0, 0]) * across, (r - corners_px[0, 1]) * down
             # what lies beside the picture takes the nearest
             column, row = np.int64(min(max(c, 0.0), width - 1.0)), np.int64(min(max(r, 0.0), height - 1.0))
             there = min(there, least[row, column])

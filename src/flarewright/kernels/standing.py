@@ -9,13 +9,25 @@ from .trace import ALIVE, REFLECT, REL, STOP_X, X, Y, hit_rays
 
 
 @borrowing
-def _crosses(rays, k, iris_radius):
+def crosses(rays, k, iris_radius):
     """Tell whether a ray crosses the stop in a circle, each time."""
     for column in range(STOP_X, rays.shape[1], 2):
         u, v = rays[k, column], rays[k, column + 1]
         if not u * u + v * v <= iris_radius * iris_radius:
             return False
     return True
+
+
+@borrowing
+def passes(rays, k, iris_radius):
+    """Tell whether a ray meets no rim and crosses the stop in a circle, each time."""
+    return rays[k, ALIVE] > 0.0 and rays[k, REL] <= 1.0 and crosses(rays, k, iris_radius)
+
+
+@borrowing
+def landed(place, x, y):
+    """Return the column and row of a place on the sensor; `place` as in `seen_rays`."""
+    return place[0, 0] + place[0, 1] * x + place[0, 2] * y, place[1, 0] + place[1, 1] * x + place[1, 2] * y
 
 
 @compiled
@@ -41,10 +53,10 @@ def seen_rays(rays, iris_radius, place, width, height):
     everywhere = width == np.inf
     for k in range(rays.shape[0]):
         seen[k] = False
-        if rays[k, ALIVE] == 0.0 or rays[k, REL] > 1.0 or not _crosses(rays, k, iris_radius):
+        if not passes(rays, k, iris_radius):
             continue
         x, y = rays[k, X], rays[k, Y]
-        column, row = place[0, 0] + place[0, 1] * x + place[0, 2] * y, place[1, 0] + place[1, 1] * x + place[1, 2] * y
+        column, row = landed(place, x, y)
         seen[k] = everywhere or (0.0 <= column < width and 0.0 <= row < height)
     return seen
 
@@ -167,7 +179,7 @@ def wide_shift(short, long, iris_radius, view_radius, quantile):
     for k in range(short.shape[0]):
         if short[k, ALIVE] * long[k, ALIVE] == 0.0 or min(short[k, REL], long[k, REL]) > 1.0:
             continue
-        if not _crosses(short, k, iris_radius):
+        if not crosses(short, k, iris_radius):
             continue
         x, y = short[k, X], short[k, Y]
         if x * x + y * y <= view_radius * view_radius:

@@ -17,7 +17,7 @@ from ..model.ghost_model import GhostModel
 from ..model.sprite import Sprite
 from .numbers import field, visible
 from .packed import Packed, posed_numbers
-from .sprites import Pixels, samples, sprite_at
+from .sprites import Pixels, between, samples, sprite_at
 
 Floats = NDArray[np.float64]
 
@@ -60,12 +60,12 @@ def carried(sprite: Sprite, packed: Packed, model: GhostModel, constellation_deg
     is, from the picture before and from the one after; where one of them did not show it, the other tells alone.
     """
     angles = np.array(sprite.constellation_deg)
-    between = angles[0] < constellation_deg < angles[-1] and constellation_deg not in angles
+    inside = angles[0] < constellation_deg < angles[-1] and constellation_deg not in angles
     # of a single row or column nothing tells how steep a ghost is
-    if not between or not packed[0] or min(sprite.rows, sprite.columns) < 2:
+    if not inside or not packed[0] or min(sprite.rows, sprite.columns) < 2:
         return sprite_at(sprite, constellation_deg)
-    k = int(np.searchsorted(angles, constellation_deg)) - 1
-    part = float((constellation_deg - angles[k]) / (angles[k + 1] - angles[k]))
+    below, far = between(angles, constellation_deg)
+    k, part = int(below), float(far)
     now = _boxes(packed, model, constellation_deg)
     out = np.zeros(sprite.pictures.shape[1:])
     moved: dict[int, list[tuple[float, Floats, Floats]]] = {}

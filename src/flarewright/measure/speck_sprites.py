@@ -19,9 +19,9 @@ from ..model.ghost_model import GhostModel
 from ..model.sprite import Sprite, packed
 from .numbers import Floats, visible
 from .packed import Packed, pack
-from .specks_drawn import Grid, Outline, outline, reading, speck_at
-from .sprite_fit import DIGIT, darkest_noise
-from .sprites import sprite_at
+from .specks_drawn import Grid, Outline, add_speck, outline, reading
+from .sprite_fit import DIGIT, darkest_noise, even_knots
+from .sprites import between, sprite_at
 from .views import Pixels, View
 
 Mask = NDArray[np.bool_]
@@ -119,9 +119,8 @@ def _small(drawn: Packed, model: GhostModel, name: str, view: View) -> Outline |
     at = outline(drawn, model, name, view.constellation_deg, _LARGEST_PX * _unit(view))
     if at is None:
         return None
-    ax, ay, cosine, sine, _ = view.frame
-    place = ax + cosine * at.along, ay - sine * at.along
-    return at if all(0.0 <= each <= side for each, side in zip(place, view.size_px, strict=True)) else None
+    inside = all(0.0 <= each <= side for each, side in zip(at.place(view.frame), view.size_px, strict=True))
+    return at if inside else None
 
 
 def covered(specks: Sequence[Speck], views: Sequence[View]) -> list[Mask]:
@@ -129,8 +128,8 @@ def covered(specks: Sequence[Speck], views: Sequence[View]) -> list[Mask]:
     masks = [np.zeros(view.pixels.shape[:2], dtype=np.bool_) for view in views]
     for speck in specks:
         for k, at in (*enumerate(speck.outlines, start=speck.first), *speck.beyond):
-            ax, ay, cosine, sine, _ = views[k].frame
-            x, y = ax + cosine * at.along, ay - sine * at.along
+            _, _, cosine, sine, _ = views[k].frame
+            x, y = at.place(views[k].frame)
             around = _AROUND_PX * _unit(views[k])
             reach = float(np.hypot(*at.half)) + around
             top, left = max(floor(y - reach), 0), max(floor(x - reach), 0)
@@ -164,24 +163,17 @@ def speck_sprites(
         Those whose pictures hold anything.
     """
     step = DIGIT * darkest_noise(views) / (_CELL_PX * _unit(views[0]))
-    left = list(pixels)
+    left = [each.copy() for each in pixels]
     found = []
     for speck in specks:
         sprite = _learned(speck, views, left, masks, step)
         if sprite is None:
             continue
         found.append(sprite)
-        grid = Grid(sprite.grain_px, sprite.corner_px, sprite.rows, sprite.columns, sprite.spread_px)
         for k, at in enumerate(speck.outlines, start=speck.first):
             picture = sprite_at(sprite, views[k].constellation_deg)
-            left[k] = left[k] - speck_at(grid, at, views[k].frame, views[k].size_px, picture)
+            add_speck(left[k], Grid.of(sprite), at, views[k].frame, -picture)
     return tuple(found)
-
-
-def _between(knots: Floats, angle: float) -> tuple[int, float]:
-    """Return the knot below an angle, and how far it is to the next one."""
-    k = int(np.clip(np.searchsorted(knots, angle) - 1, 0, knots.size - 2))
-    return k, float(np.clip((angle - knots[k]) / (knots[k + 1] - knots[k]), 0.0, 1.0))
 
 
 def _grid(speck: Speck, unit: float) -> Grid:
@@ -198,27 +190,26 @@ def _learned(
     """Solve for one speck's pictures; None where nothing of it is left."""
     grid = _grid(speck, _unit(views[0]))
     shown = views[speck.first : speck.first + len(speck.outlines)]
-    angles = np.linspace(
-        shown[0].constellation_deg, shown[-1].constellation_deg, max(2, ceil(len(shown) / _VIEWS))
-    )  # fmt: skip
+    angles = even_knots(shown, max(2, ceil(len(shown) / _VIEWS)))
     told = _told(grid, angles, shown, speck, pixels, masks)
     if told is None:
         return None
-    solved = _solved(told, angles.size, grid.rows * grid.columns)
-    pictures = _bright(solved.reshape(angles.size, grid.rows, grid.columns, 3))
+    solved = _solved(told, len(angles), grid.rows * grid.columns)
+    pictures = _bright(solved.reshape(len(angles), grid.rows, grid.columns, 3))
     if not np.abs(pictures).max() > step:
         return None
     unit, packed_cells = packed(pictures, step)
     return Sprite(
         follows="speck", ghost=speck.name, spread_px=grid.spread_px, grain_px=grid.grain_px, corner_px=grid.corner_px,
-        constellation_deg=tuple(map(float, angles)), rows=grid.rows, columns=grid.columns, unit=unit,
+        constellation_deg=angles, rows=grid.rows, columns=grid.columns, unit=unit,
         cells=packed_cells,
     )  # fmt: skip
 
 
 def _told(
-    grid: Grid, angles: Floats, shown: Sequence[View], speck: Speck, pixels: Sequence[Pixels], masks: Sequence[Mask]
-) -> _Told | None:
+    grid: Grid, angles: tuple[float, ...], shown: Sequence[View], speck: Speck, pixels: Sequence[Pixels],
+    masks: Sequence[Mask],
+) -> _Told | None:  # fmt: skip
     """Gather what views tell of a speck's cells; None where too few do."""
     parts = []
     for k, (view, at) in enumerate(zip(shown, speck.outlines, strict=True), start=speck.first):
@@ -228,10 +219,10 @@ def _told(
         if not known.any():
             continue
         own, light = (each[read.rows[known], read.columns[known]].mean(axis=1) for each in (view.variance, view.pixels))
-        k_before, far = _between(angles, view.constellation_deg)
+        before, far = between(np.array(angles), view.constellation_deg)
         count = int(known.sum())
         parts.append((
-            read.cells[known], read.weights[known], np.full(count, k_before), np.full(count, far),
+            read.cells[known], read.weights[known], np.full(count, before), np.full(count, far),
             1.0 / np.sqrt(own + (_OFF * light) ** 2).astype(np.float64), value[known],
         ))  # fmt: skip
     if len(parts) < _FEWEST:

@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..kernels.measure_mesh import draw_ghosts, window_of
-from ..kernels.measure_speck import read_cells
 from ..model.ghost_model import GhostModel
 from ..model.sprite import Sprite
 from .numbers import field, visible
@@ -53,6 +52,11 @@ class Outline:
     half: tuple[float, float]
     peak: float
 
+    def place(self, frame: Floats) -> tuple[float, float]:
+        """Return where the middle lies in a picture, pixels; `frame` is from `numbers.frame`."""
+        ax, ay, cosine, sine, scale = map(float, frame)
+        return ax + scale * cosine * self.along, ay - scale * sine * self.along
+
 
 @dataclass(frozen=True)
 class Grid:
@@ -74,6 +78,11 @@ class Grid:
     rows: int
     columns: int
     spread_px: tuple[float, float]
+
+    @classmethod
+    def of(cls, sprite: Sprite) -> Grid:
+        """Return the cells of a sprite."""
+        return cls(sprite.grain_px, sprite.corner_px, sprite.rows, sprite.columns, sprite.spread_px)
 
 
 @dataclass(frozen=True)
@@ -162,8 +171,8 @@ def reading(grid: Grid, at: Outline, frame: Floats, size_px: tuple[int, int]) ->
     Reading
         Of the pixels that cells may reach.
     """
-    ax, ay, cosine, sine, scale = frame
-    x0, y0 = ax + scale * cosine * at.along, ay - scale * sine * at.along
+    _, _, cosine, sine, scale = frame
+    x0, y0 = at.place(frame)
     stretch = [now / then for now, then in zip(at.spread, grid.spread_px, strict=True)]
     sides = (-2.0 * grid.corner_px[0] * stretch[0], -2.0 * grid.corner_px[1] * stretch[1])
     reach = 0.5 * scale * float(np.hypot(*sides)) + 1.0
@@ -193,18 +202,11 @@ def reading(grid: Grid, at: Outline, frame: Floats, size_px: tuple[int, int]) ->
     return Reading(y, x, np.stack(cells, axis=1), np.stack(weights, axis=1))
 
 
-def speck_at(grid: Grid, at: Outline, frame: Floats, size_px: tuple[int, int], picture: Pixels) -> Pixels:
-    """Draw a speck's picture, shape (rows, columns, 3), as `reading` tells; shape (H, W, 3)."""
-    read = reading(grid, at, frame, size_px)
-    count = read.rows.size
-    light = np.zeros((count, 3))
-    twice = np.repeat(picture.reshape(1, -1, 3).astype(np.float64), 2, axis=0)
-    read_cells(
-        read.cells, read.weights, np.zeros(count, np.int64), np.zeros(count), np.ones(count), twice, light
-    )  # fmt: skip
-    out = np.zeros((size_px[1], size_px[0], 3), np.float32)
-    out[read.rows, read.columns] = light
-    return out
+def add_speck(pixels: Pixels, grid: Grid, at: Outline, frame: Floats, picture: Pixels | Floats) -> None:
+    """Add a speck's picture, shape (rows, columns, 3), to pixels, shape (H, W, 3), as `reading` tells."""
+    read = reading(grid, at, frame, (pixels.shape[1], pixels.shape[0]))
+    light = np.einsum("pt,ptm->pm", read.weights, picture.reshape(-1, 3)[read.cells])
+    pixels[read.rows, read.columns] += light.astype(np.float32)
 
 
 def draw_specks(
@@ -240,7 +242,5 @@ def draw_specks(
         if at is None:
             continue
         there = visible([ghost for ghost in packed[0] if ghost.name == sprite.ghost], constellation_deg)[0]
-        grid = Grid(sprite.grain_px, sprite.corner_px, sprite.rows, sprite.columns, sprite.spread_px)
-        picture = sprite_at(sprite, constellation_deg)
-        out += np.float32(there) * speck_at(grid, at, frame, size_px, picture)
+        add_speck(out, Grid.of(sprite), at, frame, there * sprite_at(sprite, constellation_deg))
     return out

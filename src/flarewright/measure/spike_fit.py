@@ -15,19 +15,7 @@ import numpy as np
 from ..model.ghost_model import Star
 from ..model.sprite import Sprite, packed
 from .numbers import Floats
-from .sprite_fit import (
-    DIGIT,
-    ENOUGH,
-    VIEWS,
-    beside,
-    darkest_noise,
-    drawn,
-    even_knots,
-    over_angles,
-    points,
-    seen_near,
-    sure,
-)
+from .sprite_fit import DIGIT, darkest_noise, drawn, even_knots, pictures_over, points
 from .views import Pixels, View
 
 # cells along a spike as long as the picture is wide
@@ -104,15 +92,7 @@ def _strip(
         y = view.light_px[1] - sine * along + cosine * down
         values[k], variance, weights[k] = _cells(picture, view, x, y, stretch)
         noise += weights[k] ** 2 * variance
-    shape = (len(views), -1)
-    told = np.array([view.constellation_deg for view in views])
-    fitted = over_angles(values.reshape(shape), weights.reshape(shape), told, np.array(angles))
-    total = weights.sum(axis=0)
-    known = total >= ENOUGH * len(views) / max(len(angles), VIEWS)
-    noise = np.where(known, noise * len(angles) / np.maximum(total, 1e-9) ** 2, 0.0)
-    near = seen_near(weights.reshape(shape), told, np.array(angles)).reshape(len(angles), rows, columns, 3)
-    pictures = np.where(known & near, fitted.reshape(len(angles), rows, columns, 3), np.nan)
-    pictures = _above_sides(beside(sure(pictures, np.broadcast_to(noise, pictures.shape))))
+    pictures = _above_sides(pictures_over(angles, views, values, weights, noise))
     unit, cells = packed(pictures, DIGIT * darkest_noise(views) / stretch**0.5)
     return Sprite(
         follows="light", grain_px=1.0, corner_px=(begin, -0.5 * rows), turn_deg=turn_deg, stretch=float(stretch),

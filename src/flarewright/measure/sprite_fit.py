@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ..model.sprite import Sprite, packed
 from .numbers import Floats
-from .sprites import draw_sprites, samples, sprite_at
+from .sprites import between, draw_sprites, samples, sprite_at
 from .views import Pixels, View
 
 # cells of the coarsest pictures that go with the light, across a picture, and how many there are to each side of it:
@@ -155,16 +155,7 @@ def _fitted(
         x, y = view.light_px[0] + right, view.light_px[1] + down
         values[k], variance, weights[k] = _cells(picture, view, x, y, grain)
         noise += weights[k] ** 2 * variance
-    told = np.array([view.constellation_deg for view in views])
-    shape = (len(views), -1)
-    found = over_angles(values.reshape(shape), weights.reshape(shape), told, np.array(angles))
-    # what too few views tell is as its neighbours are
-    total = weights.sum(axis=0)
-    known = total >= ENOUGH * len(views) / max(len(angles), VIEWS)
-    noise = np.where(known, noise * len(angles) / np.maximum(total, 1e-9) ** 2, 0.0)
-    near = seen_near(weights.reshape(shape), told, np.array(angles)).reshape(len(angles), rows, columns, 3)
-    pictures = np.where(known & near, found.reshape(len(angles), rows, columns, 3), np.nan)
-    pictures = beside(sure(pictures, np.broadcast_to(noise, pictures.shape)))
+    pictures = pictures_over(angles, views, values, weights, noise)
     # beyond its border a fine picture is 0, and the coarse ones go on
     pictures *= np.outer(_window(rows), _window(columns))[..., None]
     unit, cells = packed(pictures, DIGIT * darkest_noise(views) / grain)
@@ -172,6 +163,37 @@ def _fitted(
         follows="light", grain_px=grain, corner_px=(-side, -side), constellation_deg=angles, rows=rows,
         columns=columns, unit=unit, cells=cells,
     )  # fmt: skip
+
+
+def pictures_over(
+    angles: tuple[float, ...], views: Sequence[View], values: Pixels, weights: Pixels, noise: Floats | Pixels
+) -> Pixels:
+    """Fit pictures over the constellation to what views show of their cells.
+
+    Parameters
+    ----------
+    angles : tuple of float
+        Of the pictures.
+    views : sequence of View
+    values, weights : ndarray, shape (V, rows, columns, 3)
+        What each view shows, and how well; 0: not measured.
+    noise : ndarray, shape (rows, columns, 3)
+        Variance of the values, times squared weights, added up over the views.
+
+    Returns
+    -------
+    ndarray, shape (K, rows, columns, 3), float32
+        What too few views tell, or none about a picture's constellation, is as its neighbours are.
+    """
+    told, knots = np.array([view.constellation_deg for view in views]), np.array(angles)
+    flat, shape = (len(views), -1), (len(angles), *noise.shape)
+    found = over_angles(values.reshape(flat), weights.reshape(flat), told, knots)
+    near = seen_near(weights.reshape(flat), told, knots)
+    total = weights.sum(axis=0)
+    known = total >= ENOUGH * len(views) / max(len(angles), VIEWS)
+    noise = np.where(known, noise * len(angles) / np.maximum(total, 1e-9) ** 2, 0.0)
+    pictures = np.where(known & near.reshape(shape), found.reshape(shape), np.nan)
+    return beside(sure(pictures, np.broadcast_to(noise, shape)))
 
 
 def _window(count: int) -> Pixels:
@@ -220,8 +242,7 @@ def _hats(told: Floats, knots: Floats) -> Floats:
     """Return what each knot counts at some constellations, linear between knots, shape (V, K)."""
     if knots.size == 1:
         return np.ones((told.size, 1))
-    k = np.clip(np.searchsorted(knots, told) - 1, 0, knots.size - 2)
-    part = np.clip((told - knots[k]) / (knots[k + 1] - knots[k]), 0.0, 1.0)
+    k, part = between(knots, told)
     basis = np.zeros((told.size, knots.size))
     basis[np.arange(told.size), k], basis[np.arange(told.size), k + 1] = 1.0 - part, part
     return basis

@@ -13,14 +13,25 @@ from ..model.sprite import Sprite
 Pixels = NDArray[np.float32]
 
 
+def between(
+    knots: NDArray[np.float64], constellation_deg: float | NDArray[np.float64]
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Tell between which of two or more rising constellations some lie: the index below, and the part of the way.
+
+    Those before the first and beyond the last are as there.
+    """
+    k = np.clip(np.searchsorted(knots, constellation_deg) - 1, 0, knots.size - 2)
+    return k, np.clip((constellation_deg - knots[k]) / (knots[k + 1] - knots[k]), 0.0, 1.0)
+
+
 def sprite_at(sprite: Sprite, constellation_deg: float) -> Pixels:
     """Return a sprite's picture at a constellation, shape (rows, columns, 3)."""
     angles = np.array(sprite.constellation_deg)
     pictures: Pixels = sprite.pictures
     if angles.size == 1:
         return np.asarray(pictures[0], dtype=np.float32)
-    k = int(np.clip(np.searchsorted(angles, constellation_deg) - 1, 0, angles.size - 2))
-    part = np.float32(np.clip((constellation_deg - angles[k]) / (angles[k + 1] - angles[k]), 0.0, 1.0))
+    k, far = between(angles, constellation_deg)
+    part = np.float32(far)
     return np.asarray((1.0 - part) * pictures[k] + part * pictures[k + 1], dtype=np.float32)
 
 
