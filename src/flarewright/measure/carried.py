@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from ..kernels.measure_mesh import draw_ghosts, window_of
 from ..model.ghost_model import GhostModel
 from ..model.sprite import Sprite
+from .moved import mixed
 from .numbers import field, visible
 from .packed import Packed, posed_numbers
 from .sprites import Pixels, between, samples, sprite_at
@@ -57,20 +58,40 @@ def carried(sprite: Sprite, packed: Packed, model: GhostModel, constellation_deg
     -----
     Each cell of a photographed picture is divided among the ghosts by the squares of how steep they are around it, and
     what remains where none is stays in its place. A ghost's share is moved and stretched as the box around the ghost
-    is, from the picture before and from the one after; where one of them did not show it, the other tells alone.
+    is, from the picture before and from the one after; where one of them did not show it, the other tells alone. A
+    sprite that has moves goes with them where they foretold photographs better (`moved.mixed`).
     """
     angles = np.array(sprite.constellation_deg)
     inside = angles[0] < constellation_deg < angles[-1] and constellation_deg not in angles
     # of a single row or column nothing tells how steep a ghost is
-    if not inside or not packed[0] or min(sprite.rows, sprite.columns) < 2:
+    if not inside or min(sprite.rows, sprite.columns) < 2:
         return sprite_at(sprite, constellation_deg)
-    below, far = between(angles, constellation_deg)
-    k, part = int(below), float(far)
+    k = int(between(angles, constellation_deg)[0])
+    with_boxes = boxed(sprite, packed, model, (k, k + 1), constellation_deg)
+    return np.asarray(mixed(sprite, packed, model, k, constellation_deg, with_boxes), dtype=np.float32)
+
+
+def boxed(sprite: Sprite, packed: Packed, model: GhostModel, ends: tuple[int, int], constellation_deg: float) -> Floats:
+    """Return what is left between two pictures of a sprite as it goes with the boxes of ghosts.
+
+    Parameters
+    ----------
+    sprite, packed, model, constellation_deg
+        As of `carried`.
+    ends : tuple of int
+        Indices of the pictures before and after.
+
+    Returns
+    -------
+    ndarray, shape (rows, columns, 3)
+    """
+    angles = [sprite.constellation_deg[n] for n in ends]
+    part = (constellation_deg - angles[0]) / (angles[1] - angles[0])
     now = _boxes(packed, model, constellation_deg)
     out = np.zeros(sprite.pictures.shape[1:])
     moved: dict[int, list[tuple[float, Floats, Floats]]] = {}
-    for n, weight in ((k, 1.0 - part), (k + 1, part)):
-        then, picture = float(angles[n]), sprite.pictures[n]
+    for n, then, weight in zip(ends, angles, (1.0 - part, part), strict=True):
+        picture = sprite.pictures[n]
         before = _boxes(packed, model, then)
         steep = {
             g: edge
@@ -92,10 +113,10 @@ def carried(sprite: Sprite, packed: Packed, model: GhostModel, constellation_deg
             out += weight * light
             continue
         counts = [weight * shown for weight, _, shown in pair]
-        whole = np.maximum(counts[0] + counts[1], 1e-9)
+        both = np.maximum(counts[0] + counts[1], 1e-9)
         for count, (_, light, _) in zip(counts, pair, strict=True):
-            out += (count / whole)[..., None] * light
-    return np.asarray(out, dtype=np.float32)
+            out += (count / both)[..., None] * light
+    return out
 
 
 def _alike(one: _Box, other: _Box) -> bool:

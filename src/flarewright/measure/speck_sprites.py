@@ -32,6 +32,8 @@ _WIDTH = 720.0
 _LARGEST_PX = 12.0
 # a speck's light over the noise of the darkest pixels; what is fainter, coarse pictures hold as well
 _BRIGHT = 100.0
+# part of a picture's light that what is left must be where a speck is taken to be that the model does not show
+_MOST_OF_IT = 0.5
 # fewer views in a row are interpolated as well
 _FEWEST = 3
 # side of a cell, and how far beyond the lit box cells go
@@ -84,7 +86,7 @@ class _Told:
 
 
 def specks_of(model: GhostModel, views: Sequence[View]) -> tuple[Speck, ...]:
-    """Return the ghosts of a model that are small and bright, each in its longest row of views.
+    """Return the ghosts of a model that are small and outshine what is around them, each in its longest row of views.
 
     Parameters
     ----------
@@ -101,7 +103,11 @@ def specks_of(model: GhostModel, views: Sequence[View]) -> tuple[Speck, ...]:
     found = []
     for ghost in drawn[0]:
         placed = {k: at for k, view in enumerate(views) if (at := _small(drawn, model, ghost.name, view)) is not None}
-        shown = [k for k in placed if visible([ghost], views[k].constellation_deg)[0] > 0.0]
+        shown = [
+            k
+            for k, at in placed.items()
+            if visible([ghost], views[k].constellation_deg)[0] > 0.0 and at.peak > _around(views[k], at)
+        ]
         rows = [[k for _, k in group] for _, group in groupby(enumerate(shown), lambda pair: pair[1] - pair[0])]
         longest = max(rows, key=len, default=[])
         if len(longest) >= _FEWEST and max(placed[k].peak for k in longest) > least:
@@ -123,23 +129,60 @@ def _small(drawn: Packed, model: GhostModel, name: str, view: View) -> Outline |
     return at if inside else None
 
 
-def covered(specks: Sequence[Speck], views: Sequence[View]) -> list[Mask]:
-    """Return where specks are in each view, shape (H, W) each; nothing else can be told there."""
+def _around(view: View, at: Outline) -> float:
+    """Return how bright a picture is in green beside a speck."""
+    margin = _BESIDE_PX * _unit(view)
+    window, *off = _about(view, at, margin)
+    light, variance = view.pixels[window][..., 1], view.variance[window][..., 1]
+    beside = ~_within(at, off, _AROUND_PX * _unit(view)) & _within(at, off, margin) & np.isfinite(variance)
+    return float(np.median(light[beside])) if beside.any() else np.inf
+
+
+def _about(view: View, at: Outline, margin: float) -> tuple[tuple[slice, slice], Floats, Floats]:
+    """Return the window of a picture that holds a speck, and how far its pixels are from the middle: along, across."""
+    _, _, cosine, sine, _ = view.frame
+    x, y = at.place(view.frame)
+    reach = float(np.hypot(*at.half)) + margin
+    rows, columns = (
+        slice(max(floor(middle - reach), 0), max(min(floor(middle + reach) + 1, side), 0))
+        for middle, side in ((y, view.size_px[1]), (x, view.size_px[0]))
+    )
+    row, column = np.mgrid[rows, columns]
+    dx, dy = column + 0.5 - x, row + 0.5 - y
+    return (rows, columns), np.abs(cosine * dx - sine * dy), np.abs(sine * dx + cosine * dy)
+
+
+def _within(at: Outline, off: Sequence[Floats], margin: float) -> Mask:
+    return np.asarray((off[0] < at.half[0] + margin) & (off[1] < at.half[1] + margin))
+
+
+def covered(specks: Sequence[Speck], views: Sequence[View], left: Sequence[Pixels]) -> list[Mask]:
+    """Return where specks are in each view, shape (H, W) each; nothing else can be told there.
+
+    Parameters
+    ----------
+    specks : sequence of Speck
+    views : sequence of View
+    left : sequence of ndarray, shape (H, W, 3)
+        What they show beside ghosts, star and halo. Where the model does not show a speck, it is taken to be there
+        if that is most of the light.
+    """
     masks = [np.zeros(view.pixels.shape[:2], dtype=np.bool_) for view in views]
     for speck in specks:
-        for k, at in (*enumerate(speck.outlines, start=speck.first), *speck.beyond):
-            _, _, cosine, sine, _ = views[k].frame
-            x, y = at.place(views[k].frame)
-            around = _AROUND_PX * _unit(views[k])
-            reach = float(np.hypot(*at.half)) + around
-            top, left = max(floor(y - reach), 0), max(floor(x - reach), 0)
-            part = masks[k][top : floor(y + reach) + 1, left : floor(x + reach) + 1]
-            row, column = np.mgrid[: part.shape[0], : part.shape[1]]
-            dx, dy = left + column + 0.5 - x, top + row + 0.5 - y
-            part |= (np.abs(cosine * dx - sine * dy) < at.half[0] + around) & (
-                np.abs(sine * dx + cosine * dy) < at.half[1] + around
-            )
+        shown = enumerate(speck.outlines, start=speck.first)
+        for k, at in (*shown, *((k, at) for k, at in speck.beyond if _outshone(views[k], at, left[k]))):
+            margin = _AROUND_PX * _unit(views[k])
+            window, *off = _about(views[k], at, margin)
+            masks[k][window] |= _within(at, off, margin)
     return masks
+
+
+def _outshone(view: View, at: Outline, left: Pixels) -> bool:
+    """Tell whether most of the light where a speck would be is not explained."""
+    window, *off = _about(view, at, 0.0)
+    rest, light = (each[window][_within(at, off, 0.0)] for each in (np.abs(left), view.pixels))
+    known = np.isfinite(rest)
+    return bool(known.any() and rest[known].mean() > _MOST_OF_IT * light[known].mean())
 
 
 def speck_sprites(

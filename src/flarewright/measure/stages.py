@@ -24,6 +24,7 @@ from .glow import halo_at, offsets, star_at
 from .glow_fit import fit_halo, fit_star, followed, glow, iris_of, register
 from .joint import lit
 from .journal import Journal
+from .moves_fit import with_moves
 from .numbers import channel_numbers
 from .pointing import candidate, kept, tell_pointed
 from .pursuit import pursue
@@ -268,7 +269,7 @@ def with_rest(model: GhostModel, views: Sequence[View]) -> GhostModel:
         left.append((known - ghosts - _light(model.halo, model.star, placed[-1])).astype(np.float32))
     specks = specks_of(model, placed)
     # a speck is so much brighter than what is around it that coarse cells would spread its errors over that
-    seen = [hidden(each, mask) for each, mask in zip(left, covered(specks, placed), strict=True)]
+    seen = [hidden(each, mask) for each, mask in zip(left, covered(specks, placed, left), strict=True)]
     spikes = spike_sprites(placed, seen, model.star)
     seen = [each - drawn(spikes, view) for each, view in zip(seen, placed, strict=True)]
     going = light_sprites(placed, seen)
@@ -276,8 +277,8 @@ def with_rest(model: GhostModel, views: Sequence[View]) -> GhostModel:
     standing = (*spikes, *going, axis_sprite(placed, seen))
     if specks:
         left = [each - drawn(standing, view) for each, view in zip(left, placed, strict=True)]
-    out: GhostModel = model.replace(sprites=(*standing, *speck_sprites(specks, placed, left, masks_of(placed))))
-    return out
+    sprites = (*standing, *speck_sprites(specks, placed, left, masks_of(placed)))
+    return with_moves(model.replace(sprites=sprites))
 
 
 def _light_of(model: GhostModel, view: View, roll_deg: float) -> tuple[float, float]:

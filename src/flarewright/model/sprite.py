@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from .base import Frozen
+from .moves import Moves
 
 # bits of a number's fraction that are kept, of the ten of a 16-bit float
 _FRACTION = 4
@@ -26,8 +27,8 @@ class Sprite(Frozen):
     follows : {"light", "axis", "ghosts", "speck"}
         "light": it goes where the light's image goes and stays upright, as the star does. "axis": it stays about the
         optical axis and turns with the direction of the light, as ghosts do. "ghosts": as with "axis", and between two
-        of its constellations what lies at a ghost's borders goes where these go. "speck": it goes and grows with one
-        small ghost.
+        of its constellations what lies at a ghost's borders goes where these go, or as `moves` tell. "speck": it goes
+        and grows with one small ghost.
     grain_px : float
         Side of a cell, pixels.
     corner_px : tuple of float
@@ -45,6 +46,8 @@ class Sprite(Frozen):
     spread_px : tuple of float
         "speck" only: standard deviation of the ghost's lit area, towards the light and at right angles to it, where a
         cell is as large as `grain_px`; elsewhere cells are larger or smaller as these are.
+    moves : Moves or None
+        "ghosts" only: how what is left moves between its pictures.
     rows, columns : int
         Cells of each picture.
     unit : float
@@ -62,6 +65,7 @@ class Sprite(Frozen):
     ghost: str | None = None
     spread_px: tuple[Annotated[float, Field(gt=0.0)], Annotated[float, Field(gt=0.0)]] = (1.0, 1.0)
     constellation_deg: tuple[float, ...] = Field(min_length=1)
+    moves: Moves | None = None
     rows: int = Field(ge=1)
     columns: int = Field(ge=1)
     unit: float = Field(gt=0.0)
@@ -73,6 +77,13 @@ class Sprite(Frozen):
             raise ValueError("the constellations of a sprite must rise")
         if (self.follows == "speck") != (self.ghost is not None):
             raise ValueError('a sprite names a ghost if it follows "speck", and only then')
+        if self.moves is not None:
+            if self.follows != "ghosts":
+                raise ValueError('only a sprite that follows "ghosts" has moves')
+            blocks = tuple(-(-cells // self.moves.block) for cells in (self.rows, self.columns))
+            shape = self.moves.intervals, self.moves.rows, self.moves.columns
+            if shape != (len(self.constellation_deg) - 1, *blocks):
+                raise ValueError("the moves of a sprite do not cover its pictures and cells")
         size = 2 * prod(self._shape)
         try:
             # a few bytes can stand for more than any memory holds

@@ -1,0 +1,148 @@
+"""Learn how what is left moves between photographs, and where that is to be believed.
+
+Block by block the move is looked for that takes one picture to the next. Then every photograph is foretold from the one
+before and the one after it, in each way, and where a way does well it counts more.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..kernels.measure_motion import match_blocks
+from ..model.ghost_model import GhostModel
+from ..model.moves import packed_moves
+from ..model.sprite import Sprite
+from .carried import boxed
+from .moved import displaced, ghosts_light, middles, spread
+from .packed import Packed, pack
+from .sprites import Pixels, samples
+
+Floats = NDArray[np.float64]
+
+# cells to each side of a block, and cells to each side of its middle that are compared
+_BLOCK, _HALF = 4, 3
+# farthest moves from one picture to the next, cells: across the light's line and along it
+_REACH = (8, 14)
+# by which part a misfit is taken for larger with each cell of the move, for longer ones have more choice
+_STIFF = 0.02
+# cells to each side over which a way's misfits are averaged, and how fast a way counts less the more it misses by
+_ABOUT, _STEEP = 5, 4.0
+# what a cell may be off by in any case, in units of the sprite: to match, and to foretell
+_MATCH, _FORETELL = 3.0, 2.0
+# one photograph is foretold from two others
+_FEWEST = 3
+
+
+def with_moves(model: GhostModel) -> GhostModel:
+    """Return a model whose sprites that follow ghosts have moves.
+
+    Parameters
+    ----------
+    model : GhostModel
+
+    Returns
+    -------
+    GhostModel
+        The same where no sprite has three pictures.
+    """
+    packed = pack(model)
+    sprites = tuple(
+        _learned(one, packed, model) if one.follows == "ghosts" and len(one.constellation_deg) >= _FEWEST else one
+        for one in model.sprites
+    )
+    out: GhostModel = model.replace(sprites=sprites)
+    return out
+
+
+def _learned(sprite: Sprite, packed: Packed, model: GhostModel) -> Sprite:
+    left = sprite.pictures
+    angles = sprite.constellation_deg
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        whole = left + np.stack(list(pool.map(lambda angle: ghosts_light(sprite, packed, model, angle), angles)))
+        ways = [left, whole]
+        steps = np.stack([_steps(pictures, sprite.unit, pool) for pictures in ways], axis=1)
+        missed = [_missed(pictures, steps[:, n], angles, pool) for n, pictures in enumerate(ways)]
+        missed.insert(0, np.stack(list(pool.map(lambda k: _missed_boxed(sprite, packed, model, k), _inner(left)))))
+    shares = _shares([_about(each, sprite.unit) for each in missed])
+    out: Sprite = sprite.replace(moves=packed_moves(_BLOCK, steps, shares[:, 1:]))
+    return out
+
+
+def _inner(pictures: Pixels) -> range:
+    """Return which photographs lie between two others."""
+    return range(1, len(pictures) - 1)
+
+
+def _steps(pictures: Pixels, unit: float, pool: ThreadPoolExecutor) -> Floats:
+    """Return the moves of each block between each picture and the next, shape (K - 1, R, C, 2)."""
+    rows, columns = (middles(count, _BLOCK) for count in pictures.shape[1:3])
+    fine = list(pool.map(_doubled, pictures))
+    noise = 3 * (2 * _HALF + 1) ** 2 * (_MATCH * unit) ** 2
+
+    def match(k: int) -> Floats:
+        out = np.empty((rows.size, columns.size, 2))
+        match_blocks(fine[k], fine[k + 1], rows, columns, _HALF, np.array(_REACH), _STIFF, noise, out)
+        return out
+
+    return np.stack(list(pool.map(match, range(len(pictures) - 1))))
+
+
+def _doubled(picture: Pixels) -> Pixels:
+    """Return a picture twice as fine, cell (r, c) at (2 r, 2 c)."""
+    rows, columns = (2 * count - 1 for count in picture.shape[:2])
+    row, column = np.mgrid[:rows, :columns] / 2.0
+    return samples(picture, column.ravel(), row.ravel()).reshape(rows, columns, 3)
+
+
+def _missed(pictures: Pixels, steps: Floats, angles: Sequence[float], pool: ThreadPoolExecutor) -> Floats:
+    """Return by which squares each inner photograph is missed when moves foretell it, shape (K - 2, rows, columns)."""
+    shape = pictures.shape[1:3]
+
+    def miss(k: int) -> Floats:
+        part = (angles[k] - angles[k - 1]) / (angles[k + 1] - angles[k - 1])
+        before = displaced(pictures[k - 1], -spread(steps[k - 1], _BLOCK, shape))
+        after = displaced(pictures[k + 1], spread(steps[k], _BLOCK, shape))
+        return np.asarray((((1.0 - part) * before + part * after - pictures[k]) ** 2).sum(axis=2))
+
+    return np.stack(list(pool.map(miss, _inner(pictures))))
+
+
+def _missed_boxed(sprite: Sprite, packed: Packed, model: GhostModel, k: int) -> Floats:
+    """Return by which squares a photograph is missed when boxes of ghosts foretell it, shape (rows, columns)."""
+    foretold = boxed(sprite, packed, model, (k - 1, k + 1), sprite.constellation_deg[k])
+    return np.asarray(((foretold - sprite.pictures[k]) ** 2).sum(axis=2))
+
+
+def _about(missed: Floats, unit: float) -> Floats:
+    """Return misfits about each block of each interval, shape (K - 1, R, C): the mean of the photographs at its ends.
+
+    The first and the last photograph are foretold by none.
+    """
+    rows, columns = (middles(count, _BLOCK) for count in missed.shape[1:])
+    about = _mean(missed)[:, rows[:, None], columns]
+    ends = np.concatenate([about[:1], about, about[-1:]])
+    return np.asarray(0.5 * (ends[1:] + ends[:-1]) + (_FORETELL * unit) ** 2)
+
+
+def _mean(missed: Floats) -> Floats:
+    """Return means over squares of cells, shape (K - 2, rows, columns); beyond the border as at the border."""
+    side = 2 * _ABOUT + 1
+    sums = np.pad(missed, [(0, 0), (_ABOUT, _ABOUT), (_ABOUT, _ABOUT)], mode="edge")
+    for axis in (1, 2):
+        sums = np.pad(sums.cumsum(axis=axis), [(0, 0), *[(1, 0) if m == axis else (0, 0) for m in (1, 2)]])
+        count = sums.shape[axis]
+        sums = sums.take(range(side, count), axis) - sums.take(range(count - side), axis)
+    # differences of sums may end a little below 0
+    return np.asarray(np.maximum(sums, 0.0) / side**2)
+
+
+def _shares(about: Sequence[Floats]) -> Floats:
+    """Return how much each way counts in each block of each interval, shape (K - 1, ways, R, C); in all 1."""
+    least = np.min(about, axis=0)
+    shares = np.stack([(each / least) ** -_STEEP for each in about], axis=1)
+    return np.asarray(shares / shares.sum(axis=1, keepdims=True))

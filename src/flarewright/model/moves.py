@@ -1,0 +1,94 @@
+"""How what is left beside ghosts moves from one picture of a sprite to the next."""
+
+from __future__ import annotations
+
+import base64
+import zlib
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, model_validator
+
+from .base import Frozen
+
+# of a move, cells; a signed byte then goes to 15.9 of them
+_STEP = 1.0 / 8.0
+# a share of 1
+_WHOLE = 127.0
+# down and along, of what is left and of the whole light; then the shares of both
+_NUMBERS = 6
+
+
+class Moves(Frozen):
+    """How what is left moves between the pictures of a sprite that follows ghosts, block by block.
+
+    Attributes
+    ----------
+    block : int
+        Cells to each side of a block.
+    intervals, rows, columns : int
+        Pictures of the sprite less one, and blocks that cover its cells.
+    numbers : str
+        Base64 of zlib of signed bytes in the order interval, row, column, number: moves from one picture to the next
+        across the light's direction (down when the light is right) and towards the light, eighths of a cell, of what is
+        left and then of it together with the ghosts; then the shares of 127 that these two ways have in the picture
+        between. What is left to 127 goes with the ghosts' boxes.
+    """
+
+    block: int = Field(ge=1)
+    intervals: int = Field(ge=1)
+    rows: int = Field(ge=1)
+    columns: int = Field(ge=1)
+    numbers: str
+
+    @model_validator(mode="after")
+    def _fits(self) -> Moves:
+        size = self.intervals * self.rows * self.columns * _NUMBERS
+        try:
+            # a few bytes can stand for more than any memory holds
+            whole = zlib.decompressobj().decompress(base64.b64decode(self.numbers, validate=True), size + 1)
+        except (ValueError, zlib.error):
+            raise ValueError("the moves of a sprite are not base64 of zlib") from None
+        if len(whole) != size:
+            found = f"{len(whole)}" if len(whole) < size else f"more than {size}"
+            raise ValueError(f"the moves of a sprite hold {found} bytes instead of {size}")
+        shares = np.frombuffer(whole, np.int8).reshape(-1, _NUMBERS)[:, 4:].astype(int)
+        if (shares < 0).any() or (shares.sum(axis=1) > _WHOLE).any():
+            raise ValueError("shares in the moves of a sprite must be 0 or more and 127 at most together")
+        return self
+
+    @cached_property
+    def _bytes(self) -> NDArray[np.int8]:
+        whole = zlib.decompress(base64.b64decode(self.numbers))
+        return np.frombuffer(whole, np.int8).reshape(self.intervals, self.rows, self.columns, _NUMBERS)
+
+    def steps(self, interval: int) -> NDArray[np.float64]:
+        """Return moves in cells, shape (2, rows, columns, 2): of what is left, of the whole light; down, along."""
+        moves = _STEP * self._bytes[interval, ..., :4].astype(np.float64)
+        return np.asarray(np.moveaxis(moves.reshape(self.rows, self.columns, 2, 2), 2, 0))
+
+    def shares(self, interval: int) -> NDArray[np.float64]:
+        """Return the shares of the two ways, shape (2, rows, columns)."""
+        return np.asarray(np.moveaxis(self._bytes[interval, ..., 4:] / _WHOLE, -1, 0))
+
+
+def packed_moves(block: int, steps: NDArray[np.float64], shares: NDArray[np.float64]) -> Moves:
+    """Return moves as a file holds them.
+
+    Parameters
+    ----------
+    block : int
+        Cells.
+    steps : ndarray, shape (intervals, 2, rows, columns, 2)
+        Cells, as `Moves.steps`.
+    shares : ndarray, shape (intervals, 2, rows, columns)
+    """
+    intervals, _, rows, columns, _ = steps.shape
+    whole = np.empty((intervals, rows, columns, _NUMBERS), np.int8)
+    moves = np.rint(np.clip(steps / _STEP, -127.0, 127.0)).astype(np.int8)
+    whole[..., :4] = np.moveaxis(moves, 1, 3).reshape(intervals, rows, columns, 4)
+    # cut off, so that both together are never more than all
+    whole[..., 4:] = np.moveaxis(np.floor(_WHOLE * shares), 1, -1).astype(np.int8)
+    told = base64.b64encode(zlib.compress(whole.tobytes(), 9)).decode("ascii")
+    return Moves(block=block, intervals=intervals, rows=rows, columns=columns, numbers=told)
