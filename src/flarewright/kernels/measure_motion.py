@@ -8,22 +8,23 @@ from ._jit import compiled, inner
 
 
 @inner
-def _apart(before, after, row, column, half, down, along, enough):
-    """Add up the squares by which two pictures differ around a cell that moves by (down, along) from one to the other.
+def _apart(here, there, fine, row, column, half, off, enough):
+    """Add up the squares by which two pictures differ around a cell, each read at a place off it.
 
-    Pictures are twice as fine as cells, so that half of a move is a place in both. Adds no further than `enough`.
+    Pictures have `fine` places to a cell; `off` has rows and columns for the one and then for the other. Adds no
+    further than `enough`.
     """
-    last_row, last_column = before.shape[0] - 1, before.shape[1] - 1
+    last_row, last_column = here.shape[0] - 1, here.shape[1] - 1
     total = 0.0
     for r in range(row - half, row + half + 1):
-        ra = min(max(2 * r - down, 0), last_row)
-        rb = min(max(2 * r + down, 0), last_row)
+        ra = min(max(fine * r + off[0], 0), last_row)
+        rb = min(max(fine * r + off[2], 0), last_row)
         for c in range(column - half, column + half + 1):
-            ca = min(max(2 * c - along, 0), last_column)
-            cb = min(max(2 * c + along, 0), last_column)
+            ca = min(max(fine * c + off[1], 0), last_column)
+            cb = min(max(fine * c + off[3], 0), last_column)
             for m in range(3):
-                off = before[ra, ca, m] - after[rb, cb, m]
-                total += off * off
+                apart = here[ra, ca, m] - there[rb, cb, m]
+                total += apart * apart
         if total > enough:
             break
     return total
@@ -37,13 +38,13 @@ def _vertex(low, middle, high):
 
 
 @compiled
-def match_blocks(before, after, rows, columns, half, reach, stiff, noise, out):
-    """Find for blocks of a picture halfway between two others how what is there moves from the one to the other.
+def match_blocks(here, there, rows, columns, half, reach, stiff, noise, out):
+    """Find where blocks of a picture are in another one.
 
     Parameters
     ----------
-    before, after : ndarray, shape (H, W, 3), float32
-        Twice as fine as cells: cell (r, c) is at (2 r, 2 c). Beyond the border as at the border.
+    here, there : ndarray, shape (H, W, 3), float32
+        Beyond the border as at the border.
     rows, columns : ndarray, shape (R,) and (C,), int64
         Cells in the middle of blocks.
     half : int
@@ -54,14 +55,13 @@ def match_blocks(before, after, rows, columns, half, reach, stiff, noise, out):
         By which part of itself a misfit is larger for each cell of the move.
     noise : float
         Sum of squares that is added to every misfit, so that a block without light stays.
-    out : ndarray, shape (R, C, 2), float64
-        Filled: moves down and along, in cells. Of moves that do as well, the shortest.
+    out : ndarray, shape (R, C, 3), float64
+        Filled: moves down and along, in whole cells, and by how much the misfit is less than without. Of moves that do
+        as well, the shortest.
 
     Notes
     -----
-    Both pictures are read half the move away from the block, each on its side, so that blocks do not gape or overlap
-    (bilateral motion estimation; Choi, Lee and Ko 2000, New frame rate up-conversion using bi-directional motion
-    estimation). Between whole cells, the vertex of a parabola.
+    Full search (Jain and Jain 1981, Displacement measurement and its application in interframe image coding).
     """
     down, along = reach[0], reach[1]
     count = (2 * down + 1) * (2 * along + 1)
@@ -73,19 +73,60 @@ def match_blocks(before, after, rows, columns, half, reach, stiff, noise, out):
     order = np.argsort(lengths, kind="mergesort")
     for i in range(rows.size):
         for j in range(columns.size):
-            best, chosen = np.inf, 0
+            best, chosen, still = np.inf, 0, 0.0
             for n in order:
                 factor = 1.0 + stiff * lengths[n]
                 enough = best / factor - noise
-                misfit = _apart(before, after, rows[i], columns[j], half, moves[n, 0], moves[n, 1], enough)
+                off = (0, 0, moves[n, 0], moves[n, 1])
+                misfit = _apart(here, there, 1, rows[i], columns[j], half, off, enough)
                 cost = (misfit + noise) * factor
+                if n == order[0]:
+                    still = cost
                 if cost < best:
                     best, chosen = cost, n
-            v, h = moves[chosen, 0], moves[chosen, 1]
-            here = _apart(before, after, rows[i], columns[j], half, v, h, np.inf)
-            sides = np.empty(4)
-            for n in range(4):
-                dv, dh = (2 * n - 1, 0) if n < 2 else (0, 2 * n - 5)
-                sides[n] = _apart(before, after, rows[i], columns[j], half, v + dv, h + dh, np.inf)
-            out[i, j, 0] = v + _vertex(sides[0], here, sides[1])
-            out[i, j, 1] = h + _vertex(sides[2], here, sides[3])
+            out[i, j, 0], out[i, j, 1] = moves[chosen, 0], moves[chosen, 1]
+            out[i, j, 2] = still - best
+
+
+@compiled
+def refine_blocks(before, after, rows, columns, half, around, steps):
+    """Find better moves near known ones, for blocks of a picture halfway between two others.
+
+    Parameters
+    ----------
+    before, after : ndarray, shape (H, W, 3), float32
+        Twice as fine as cells: cell (r, c) is at (2 r, 2 c). Beyond the border as at the border.
+    rows, columns : ndarray, shape (R,) and (C,), int64
+        Cells in the middle of blocks.
+    half : int
+        A block goes so many cells to each side of its middle.
+    around : int
+        Cells by which a better move is another one, down and along.
+    steps : ndarray, shape (R, C, 3), float64
+        Changed: moves down and along, cells.
+
+    Notes
+    -----
+    Both pictures are read half the move away from the block, each on its side, so that blocks do not gape or overlap
+    (bilateral motion estimation; Choi, Lee and Ko 2000, New frame rate up-conversion using bi-directional motion
+    estimation). Between whole cells, the vertex of a parabola.
+    """
+    side = 2 * around + 3
+    misfits = np.empty((side, side))
+    for i in range(rows.size):
+        for j in range(columns.size):
+            v, h = int(round(steps[i, j, 0])), int(round(steps[i, j, 1]))
+            for a in range(side):
+                for b in range(side):
+                    down, along = v + a - around - 1, h + b - around - 1
+                    off = (-down, -along, down, along)
+                    misfits[a, b] = _apart(before, after, 2, rows[i], columns[j], half, off, np.inf)
+            # as it was, where nothing is better
+            p = q = around + 1
+            for a in range(1, side - 1):
+                for b in range(1, side - 1):
+                    if misfits[a, b] < misfits[p, q]:
+                        p, q = a, b
+            middle = misfits[p, q]
+            steps[i, j, 0] = v + p - around - 1 + _vertex(misfits[p - 1, q], middle, misfits[p + 1, q])
+            steps[i, j, 1] = h + q - around - 1 + _vertex(misfits[p, q - 1], middle, misfits[p, q + 1])

@@ -49,6 +49,34 @@ def middles(count: int, block: int) -> NDArray[np.int64]:
     return np.minimum(np.arange(0, count, block) + block // 2, count - 1)
 
 
+def landed(steps: Floats, block: int, part: float, under: Floats | None = None) -> Floats:
+    """Return moves by where what moves is a part of its way off where they are told, shape (R, C, 3).
+
+    Parameters
+    ----------
+    steps : ndarray, shape (R, C, 3)
+        Cells down and along, and weight.
+    block : int
+        Cells to each side of a block.
+    part : float
+        Of a whole move, below 0 backwards.
+    under : ndarray, shape (R, C, 3), optional
+        What is there already; None: the moves as told. Where several come together, the largest weight stays.
+    """
+    flat = steps.reshape(-1, 3)
+    here = np.stack(np.unravel_index(np.arange(len(flat)), steps.shape[:2]), axis=1)
+    there = np.rint(here + (part / block) * flat[:, :2]).astype(np.int64)
+    order = np.argsort(flat[:, 2], kind="stable")
+    inside = np.asarray((there >= 0) & (there < steps.shape[:2])).all(axis=1)
+    order = order[inside[order]]
+    out = np.full(steps.shape, -1.0)
+    out[there[order, 0], there[order, 1]] = flat[order]
+    # where nothing came
+    below = steps if under is None else under
+    least = np.zeros(steps.shape[:2]) if under is None else under[..., 2]
+    return np.where((out[..., 2] < least)[..., None], below, out)
+
+
 def displaced(picture: Pixels, moves: Floats) -> Floats:
     """Read a picture at places off each cell, shape (rows, columns, 2): cells down and along."""
     row, column = np.mgrid[: picture.shape[0], : picture.shape[1]]
@@ -108,7 +136,9 @@ def mixed(
     part = (constellation_deg - angles[0]) / (angles[1] - angles[0])
     before, after = sprite.pictures[interval], sprite.pictures[interval + 1]
     shares = spread(np.moveaxis(moves.shares(interval), 0, -1), moves.block, shape)
-    left, whole = (spread(steps, moves.block, shape) for steps in moves.steps(interval))
+    left, whole = (
+        spread(landed(steps, moves.block, part - 0.5)[..., :2], moves.block, shape) for steps in moves.steps(interval)
+    )
     drawn = [ghosts_light(sprite, packed, model, angle) for angle in (*angles, constellation_deg)]
     of_left = halfway(before, after, left, part)
     of_whole = halfway(before + drawn[0], after + drawn[1], whole, part) - drawn[2]

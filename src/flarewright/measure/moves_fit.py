@@ -13,12 +13,12 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernels.measure_motion import match_blocks
+from ..kernels.measure_motion import match_blocks, refine_blocks
 from ..model.ghost_model import GhostModel
 from ..model.moves import packed_moves
 from ..model.sprite import Sprite
 from .carried import boxed
-from .moved import displaced, ghosts_light, middles, spread
+from .moved import displaced, ghosts_light, landed, middles, spread
 from .packed import Packed, pack
 from .sprites import Pixels, samples
 
@@ -28,12 +28,16 @@ Floats = NDArray[np.float64]
 _BLOCK, _HALF = 4, 3
 # farthest moves from one picture to the next, cells: across the light's line and along it
 _REACH = (8, 14)
+# cells around a move that was told by a place nearby
+_NEARBY = 2
 # by which part a misfit is taken for larger with each cell of the move, for longer ones have more choice
 _STIFF = 0.02
 # cells to each side over which a way's misfits are averaged, and how fast a way counts less the more it misses by
 _ABOUT, _STEEP = 5, 4.0
 # what a cell may be off by in any case, in units of the sprite: to match, and to foretell
 _MATCH, _FORETELL = 3.0, 2.0
+# a move's weight: so many for each factor of 2 by which the misfit without it stands out of the noise, and at most
+_LOUD, _LOUDEST = 4.0, 127.0
 # one photograph is foretold from two others
 _FEWEST = 3
 
@@ -60,16 +64,18 @@ def with_moves(model: GhostModel) -> GhostModel:
 
 
 def _learned(sprite: Sprite, packed: Packed, model: GhostModel) -> Sprite:
-    left = sprite.pictures
-    angles = sprite.constellation_deg
+    left, angles = sprite.pictures, sprite.constellation_deg
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         whole = left + np.stack(list(pool.map(lambda angle: ghosts_light(sprite, packed, model, angle), angles)))
-        ways = [left, whole]
-        steps = np.stack([_steps(pictures, sprite.unit, pool) for pictures in ways], axis=1)
-        missed = [_missed(pictures, steps[:, n], angles, pool) for n, pictures in enumerate(ways)]
-        missed.insert(0, np.stack(list(pool.map(lambda k: _missed_boxed(sprite, packed, model, k), _inner(left)))))
+        missed = [np.stack(list(pool.map(lambda k: _missed_boxed(sprite, packed, model, k), _inner(left))))]
+        steps = []
+        for pictures in (left, whole):
+            onward = _steps(pictures[:-1], pictures[1:], sprite.unit, pool)
+            back = _steps(pictures[1:], pictures[:-1], sprite.unit, pool)
+            missed.append(_missed(pictures, onward, back, angles, pool))
+            steps.append(_refined(pictures, [_halfway(*pair) for pair in zip(onward, back, strict=True)], pool))
     shares = _shares([_about(each, sprite.unit) for each in missed])
-    out: Sprite = sprite.replace(moves=packed_moves(_BLOCK, steps, shares[:, 1:]))
+    out: Sprite = sprite.replace(moves=packed_moves(_BLOCK, np.stack(steps, axis=1), shares[:, 1:]))
     return out
 
 
@@ -78,18 +84,37 @@ def _inner(pictures: Pixels) -> range:
     return range(1, len(pictures) - 1)
 
 
-def _steps(pictures: Pixels, unit: float, pool: ThreadPoolExecutor) -> Floats:
-    """Return the moves of each block between each picture and the next, shape (K - 1, R, C, 2)."""
-    rows, columns = (middles(count, _BLOCK) for count in pictures.shape[1:3])
-    fine = list(pool.map(_doubled, pictures))
+def _steps(here: Pixels, there: Pixels, unit: float, pool: ThreadPoolExecutor) -> Floats:
+    """Return the moves of each block from pictures to others, and their weights, shape (K - 1, R, C, 3)."""
+    rows, columns = (middles(count, _BLOCK) for count in here.shape[1:3])
     noise = 3 * (2 * _HALF + 1) ** 2 * (_MATCH * unit) ** 2
 
     def match(k: int) -> Floats:
-        out = np.empty((rows.size, columns.size, 2))
-        match_blocks(fine[k], fine[k + 1], rows, columns, _HALF, np.array(_REACH), _STIFF, noise, out)
+        out = np.empty((rows.size, columns.size, 3))
+        match_blocks(here[k], there[k], rows, columns, _HALF, np.array(_REACH), _STIFF, noise, out)
+        out[..., 2] = np.minimum(_LOUD * np.log2(1.0 + np.maximum(out[..., 2], 0.0) / noise), _LOUDEST)
         return out
 
-    return np.stack(list(pool.map(match, range(len(pictures) - 1))))
+    return np.stack(list(pool.map(match, range(len(here)))))
+
+
+def _halfway(onward: Floats, back: Floats) -> Floats:
+    """Return moves by where things are halfway, from those told by where they are before and after, shape (R, C, 3)."""
+    returned = back * np.array([-1.0, -1.0, 1.0])
+    return landed(returned, _BLOCK, -0.5, landed(onward, _BLOCK, 0.5))
+
+
+def _refined(pictures: Pixels, steps: Sequence[Floats], pool: ThreadPoolExecutor) -> Floats:
+    """Return moves to parts of a cell, shape (K - 1, R, C, 3)."""
+    rows, columns = (middles(count, _BLOCK) for count in pictures.shape[1:3])
+    fine = list(pool.map(_doubled, pictures))
+
+    def refine(k: int) -> Floats:
+        out = steps[k].copy()
+        refine_blocks(fine[k], fine[k + 1], rows, columns, _HALF, _NEARBY, out)
+        return out
+
+    return np.stack(list(pool.map(refine, range(len(steps)))))
 
 
 def _doubled(picture: Pixels) -> Pixels:
@@ -99,14 +124,16 @@ def _doubled(picture: Pixels) -> Pixels:
     return samples(picture, column.ravel(), row.ravel()).reshape(rows, columns, 3)
 
 
-def _missed(pictures: Pixels, steps: Floats, angles: Sequence[float], pool: ThreadPoolExecutor) -> Floats:
+def _missed(
+    pictures: Pixels, onward: Floats, back: Floats, angles: Sequence[float], pool: ThreadPoolExecutor
+) -> Floats:
     """Return by which squares each inner photograph is missed when moves foretell it, shape (K - 2, rows, columns)."""
     shape = pictures.shape[1:3]
 
     def miss(k: int) -> Floats:
         part = (angles[k] - angles[k - 1]) / (angles[k + 1] - angles[k - 1])
-        before = displaced(pictures[k - 1], -spread(steps[k - 1], _BLOCK, shape))
-        after = displaced(pictures[k + 1], spread(steps[k], _BLOCK, shape))
+        before = displaced(pictures[k - 1], spread(back[k - 1, ..., :2], _BLOCK, shape))
+        after = displaced(pictures[k + 1], spread(onward[k, ..., :2], _BLOCK, shape))
         return np.asarray((((1.0 - part) * before + part * after - pictures[k]) ** 2).sum(axis=2))
 
     return np.stack(list(pool.map(miss, _inner(pictures))))

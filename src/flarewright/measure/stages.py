@@ -40,6 +40,8 @@ Progress = Callable[[float, str], None]
 
 # nothing is looked for nearer to the light than this, in pixels of a picture 720 wide
 AROUND_LIGHT = 40.0 / 720.0
+# and nothing but what goes with the light is learned nearer to it than this
+NEXT_TO_LIGHT = 24.0 / 720.0
 # part of the glow that may stay behind where it was taken off
 LEFT_BEHIND = 0.1
 # tangent of the constellation from which the light's distance from the axis tells the focal length
@@ -274,11 +276,18 @@ def with_rest(model: GhostModel, views: Sequence[View]) -> GhostModel:
     seen = [each - drawn(spikes, view) for each, view in zip(seen, placed, strict=True)]
     going = light_sprites(placed, seen)
     seen = [each - drawn(going, view) for each, view in zip(seen, placed, strict=True)]
-    standing = (*spikes, *going, axis_sprite(placed, seen))
+    # next to the light a pixel's error is brighter than all that turns about the axis
+    apart = [hidden(each, _near_light(view)) for each, view in zip(seen, placed, strict=True)]
+    standing = (*spikes, *going, axis_sprite(placed, apart))
     if specks:
         left = [each - drawn(standing, view) for each, view in zip(left, placed, strict=True)]
     sprites = (*standing, *speck_sprites(specks, placed, left, masks_of(placed)))
     return with_moves(model.replace(sprites=sprites))
+
+
+def _near_light(view: View) -> NDArray[np.bool_]:
+    x, y = offsets(view.light_px, view.size_px, 1.0)
+    return np.asarray(np.hypot(x, y) < NEXT_TO_LIGHT * view.size_px[0])
 
 
 def _light_of(model: GhostModel, view: View, roll_deg: float) -> tuple[float, float]:

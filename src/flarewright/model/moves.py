@@ -16,8 +16,8 @@ from .base import Frozen
 _STEP = 1.0 / 8.0
 # a share of 1
 _WHOLE = 127.0
-# down and along, of what is left and of the whole light; then the shares of both
-_NUMBERS = 6
+# down, along and weight, of what is left and of the whole light; then the shares of both
+_NUMBERS = 8
 
 
 class Moves(Frozen):
@@ -30,10 +30,11 @@ class Moves(Frozen):
     intervals, rows, columns : int
         Pictures of the sprite less one, and blocks that cover its cells.
     numbers : str
-        Base64 of zlib of signed bytes in the order interval, row, column, number: moves from one picture to the next
-        across the light's direction (down when the light is right) and towards the light, eighths of a cell, of what is
-        left and then of it together with the ghosts; then the shares of 127 that these two ways have in the picture
-        between. What is left to 127 goes with the ghosts' boxes.
+        Base64 of zlib of signed bytes in the order interval, row, column, number: where what is in a block halfway
+        between two pictures moves from the one to the other, across the light's direction (down when the light is
+        right) and towards the light, eighths of a cell, and its weight: of blocks that come to one place, the one of
+        the largest weight is seen. These three of what is left, and of it together with the ghosts; then the shares of
+        127 that these two ways have. What lacks to 127 goes with the ghosts' boxes.
     """
 
     block: int = Field(ge=1)
@@ -53,7 +54,7 @@ class Moves(Frozen):
         if len(whole) != size:
             found = f"{len(whole)}" if len(whole) < size else f"more than {size}"
             raise ValueError(f"the moves of a sprite hold {found} bytes instead of {size}")
-        shares = np.frombuffer(whole, np.int8).reshape(-1, _NUMBERS)[:, 4:].astype(int)
+        shares = np.frombuffer(whole, np.int8).reshape(-1, _NUMBERS)[:, 6:].astype(int)
         if (shares < 0).any() or (shares.sum(axis=1) > _WHOLE).any():
             raise ValueError("shares in the moves of a sprite must be 0 or more and 127 at most together")
         return self
@@ -64,13 +65,13 @@ class Moves(Frozen):
         return np.frombuffer(whole, np.int8).reshape(self.intervals, self.rows, self.columns, _NUMBERS)
 
     def steps(self, interval: int) -> NDArray[np.float64]:
-        """Return moves in cells, shape (2, rows, columns, 2): of what is left, of the whole light; down, along."""
-        moves = _STEP * self._bytes[interval, ..., :4].astype(np.float64)
-        return np.asarray(np.moveaxis(moves.reshape(self.rows, self.columns, 2, 2), 2, 0))
+        """Return moves, cells down and along, and weights of what is left and of it with ghosts, shape (2, R, C, 3)."""
+        numbers = self._bytes[interval, ..., :6].reshape(self.rows, self.columns, 2, 3) * np.array([_STEP, _STEP, 1.0])
+        return np.asarray(np.moveaxis(numbers, 2, 0))
 
     def shares(self, interval: int) -> NDArray[np.float64]:
         """Return the shares of the two ways, shape (2, rows, columns)."""
-        return np.asarray(np.moveaxis(self._bytes[interval, ..., 4:] / _WHOLE, -1, 0))
+        return np.asarray(np.moveaxis(self._bytes[interval, ..., 6:] / _WHOLE, -1, 0))
 
 
 def packed_moves(block: int, steps: NDArray[np.float64], shares: NDArray[np.float64]) -> Moves:
@@ -80,15 +81,15 @@ def packed_moves(block: int, steps: NDArray[np.float64], shares: NDArray[np.floa
     ----------
     block : int
         Cells.
-    steps : ndarray, shape (intervals, 2, rows, columns, 2)
-        Cells, as `Moves.steps`.
+    steps : ndarray, shape (intervals, 2, rows, columns, 3)
+        As `Moves.steps`; weights from 0 to 127.
     shares : ndarray, shape (intervals, 2, rows, columns)
     """
     intervals, _, rows, columns, _ = steps.shape
     whole = np.empty((intervals, rows, columns, _NUMBERS), np.int8)
-    moves = np.rint(np.clip(steps / _STEP, -127.0, 127.0)).astype(np.int8)
-    whole[..., :4] = np.moveaxis(moves, 1, 3).reshape(intervals, rows, columns, 4)
+    numbers = np.rint(np.clip(steps / np.array([_STEP, _STEP, 1.0]), -127.0, 127.0)).astype(np.int8)
+    whole[..., :6] = np.moveaxis(numbers, 1, 3).reshape(intervals, rows, columns, 6)
     # cut off, so that both together are never more than all
-    whole[..., 4:] = np.moveaxis(np.floor(_WHOLE * shares), 1, -1).astype(np.int8)
+    whole[..., 6:] = np.moveaxis(np.floor(_WHOLE * shares), 1, -1).astype(np.int8)
     told = base64.b64encode(zlib.compress(whole.tobytes(), 9)).decode("ascii")
     return Moves(block=block, intervals=intervals, rows=rows, columns=columns, numbers=told)
