@@ -5,8 +5,8 @@
     python -m benchmarks.measure --speed
 
 A synthetic camera (`tests/measure/synthetic_camera.py`) photographs each lens at the even ones of 100 constellations;
-the model is found and fitted from those alone, and judged at the odd ones against the noise-free truth, outside 40 (of
-720) pixels around the light.
+the model is found, fitted, tracked and compressed from those alone, as `flarewright measure run` does, and judged at
+the odd ones against the noise-free truth, outside 40 (of 720) pixels around the light.
 """
 
 from __future__ import annotations
@@ -28,10 +28,11 @@ from flarewright.io.ghost_model_file import write_ghost_model
 from flarewright.io.merged import read_run
 from flarewright.measure.merge_run import merge_captures
 from flarewright.measure.stages import find_ghosts, fit_ghosts
+from flarewright.measure.track_stage import compress_ghosts, track_ghosts
 
 
 def prove(lens: str, folder: Path, given: argparse.Namespace) -> dict[str, Any]:
-    """Photograph, merge, find, fit and judge one lens."""
+    """Photograph one lens, go through all stages and judge it."""
     shoot(setup_of(lens, given.width, given.count, given.f_number), folder)
     run_folder = folder / given.merge
     start, cpu = time.perf_counter(), time.process_time()
@@ -50,8 +51,19 @@ def prove(lens: str, folder: Path, given: argparse.Namespace) -> dict[str, Any]:
     model = fit_ghosts(run_folder, run, rough, tell=tell)
     fitted = time.process_time()
     write_ghost_model(folder / f"model-{given.merge}.json", model)
+    tell("fitted")
+    tracks = track_ghosts(run_folder, run, model)
+    tracked = time.process_time()
+    model = compress_ghosts(run_folder, run, model, tracks)
+    compressed = time.process_time()
+    wall = time.perf_counter() - start
+    write_ghost_model(folder / f"compact-{given.merge}.json", model)
+    tell("compressed")
     scores = judge(model, folder, run_folder, run)
-    times = {"merge": merged - cpu, "find": found - merged, "fit": fitted - found, "wall": time.perf_counter() - start}
+    times = {
+        "merge": merged - cpu, "find": found - merged, "fit": fitted - found, "track": tracked - fitted,
+        "compress": compressed - tracked, "wall": wall,
+    }  # fmt: skip
     return {"lens": lens, "merge": given.merge, "ghosts": len(model.ghosts), "CPU s": times, **scores}
 
 

@@ -96,11 +96,30 @@ def test_nothing_is_learned_where_nothing_may_be_believed(run):
 def test_specks_are_hidden_from_coarser_pictures(run):
     model, seen = run
     specks = specks_of(model, seen)
-    for view, mask in zip(seen, covered(specks, seen), strict=True):
+    for view, mask in zip(seen, covered(specks, seen, left_of(model, seen)), strict=True):
         alone = cast(GhostModel, model.replace(ghosts=model.ghosts[:1]))
         light = replay(alone, view.constellation_deg)[0].pixels[..., 1]
         assert light[~mask].max(initial=0.0) < 0.02 * light.max()
         assert mask.sum() < 400
+
+
+def test_a_ghost_that_does_not_outshine_what_is_around_it_is_no_speck(run):
+    model, seen = run
+    bright = [replace(view, pixels=view.pixels + np.float32(300.0)) for view in seen]
+    assert specks_of(model, bright) == ()
+
+
+def test_where_a_model_does_not_show_a_speck_it_is_hidden_only_if_it_is_there(run):
+    model, seen = run
+    short = model.replace(ghosts=(model.ghosts[0].replace(visible_deg=(8.5, LARGEST)), model.ghosts[1]))
+    (speck,) = specks_of(short, seen)
+    assert {k for k, _ in speck.beyond} == set(range(8))
+    there = covered((speck,), seen, left_of(short, seen))
+    assert all(mask.any() for mask in there)
+    # the ghost is known, and what the model shows is all
+    gone = views(TRUE[1:], angles=CAPTURED, noise=0.001)
+    empty = covered((speck,), gone, [0.1 * view.pixels for view in gone])
+    assert not any(mask.any() for mask in empty[:8])
 
 
 @pytest.mark.parametrize("roll", [0.0, 33.0, 217.0])

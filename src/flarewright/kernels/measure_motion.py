@@ -6,6 +6,9 @@ import numpy as np
 
 from ._jit import compiled, inner
 
+# how far a bowl's bends may differ before it is a valley
+_VALLEY = 0.01
+
 
 @inner
 def _apart(here, there, fine, row, column, half, off, enough):
@@ -31,10 +34,42 @@ def _apart(here, there, fine, row, column, half, off, enough):
 
 
 @inner
-def _vertex(low, middle, high):
-    """Return where the parabola through three values at -1, 0 and 1 is least, at most half a step off."""
-    bend = low + high - 2.0 * middle
-    return min(max(0.5 * (low - high) / bend, -0.5), 0.5) if bend > 0.0 else 0.0
+def _structure(picture, row, column, half):
+    """Add up the squares by which a block differs from its mean."""
+    last_row, last_column = picture.shape[0] - 1, picture.shape[1] - 1
+    total = 0.0
+    for m in range(3):
+        light, squares = 0.0, 0.0
+        for r in range(row - half, row + half + 1):
+            ra = min(max(r, 0), last_row)
+            for c in range(column - half, column + half + 1):
+                value = picture[ra, min(max(c, 0), last_column), m]
+                light += value
+                squares += value * value
+        total += squares - light * light / (2 * half + 1) ** 2
+    return total
+
+
+@inner
+def _lowest(misfits, p, q, out):
+    """Fill by how much the lowest point of a bowl through the values around (p, q) is off that, at most half a step.
+
+    Along a straight border a move tells nothing; there the bowl is a valley, and the nearest of its lowest points
+    counts.
+    """
+    here = misfits[p, q]
+    down = 0.5 * (misfits[p + 1, q] - misfits[p - 1, q])
+    along = 0.5 * (misfits[p, q + 1] - misfits[p, q - 1])
+    bend = misfits[p + 1, q] + misfits[p - 1, q] - 2.0 * here
+    sway = misfits[p, q + 1] + misfits[p, q - 1] - 2.0 * here
+    twist = 0.25 * (misfits[p + 1, q + 1] + misfits[p - 1, q - 1] - misfits[p + 1, q - 1] - misfits[p - 1, q + 1])
+    stiff = _VALLEY * (bend + sway)
+    bend, sway = bend + stiff, sway + stiff
+    space = bend * sway - twist * twist
+    out[0], out[1] = 0.0, 0.0
+    if space > 0.0 and bend > 0.0:
+        out[0] = min(max((twist * along - sway * down) / space, -0.5), 0.5)
+        out[1] = min(max((twist * down - bend * along) / space, -0.5), 0.5)
 
 
 @compiled
@@ -56,8 +91,8 @@ def match_blocks(here, there, rows, columns, half, reach, stiff, noise, out):
     noise : float
         Sum of squares that is added to every misfit, so that a block without light stays.
     out : ndarray, shape (R, C, 3), float64
-        Filled: moves down and along, in whole cells, and by how much the misfit is less than without. Of moves that do
-        as well, the shortest.
+        Filled: moves down and along, in whole cells, and by how much the misfit is less than without, but not more than
+        the squares by which the block differs from its mean. Of moves that do as well, the shortest.
 
     Notes
     -----
@@ -85,7 +120,8 @@ def match_blocks(here, there, rows, columns, half, reach, stiff, noise, out):
                 if cost < best:
                     best, chosen = cost, n
             out[i, j, 0], out[i, j, 1] = moves[chosen, 0], moves[chosen, 1]
-            out[i, j, 2] = still - best
+            # darkness finds darkness where light was before, and that is nothing that moves
+            out[i, j, 2] = min(still - best, _structure(here, rows[i], columns[j], half))
 
 
 @compiled
@@ -109,10 +145,10 @@ def refine_blocks(before, after, rows, columns, half, around, steps):
     -----
     Both pictures are read half the move away from the block, each on its side, so that blocks do not gape or overlap
     (bilateral motion estimation; Choi, Lee and Ko 2000, New frame rate up-conversion using bi-directional motion
-    estimation). Between whole cells, the vertex of a parabola.
+    estimation). Between whole cells, the lowest point of a bowl.
     """
     side = 2 * around + 3
-    misfits = np.empty((side, side))
+    misfits, off_middle = np.empty((side, side)), np.empty(2)
     for i in range(rows.size):
         for j in range(columns.size):
             v, h = int(round(steps[i, j, 0])), int(round(steps[i, j, 1]))
@@ -127,6 +163,6 @@ def refine_blocks(before, after, rows, columns, half, around, steps):
                 for b in range(1, side - 1):
                     if misfits[a, b] < misfits[p, q]:
                         p, q = a, b
-            middle = misfits[p, q]
-            steps[i, j, 0] = v + p - around - 1 + _vertex(misfits[p - 1, q], middle, misfits[p + 1, q])
-            steps[i, j, 1] = h + q - around - 1 + _vertex(misfits[p, q - 1], middle, misfits[p, q + 1])
+            _lowest(misfits, p, q, off_middle)
+            steps[i, j, 0] = v + p - around - 1 + off_middle[0]
+            steps[i, j, 1] = h + q - around - 1 + off_middle[1]

@@ -63,8 +63,9 @@ def carried(sprite: Sprite, packed: Packed, model: GhostModel, constellation_deg
     """
     angles = np.array(sprite.constellation_deg)
     inside = angles[0] < constellation_deg < angles[-1] and constellation_deg not in angles
+    stands = sprite.moves is None and not packed[0]
     # of a single row or column nothing tells how steep a ghost is
-    if not inside or min(sprite.rows, sprite.columns) < 2:
+    if not inside or stands or min(sprite.rows, sprite.columns) < 2:
         return sprite_at(sprite, constellation_deg)
     k = int(between(angles, constellation_deg)[0])
     with_boxes = boxed(sprite, packed, model, (k, k + 1), constellation_deg)

@@ -65,9 +65,10 @@ def landed(steps: Floats, block: int, part: float, under: Floats | None = None) 
     """
     flat = steps.reshape(-1, 3)
     here = np.stack(np.unravel_index(np.arange(len(flat)), steps.shape[:2]), axis=1)
-    there = np.rint(here + (part / block) * flat[:, :2]).astype(np.int64)
+    # not to even ones, so that neighbours stay neighbours
+    there = np.floor(here + (part / block) * flat[:, :2] + 0.5).astype(np.int64)
     order = np.argsort(flat[:, 2], kind="stable")
-    inside = np.asarray((there >= 0) & (there < steps.shape[:2])).all(axis=1)
+    inside = np.all((there >= 0) & (there < steps.shape[:2]), axis=1)
     order = order[inside[order]]
     out = np.full(steps.shape, -1.0)
     out[there[order, 0], there[order, 1]] = flat[order]

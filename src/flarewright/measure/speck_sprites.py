@@ -168,21 +168,23 @@ def covered(specks: Sequence[Speck], views: Sequence[View], left: Sequence[Pixel
         if that is most of the light.
     """
     masks = [np.zeros(view.pixels.shape[:2], dtype=np.bool_) for view in views]
+    least = _BRIGHT * darkest_noise(views)
     for speck in specks:
         shown = enumerate(speck.outlines, start=speck.first)
-        for k, at in (*shown, *((k, at) for k, at in speck.beyond if _outshone(views[k], at, left[k]))):
+        beyond = ((k, at) for k, at in speck.beyond if _outshone(views[k], at, left[k], least))
+        for k, at in (*shown, *beyond):
             margin = _AROUND_PX * _unit(views[k])
             window, *off = _about(views[k], at, margin)
             masks[k][window] |= _within(at, off, margin)
     return masks
 
 
-def _outshone(view: View, at: Outline, left: Pixels) -> bool:
-    """Tell whether most of the light where a speck would be is not explained."""
+def _outshone(view: View, at: Outline, left: Pixels, least: float) -> bool:
+    """Tell whether most of the light where a speck would be is not explained, and bright."""
     window, *off = _about(view, at, 0.0)
     rest, light = (each[window][_within(at, off, 0.0)] for each in (np.abs(left), view.pixels))
     known = np.isfinite(rest)
-    return bool(known.any() and rest[known].mean() > _MOST_OF_IT * light[known].mean())
+    return bool(known.any() and rest[known].max() > least and rest[known].mean() > _MOST_OF_IT * light[known].mean())
 
 
 def speck_sprites(

@@ -1,0 +1,144 @@
+"""What no ghost explains moves as the pictures tell, where that foretells captures; nothing changes at captures."""
+
+from base64 import b64encode
+from typing import cast
+from zlib import compress
+
+import numpy as np
+import pytest
+from planted_run import views
+from test_carried import BETWEEN, CAPTURED, TRUE, missed, mistaken, model_of
+
+from flarewright.measure.carried import carried
+from flarewright.measure.moved import halfway, landed, middles, spread
+from flarewright.measure.moves_fit import with_moves
+from flarewright.measure.packed import pack
+from flarewright.model.ghost_model import GhostModel
+from flarewright.model.moves import Moves, packed_moves
+from flarewright.model.sprite import Sprite, packed
+
+
+@pytest.fixture(scope="module")
+def unknown():
+    """Return a model that knows no ghost, before and after it has moves."""
+    model, _ = model_of(())
+    return model, with_moves(model)
+
+
+def test_ghosts_that_nobody_knows_are_foretold_between_captures(unknown):
+    before, after = unknown
+    truth = views(TRUE, angles=BETWEEN, noise=0.0)
+    assert missed(after, truth) < 0.3 * missed(before, truth)
+
+
+def test_known_ghosts_still_go_with_their_boxes():
+    model, _ = model_of(tuple(mistaken(one) for one in TRUE))
+    truth = views(TRUE, angles=BETWEEN, noise=0.0)
+    # nor is a ghost a loss that is drawn quite elsewhere than it is
+    assert missed(with_moves(model), truth) < 1.1 * missed(model, truth)
+    strange, _ = model_of((TRUE[0].__class__(-TRUE[0].numbers, TRUE[0].discs),))
+    assert missed(with_moves(strange), truth) < 0.5 * missed(strange, truth)
+
+
+def test_at_captures_and_next_to_them_nothing_changes(unknown):
+    _, model = unknown
+    sprite = model.sprites[0]
+    for k in (0, 7, len(CAPTURED) - 1):
+        own = sprite.pictures[k]
+        for beside in (CAPTURED[k] - 1e-7, CAPTURED[k], CAPTURED[k] + 1e-7):
+            there = carried(sprite, pack(model), model, float(beside))
+            assert np.abs(there - own).max() < 1e-4 * np.abs(own).max()
+
+
+def test_a_speck_of_light_is_carried_over_a_gap_wider_than_itself():
+    pictures = np.zeros((5, 24, 80, 3), np.float32)
+    for k in range(5):
+        pictures[k, 10:14, 8 + 12 * k : 13 + 12 * k] = 1.0
+    unit, cells = packed(pictures, 1e-3)
+    sprite = Sprite(
+        follows="ghosts", grain_px=3.0, corner_px=(-120.0, -36.0), constellation_deg=(1.0, 2.0, 3.0, 4.0, 5.0), rows=24,
+        columns=80, unit=unit, cells=cells,
+    )  # fmt: skip
+    empty = GhostModel(
+        size_px=(240, 72), axis_px=(120.0, 36.0), focal_px=1e3, largest_deg=5.0, constellation_deg=(1.0, 5.0),
+        ghosts=(), sprites=(sprite,),
+    )  # fmt: skip
+    model = cast(GhostModel, with_moves(empty))
+    for angle in (2.25, 2.5, 3.75):
+        there = carried(model.sprites[0], pack(model), model, angle)[..., 1]
+        light = np.maximum(there, 0.0)
+        middle = (light.sum(axis=0) @ np.arange(80)) / light.sum()
+        assert middle == pytest.approx(10.0 + 12.0 * (angle - 1.0), abs=0.5)
+        # one, as wide as it is, not two of half the light
+        assert light[11].max() == pytest.approx(1.0, abs=0.1)
+        assert (light[11] > 0.5).sum() in range(4, 8)
+
+
+def test_two_pictures_give_no_moves(unknown):
+    before, _ = unknown
+    sprite = before.sprites[0]
+    unit, cells = packed(sprite.pictures[:2], sprite.unit)
+    short = before.replace(
+        sprites=(sprite.replace(constellation_deg=sprite.constellation_deg[:2], unit=unit, cells=cells),)
+    )
+    assert with_moves(short).sprites[0].moves is None
+
+
+def test_moves_come_back_from_a_file_to_their_step(unknown):
+    _, model = unknown
+    assert GhostModel.model_validate_json(model.model_dump_json()) == model
+    rng = np.random.default_rng(1)
+    steps = rng.uniform(-15.0, 15.0, (3, 2, 4, 5, 3))
+    steps[..., 2] = rng.integers(0, 128, (3, 2, 4, 5))
+    shares = rng.dirichlet((1.0, 1.0, 1.0), (3, 4, 5))[..., :2].transpose(0, 3, 1, 2)
+    back = packed_moves(4, steps, shares)
+    for k in range(3):
+        assert np.abs(back.steps(k) - steps[k]).max() <= 0.0625
+        assert np.abs(back.shares(k) - shares[k]).max() <= 1.0 / 127.0
+
+
+def test_broken_moves_are_told(unknown):
+    _, model = unknown
+    sprite, moves = model.sprites[0], model.sprites[0].moves
+    with pytest.raises(ValueError, match="not base64 of zlib"):
+        moves.replace(numbers="?")
+    with pytest.raises(ValueError, match="hold 8 bytes instead of"):
+        moves.replace(numbers=b64encode(compress(bytes(8))).decode())
+    with pytest.raises(ValueError, match="more than"):
+        moves.replace(rows=1)
+    with pytest.raises(ValueError, match="127 at most together"):
+        Moves(block=4, intervals=1, rows=1, columns=1, numbers=b64encode(compress(bytes(6) + b"\x60\x60")).decode())
+    with pytest.raises(ValueError, match="do not cover"):
+        sprite.replace(moves=packed_moves(4, np.zeros((1, 2, 3, 3, 3)), np.zeros((1, 2, 3, 3))))
+    with pytest.raises(ValueError, match='only a sprite that follows "ghosts"'):
+        sprite.replace(follows="axis")
+
+
+def test_what_lands_on_one_place_is_what_weighs_most():
+    steps = np.zeros((1, 6, 3))
+    steps[0, 1], steps[0, 4] = (0.0, 8.0, 5.0), (0.0, -4.0, 9.0)
+    out = landed(steps, 4, 1.0)
+    assert tuple(out[0, 3]) == (0.0, -4.0, 9.0)
+    # nothing comes to where they were: as told there
+    assert tuple(out[0, 1]) == (0.0, 8.0, 5.0)
+    assert tuple(landed(steps, 4, 0.5)[0, 2]) == (0.0, 8.0, 5.0)
+    assert np.array_equal(landed(steps, 4, 0.0), steps)
+
+
+def test_blocks_are_linear_between_their_middles():
+    at = middles(22, 4)
+    assert tuple(at) == (2, 6, 10, 14, 18, 21)
+    values = spread(at[:, None].astype(float), 4, (22, 1))[:, 0]
+    assert np.abs(values[2:19] - np.arange(2, 19)).max() < 1e-12
+
+
+def test_what_moves_evenly_is_halfway_in_between():
+    row, column = np.mgrid[:30, :40]
+
+    def hill(x):
+        return np.exp(-((column - x) ** 2 + (row - 15) ** 2) / 30.0)[..., None] * np.ones(3)
+
+    moves = np.broadcast_to((0.0, 6.0), (30, 40, 2))
+    for part in (0.0, 0.3, 0.8):
+        between = halfway(hill(14).astype(np.float32), hill(20).astype(np.float32), moves, part)
+        assert np.abs(between - hill(14 + 6 * part)).max() < 0.01
