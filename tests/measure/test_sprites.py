@@ -17,7 +17,7 @@ from flarewright.measure.numbers import frame
 from flarewright.measure.replay import light_px, replay
 from flarewright.measure.sprite_fit import axis_sprite, drawn, light_sprites, seen_near
 from flarewright.measure.sprites import draw_sprites, sprite_at
-from flarewright.measure.stages import light_law, with_rest
+from flarewright.measure.stages import AROUND_LIGHT, around_light, light_law, with_rest
 from flarewright.measure.views import View
 from flarewright.model.ghost_model import GhostModel
 from flarewright.model.sprite import Sprite, packed
@@ -210,3 +210,21 @@ def test_what_no_view_shows_about_a_constellation_is_not_told_from_afar():
     assert near[:, 0].all()
     assert near[:, 1].tolist() == [True, True, False, False]
     assert not near[:, 2].any()
+
+
+def test_what_hides_the_light_is_filled_by_what_is_as_far_from_it():
+    one = views((), angles=np.array([5.0]), noise=0.0)[0]
+    size = one.size_px
+    x, y = offsets(one.light_px, size, 1.0)
+    far = np.hypot(x, y)
+    glow = np.repeat((50.0 / (1.0 + far) ** 2)[..., None], 3, axis=2).astype(np.float32)
+    clipped, hidden_by_speck = far < 2.0, (far > 4.0) & (far < 8.0) & (y > 0.0)
+    beyond = far > AROUND_LIGHT * size[0]
+    seen = np.where((clipped | hidden_by_speck | (beyond & (x > 60.0)))[..., None], np.float32(np.nan), glow)
+    variance = np.where(clipped[..., None], np.inf, one.variance).astype(np.float32)
+    filled = around_light(replace(one, variance=variance), seen)
+    assert np.isnan(filled[clipped]).all()
+    assert np.allclose(filled[hidden_by_speck], glow[hidden_by_speck], rtol=0.35)
+    assert np.isnan(filled[beyond & (x > 60.0)]).all()
+    known = np.isfinite(seen)
+    assert np.array_equal(filled[known], seen[known])

@@ -147,3 +147,10 @@ def test_a_screen_shows_higher_ripples_only(monkeypatch):
     assert not ripples.ripples_seen(item, rings, None, None, least=ripples.SCREEN_RIPPLE)
     rings = SimpleNamespace(widest_px=2.0)
     assert ripples.ripples_seen(item, rings, None, None, least=ripples.SCREEN_RIPPLE)
+
+
+@pytest.mark.parametrize("wavelengths", [4, 6])
+def test_rings_are_looked_for_at_any_number_of_wavelengths(wavelengths, drawn):
+    found = picture(project(quality=Quality(wavelengths=wavelengths)))
+    assert any(drawn)
+    assert found.sum() == pytest.approx(picture(project()).sum(), rel=0.02)

@@ -274,7 +274,8 @@ def with_rest(model: GhostModel, views: Sequence[View]) -> GhostModel:
     seen = [hidden(each, mask) for each, mask in zip(left, covered(specks, placed, left), strict=True)]
     spikes = spike_sprites(placed, seen, model.star)
     seen = [each - drawn(spikes, view) for each, view in zip(seen, placed, strict=True)]
-    going = light_sprites(placed, seen)
+    # coarse pictures overshoot beside the light's image, which finer ones only mend where something is known
+    going = light_sprites(placed, [around_light(view, each) for view, each in zip(placed, seen, strict=True)])
     seen = [each - drawn(going, view) for each, view in zip(seen, placed, strict=True)]
     # next to the light a pixel's error is brighter than all that turns about the axis
     apart = [hidden(each, _near_light(view)) for each, view in zip(seen, placed, strict=True)]
@@ -283,6 +284,34 @@ def with_rest(model: GhostModel, views: Sequence[View]) -> GhostModel:
         left = [each - drawn(standing, view) for each, view in zip(left, placed, strict=True)]
     sprites = (*standing, *speck_sprites(specks, placed, left, masks_of(placed)))
     return with_moves(model.replace(sprites=sprites))
+
+
+def around_light(view: View, pixels: Pixels) -> Pixels:
+    """Fill what is not known near the light with the median of what is known as far from it.
+
+    Parameters
+    ----------
+    view : View
+    pixels : ndarray, shape (H, W, 3)
+        Not a number where nothing was measured.
+
+    Returns
+    -------
+    ndarray, shape (H, W, 3)
+        Farther off than where ghosts are looked for, and where nothing at a distance is known, as it was. So is what
+        the view itself does not show, its clipped middle above all.
+    """
+    x, y = offsets(view.light_px, view.size_px, 1.0)
+    ring = np.hypot(x, y).astype(np.int64)
+    gaps = np.isnan(pixels).any(axis=2) & np.isfinite(view.variance).all(axis=2)
+    gaps &= ring < AROUND_LIGHT * view.size_px[0]
+    out = pixels.copy()
+    for far in np.unique(ring[gaps]):
+        known = pixels[ring == far]
+        known = known[np.isfinite(known).all(axis=1)]
+        if known.size:
+            out[gaps & (ring == far)] = np.median(known, axis=0)
+    return out
 
 
 def _near_light(view: View) -> NDArray[np.bool_]:

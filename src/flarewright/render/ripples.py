@@ -72,7 +72,8 @@ def narrowest(border: Floats) -> float:
 
 def _largest_part(item: FinalPass, rings: Rings, bundle: Bundle, around: Surroundings) -> float:
     """Compare a ghost's irradiance at its lit edge with all light there, where it is in the picture."""
-    data = bundle.traced[len(item.shot.packed.wavelengths_nm) // 2]
+    held = sorted(bundle.traced)
+    data = bundle.traced[held[len(held) // 2]]
     own = node_densities(data, bundle.pupil, bundle.triangles) * unit(item, bundle, data)
     place, edges = place_of(item.shot, item.to_pixels), rings.edges
     parts = [
