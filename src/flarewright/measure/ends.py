@@ -51,18 +51,20 @@ def ended(
         shown = [k for k, view in enumerate(views) if visible([ghost], view.constellation_deg)[0] > 0.0]
         spans, fades = list(ghost.visible_deg), list(ghost.fade_deg)
         for end in (0, -1):
-            gone = None
-            while len(shown) > _FEWEST:
-                k = shown[end]
+            gone = 0
+            for count, k in enumerate(shown[:: 1 if end == 0 else -1][:-_FEWEST], start=1):
                 light = draw(alone, views[k].constellation_deg, views[k].roll_deg, views[k].size_px)
                 known = masks[k][..., None] & np.isfinite(rest[k]) & (light != 0.0)
                 without = rest[k] + light.astype(np.float32)
-                # one that is out of the picture costs nothing
-                if not known.any() or (rest[k][known] ** 2).sum() < (without[known] ** 2).sum():
+                if not known.any():
+                    # out of the picture, which says nothing of those before
+                    continue
+                if (rest[k][known] ** 2).sum() < (without[known] ** 2).sum():
                     break
-                rest[k], gone = without, shown.pop(end)
-            if gone is not None:
-                last, next_ = (views[n].constellation_deg for n in (shown[end], gone))
+                rest[k], gone = without, count
+            if gone:
+                past, shown = (shown[:gone], shown[gone:]) if end == 0 else (shown[-gone:], shown[:-gone])
+                last, next_ = (views[n].constellation_deg for n in (shown[end], past[-1 - end]))
                 spans[end], fades[end] = 0.5 * (last + next_), abs(next_ - last)
         ghosts.append(ghost.replace(visible_deg=tuple(spans), fade_deg=tuple(fades)))
     return cast(GhostModel, model.replace(ghosts=tuple(ghosts))), rest
