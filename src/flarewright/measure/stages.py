@@ -17,7 +17,6 @@ from ..kernels.measure_pupil import FIRST_DISC, FIRST_I, SOFT
 from ..model.capture import MergedRun
 from ..model.corrections import Corrections
 from ..model.ghost_model import AberrationGhost, Blades, GhostModel, Halo, Reference, Star
-from .ends import ended
 from .fit import Shape, light_of
 from .found import Found
 from .fragments import joined
@@ -264,12 +263,12 @@ def with_rest(model: GhostModel, views: Sequence[View]) -> GhostModel:
     """
     left, placed = [], []
     for view in views:
-        roll = view.roll_deg
+        turn = float(np.degrees(np.arctan2(view.frame[3], view.frame[2])))
+        roll = turn - (180.0 if view.constellation_deg < 0.0 else 0.0)
         ghosts = draw(model, view.constellation_deg, roll, view.size_px)
         known = np.where(np.isfinite(view.variance), view.pixels, np.nan)
         placed.append(replace(view, light_px=_light_of(model, view, roll)))
         left.append((known - ghosts - _light(model.halo, model.star, placed[-1])).astype(np.float32))
-    model, left = ended(model, placed, left, masks_of(placed))
     specks = specks_of(model, placed)
     # a speck is so much brighter than what is around it that coarse cells would spread its errors over that
     seen = [hidden(each, mask) for each, mask in zip(left, covered(specks, placed, left), strict=True)]

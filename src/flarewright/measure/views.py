@@ -45,12 +45,6 @@ class View:
         """Width and height."""
         return self.pixels.shape[1], self.pixels.shape[0]
 
-    @property
-    def roll_deg(self) -> float:
-        """Direction of the light as a replay takes it: a negative constellation is on the other side."""
-        turn = float(np.degrees(np.arctan2(self.frame[3], self.frame[2])))
-        return turn - (180.0 if self.constellation_deg < 0.0 else 0.0)
-
     def showing(self, pixels: Pixels) -> View:
         """Return the same view with other pixels."""
         return replace(self, pixels=pixels)
