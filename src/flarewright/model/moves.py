@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import base64
-import zlib
 from functools import cached_property
+from math import prod
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from .base import Frozen
+from .bytes_text import read_bytes, told_bytes
 
 # of a move, cells; a signed byte then goes to 15.9 of them
 _STEP = 1.0 / 8.0
@@ -45,24 +45,19 @@ class Moves(Frozen):
 
     @model_validator(mode="after")
     def _fits(self) -> Moves:
-        size = self.intervals * self.rows * self.columns * _NUMBERS
-        try:
-            # a few bytes can stand for more than any memory holds
-            whole = zlib.decompressobj().decompress(base64.b64decode(self.numbers, validate=True), size + 1)
-        except (ValueError, zlib.error):
-            raise ValueError("the moves of a sprite are not base64 of zlib") from None
-        if len(whole) != size:
-            found = f"{len(whole)}" if len(whole) < size else f"more than {size}"
-            raise ValueError(f"the moves of a sprite hold {found} bytes instead of {size}")
-        shares = np.frombuffer(whole, np.int8).reshape(-1, _NUMBERS)[:, 6:].astype(int)
-        if (shares < 0).any() or (shares.sum(axis=1) > _WHOLE).any():
+        # not kept, for what is kept is compared where records are
+        shares = self._read()[..., 6:].astype(int)
+        if (shares < 0).any() or (shares.sum(axis=-1) > _WHOLE).any():
             raise ValueError("shares in the moves of a sprite must be 0 or more and 127 at most together")
         return self
 
+    def _read(self) -> NDArray[np.int8]:
+        shape = self.intervals, self.rows, self.columns, _NUMBERS
+        return np.frombuffer(read_bytes(self.numbers, prod(shape), "the moves of a sprite"), np.int8).reshape(shape)
+
     @cached_property
     def _bytes(self) -> NDArray[np.int8]:
-        whole = zlib.decompress(base64.b64decode(self.numbers))
-        return np.frombuffer(whole, np.int8).reshape(self.intervals, self.rows, self.columns, _NUMBERS)
+        return self._read()
 
     def steps(self, interval: int) -> NDArray[np.float64]:
         """Return moves, cells down and along, and weights of what is left and of it with ghosts, shape (2, R, C, 3)."""
@@ -91,5 +86,4 @@ def packed_moves(block: int, steps: NDArray[np.float64], shares: NDArray[np.floa
     whole[..., :6] = np.moveaxis(numbers, 1, 3).reshape(intervals, rows, columns, 6)
     # cut off, so that both together are never more than all
     whole[..., 6:] = np.moveaxis(np.floor(_WHOLE * shares), 1, -1).astype(np.int8)
-    told = base64.b64encode(zlib.compress(whole.tobytes(), 9)).decode("ascii")
-    return Moves(block=block, intervals=intervals, rows=rows, columns=columns, numbers=told)
+    return Moves(block=block, intervals=intervals, rows=rows, columns=columns, numbers=told_bytes(whole.tobytes()))

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import base64
-import zlib
 from functools import cached_property
 from math import prod
 from typing import Annotated, Literal
@@ -13,6 +11,7 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from .base import Frozen
+from .bytes_text import read_bytes, told_bytes
 from .moves import Moves
 
 # bits of a number's fraction that are kept, of the ten of a 16-bit float
@@ -84,25 +83,22 @@ class Sprite(Frozen):
             shape = self.moves.intervals, self.moves.rows, self.moves.columns
             if shape != (len(self.constellation_deg) - 1, *blocks):
                 raise ValueError("the moves of a sprite do not cover its pictures and cells")
-        size = 2 * prod(self._shape)
-        try:
-            # a few bytes can stand for more than any memory holds
-            whole = zlib.decompressobj().decompress(base64.b64decode(self.cells, validate=True), size + 1)
-        except (ValueError, zlib.error):
-            raise ValueError("the cells of a sprite are not base64 of zlib") from None
-        if len(whole) != size:
-            found = f"{len(whole)}" if len(whole) < size else f"more than {size}"
-            raise ValueError(f"the cells of a sprite hold {found} bytes instead of {size}")
+        read_bytes(self.cells, self._size, "the cells of a sprite")
         return self
 
     @property
     def _shape(self) -> tuple[int, int, int, int]:
         return len(self.constellation_deg), self.rows, self.columns, 3
 
+    @property
+    def _size(self) -> int:
+        return 2 * prod(self._shape)
+
     @cached_property
     def pictures(self) -> NDArray[np.float32]:
         """Radiance, shape (constellations, rows, columns, 3)."""
-        planes = np.frombuffer(zlib.decompress(base64.b64decode(self.cells)), np.uint8).reshape(2, -1)
+        whole = read_bytes(self.cells, self._size, "the cells of a sprite")
+        planes = np.frombuffer(whole, np.uint8).reshape(2, -1)
         bits = (planes[0].astype(np.uint16) << 8) | planes[1]
         values: NDArray[np.float32] = bits.view(np.float16).astype(np.float32).reshape(self._shape)
         return values * np.float32(self.unit)
@@ -125,4 +121,4 @@ def packed(pictures: NDArray[np.float32], step: float) -> tuple[float, str]:
     gone = 10 - _FRACTION
     bits = ((bits + (1 << (gone - 1))) >> gone) << gone
     planes = np.concatenate([(bits >> 8).astype(np.uint8), (bits & 0xFF).astype(np.uint8)])
-    return unit, base64.b64encode(zlib.compress(planes.tobytes(), 9)).decode("ascii")
+    return unit, told_bytes(planes.tobytes())
