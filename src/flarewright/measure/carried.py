@@ -12,13 +12,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernels.measure_mesh import draw_ghosts, window_of
+from ..kernels.measure_mesh import window_of
 from ..model.ghost_model import GhostModel
 from ..model.sprite import Sprite
 from .moved import mixed
 from .numbers import field, visible
-from .packed import Packed, posed_numbers
-from .sprites import Pixels, between, samples, sprite_at
+from .packed import Packed, one_colour, posed_numbers
+from .sprites import Pixels, between, cells_frame, samples, sprite_at
 
 Floats = NDArray[np.float64]
 
@@ -69,7 +69,9 @@ def carried(sprite: Sprite, packed: Packed, model: GhostModel, constellation_deg
         return sprite_at(sprite, constellation_deg)
     k = int(between(angles, constellation_deg)[0])
     with_boxes = boxed(sprite, packed, model, (k, k + 1), constellation_deg)
-    return np.asarray(mixed(sprite, packed, model, k, constellation_deg, with_boxes), dtype=np.float32)
+    if sprite.moves is None:
+        return np.asarray(with_boxes, dtype=np.float32)
+    return np.asarray(mixed(sprite, sprite.moves, packed, model, k, constellation_deg, with_boxes), dtype=np.float32)
 
 
 def boxed(sprite: Sprite, packed: Packed, model: GhostModel, ends: tuple[int, int], constellation_deg: float) -> Floats:
@@ -148,14 +150,11 @@ def _edges(sprite: Sprite, packed: Packed, model: GhostModel, constellation_deg:
     """Return how steep each ghost's green is around each cell of a sprite, radiance a cell; flat ones left out."""
     green, counts, sigma = _greens(packed, model, constellation_deg)
     there = visible(packed[0], constellation_deg)
-    grain = sprite.grain_px
-    frame = np.array([-sprite.corner_px[0] / grain, -sprite.corner_px[1] / grain, 1.0, 0.0, 1.0 / grain])
+    frame, shape = cells_frame(sprite), (sprite.rows, sprite.columns)
     found = {}
     for g in np.flatnonzero(there):
         one = slice(g, g + 1)
-        plane = np.zeros((sprite.rows, sprite.columns + 1))
-        draw_ghosts(green[one], counts[one], there[one], sigma, frame, plane)
-        light = np.maximum(plane.cumsum(axis=1)[:, :-1], 0.0)
+        light = np.maximum(one_colour(green[one], counts[one], there[one], sigma, frame, shape), 0.0)
         edge = _most_around(np.hypot(*np.gradient(light)))
         if edge.max() > sprite.unit:
             found[int(g)] = edge

@@ -9,12 +9,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernels.measure_mesh import draw_ghosts
 from ..model.ghost_model import GhostModel
+from ..model.moves import Moves
 from ..model.sprite import Sprite
 from .numbers import field, visible
-from .packed import Packed, posed_numbers
-from .sprites import Pixels, samples
+from .packed import Packed, one_colour, posed_numbers
+from .sprites import Pixels, cells_frame, samples
 
 Floats = NDArray[np.float64]
 
@@ -73,8 +73,7 @@ def landed(steps: Floats, block: int, part: float, under: Floats | None = None) 
     out = np.full(steps.shape, -1.0)
     out[there[order, 0], there[order, 1]] = flat[order]
     # where nothing came
-    below = steps if under is None else under
-    least = np.zeros(steps.shape[:2]) if under is None else under[..., 2]
+    below, least = (steps, 0.0) if under is None else (under, under[..., 2])
     return np.where((out[..., 2] < least)[..., None], below, out)
 
 
@@ -97,25 +96,22 @@ def ghosts_light(sprite: Sprite, packed: Packed, model: GhostModel, constellatio
     specks = {one.ghost for one in model.sprites if one.follows == "speck"}
     there = visible(meshes, constellation_deg) * np.array([ghost.name not in specks for ghost in meshes])
     bent = posed_numbers(meshes, numbers, constellation_deg, sigma)
-    grain = sprite.grain_px
-    frame = np.array([-sprite.corner_px[0] / grain, -sprite.corner_px[1] / grain, 1.0, 0.0, 1.0 / grain])
-    light = np.zeros((sprite.rows, sprite.columns, 3), np.float32)
-    for m in range(3):
-        plane = np.zeros((sprite.rows, sprite.columns + 1))
-        draw_ghosts(bent[m], counts[m], there, sigma, frame, plane)
-        light[..., m] = plane.cumsum(axis=1)[:, :-1]
-    return light
+    frame, shape = cells_frame(sprite), (sprite.rows, sprite.columns)
+    colours = [one_colour(bent[m], counts[m], there, sigma, frame, shape) for m in range(3)]
+    return np.stack(colours, axis=-1).astype(np.float32)
 
 
 def mixed(
-    sprite: Sprite, packed: Packed, model: GhostModel, interval: int, constellation_deg: float, boxed: Floats
-) -> Floats:
+    sprite: Sprite, moves: Moves, packed: Packed, model: GhostModel, interval: int, constellation_deg: float,
+    boxed: Floats,
+) -> Floats:  # fmt: skip
     """Mix what is left between two pictures of a sprite from what three ways tell of it.
 
     Parameters
     ----------
     sprite : Sprite
-        With moves.
+    moves : Moves
+        The sprite's.
     packed : Packed
         The model's ghosts, from `pack`.
     model : GhostModel
@@ -129,9 +125,6 @@ def mixed(
     -------
     ndarray, shape (rows, columns, 3)
     """
-    moves = sprite.moves
-    if moves is None:
-        return boxed
     shape = sprite.rows, sprite.columns
     angles = sprite.constellation_deg[interval : interval + 2]
     part = (constellation_deg - angles[0]) / (angles[1] - angles[0])

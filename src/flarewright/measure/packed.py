@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from ..kernels.measure_mesh import draw_ghosts
 from ..model.ghost_model import AberrationGhost, BezierGhost, Curves, GhostModel
 from .curves import pose_at, posed
 from .numbers import NUMBERS, channel_numbers
@@ -39,3 +40,34 @@ def posed_numbers(meshes: Sequence[AberrationGhost], numbers: Floats, constellat
             for m in range(3):
                 out[m, k] = posed(numbers[m, k], sigma, pose)
     return out
+
+
+def one_colour(
+    numbers: Floats, counts: NDArray[np.int64], there: Floats, sigma: float, frame: Floats, shape: tuple[int, int]
+) -> Floats:
+    """Draw ghosts in one colour.
+
+    Parameters
+    ----------
+    numbers : ndarray, shape (G, 45)
+        At a constellation, from `posed_numbers`.
+    counts : ndarray, shape (G,)
+        How many discs cut each.
+    there : ndarray, shape (G,)
+        Which part of each ghost's light is there.
+    sigma : float
+        Length of the field.
+    frame : ndarray, shape (5,)
+        From `numbers.frame`.
+    shape : tuple of int
+        Rows and columns.
+
+    Returns
+    -------
+    ndarray, shape (rows, columns)
+        Radiance, a little below 0 in places by rounding.
+    """
+    plane = np.zeros((shape[0], shape[1] + 1))
+    draw_ghosts(numbers, counts, there, sigma, frame, plane)
+    light: Floats = plane.cumsum(axis=1)[:, :-1]
+    return light

@@ -182,7 +182,8 @@ def covered(specks: Sequence[Speck], views: Sequence[View], left: Sequence[Pixel
 def _outshone(view: View, at: Outline, left: Pixels, least: float) -> bool:
     """Tell whether most of the light where a speck would be is not explained, and bright."""
     window, *off = _about(view, at, 0.0)
-    rest, light = (each[window][_within(at, off, 0.0)] for each in (np.abs(left), view.pixels))
+    inside = _within(at, off, 0.0)
+    rest, light = np.abs(left[window][inside]), view.pixels[window][inside]
     known = np.isfinite(rest)
     return bool(known.any() and rest[known].max() > least and rest[known].mean() > _MOST_OF_IT * light[known].mean())
 

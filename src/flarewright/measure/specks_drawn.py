@@ -13,11 +13,11 @@ from math import ceil
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernels.measure_mesh import draw_ghosts, window_of
+from ..kernels.measure_mesh import window_of
 from ..model.ghost_model import GhostModel
 from ..model.sprite import Sprite
 from .numbers import field, visible
-from .packed import Packed, posed_numbers
+from .packed import Packed, one_colour, posed_numbers
 from .sprites import Pixels, sprite_at
 
 Floats = NDArray[np.float64]
@@ -137,10 +137,8 @@ def outline(
     left, top = left - _FAR - _MARGIN, top - _FAR - _MARGIN
     finer = min(_FINER, _SAMPLES / max(width, height))
     columns, rows = (ceil((side + 2 * _MARGIN) * finer) for side in (width, height))
-    plane = np.zeros((rows, columns + 1))
     fine = np.array([-left * finer, -top * finer, 1.0, 0.0, finer])
-    draw_ghosts(green, counts[1, one], np.ones(1), sigma, fine, plane)
-    light = plane.cumsum(axis=1)[:, :-1]
+    light = one_colour(green, counts[1, one], np.ones(1), sigma, fine, (rows, columns))
     peak = float(light.max())
     if not peak > 0.0:
         return None

@@ -24,6 +24,12 @@ def between(
     return k, np.clip((constellation_deg - knots[k]) / (knots[k + 1] - knots[k]), 0.0, 1.0)
 
 
+def cells_frame(sprite: Sprite) -> NDArray[np.float64]:
+    """Return the axis, the light's direction and the scale of a sprite's cells, as `numbers.frame` does of pictures."""
+    grain = sprite.grain_px
+    return np.array([-sprite.corner_px[0] / grain, -sprite.corner_px[1] / grain, 1.0, 0.0, 1.0 / grain])
+
+
 def sprite_at(sprite: Sprite, constellation_deg: float) -> Pixels:
     """Return a sprite's picture at a constellation, shape (rows, columns, 3)."""
     angles = np.array(sprite.constellation_deg)

@@ -71,10 +71,15 @@ def masks_of(views: Sequence[View]) -> list[NDArray[np.bool_]]:
     """Return where ghosts are looked for: where all colours were measured, away from the light."""
     out = []
     for view in views:
-        x, y = offsets(view.light_px, view.size_px, 1.0)
-        far = np.hypot(x, y) > AROUND_LIGHT * view.size_px[0]
+        far = _off_light(view) > AROUND_LIGHT * view.size_px[0]
         out.append(far & np.isfinite(view.variance).all(axis=2))
     return out
+
+
+def _off_light(view: View) -> NDArray[np.float64]:
+    """Return how far each pixel is from the light, pixels, shape (H, W)."""
+    x, y = offsets(view.light_px, view.size_px, 1.0)
+    return np.asarray(np.hypot(x, y))
 
 
 def coarse(view: View, times: int) -> View:
@@ -278,7 +283,10 @@ def with_rest(model: GhostModel, views: Sequence[View]) -> GhostModel:
     going = light_sprites(placed, [around_light(view, each) for view, each in zip(placed, seen, strict=True)])
     seen = [each - drawn(going, view) for each, view in zip(seen, placed, strict=True)]
     # next to the light a pixel's error is brighter than all that turns about the axis
-    apart = [hidden(each, _near_light(view)) for each, view in zip(seen, placed, strict=True)]
+    apart = [
+        hidden(each, _off_light(view) < NEXT_TO_LIGHT * view.size_px[0])
+        for each, view in zip(seen, placed, strict=True)
+    ]
     standing = (*spikes, *going, axis_sprite(placed, apart))
     if specks:
         left = [each - drawn(standing, view) for each, view in zip(left, placed, strict=True)]
@@ -301,22 +309,18 @@ def around_light(view: View, pixels: Pixels) -> Pixels:
         Farther off than where ghosts are looked for, and where nothing at a distance is known, as it was. So is what
         the view itself does not show, its clipped middle above all.
     """
-    x, y = offsets(view.light_px, view.size_px, 1.0)
-    ring = np.hypot(x, y).astype(np.int64)
-    gaps = np.isnan(pixels).any(axis=2) & np.isfinite(view.variance).all(axis=2)
-    gaps &= ring < AROUND_LIGHT * view.size_px[0]
-    out = pixels.copy()
+    rings = _off_light(view).astype(np.int64)
+    near = rings < AROUND_LIGHT * view.size_px[0]
+    ring, light = rings[near], pixels[near]
+    known = np.isfinite(light).all(axis=1)
+    gaps = np.isnan(light).any(axis=1) & np.isfinite(view.variance[near]).all(axis=1)
     for far in np.unique(ring[gaps]):
-        known = pixels[ring == far]
-        known = known[np.isfinite(known).all(axis=1)]
-        if known.size:
-            out[gaps & (ring == far)] = np.median(known, axis=0)
+        told = light[known & (ring == far)]
+        if told.size:
+            light[gaps & (ring == far)] = np.median(told, axis=0)
+    out = pixels.copy()
+    out[near] = light
     return out
-
-
-def _near_light(view: View) -> NDArray[np.bool_]:
-    x, y = offsets(view.light_px, view.size_px, 1.0)
-    return np.asarray(np.hypot(x, y) < NEXT_TO_LIGHT * view.size_px[0])
 
 
 def _light_of(model: GhostModel, view: View, roll_deg: float) -> tuple[float, float]:
