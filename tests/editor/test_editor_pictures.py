@@ -841,3 +841,35 @@ def test_a_picture_that_rests_is_as_large_as_the_page_shows_it(project):
     session.do("move_light", {"light": 0, "x": 1.0, "y": 1.0})
     assert screen.wait(60.0)
     assert screen.picture.ghosts.shape == (562, 1000, 3)
+
+
+def test_a_page_fetches_what_is_final_for_the_screen_before_the_next_picture_is_begun(monkeypatch):
+    session, _ = begin(None)
+    screen = Screen(session)
+    screen.start()
+    assert screen.wait(60.0)
+    begun = []
+    real = studio.take
+
+    def watched(project, grade, *words, **more):
+        begun.append((grade, screen.fetched.is_set()))
+        return real(project, grade, *words, **more)
+
+    monkeypatch.setattr(studio, "take", watched)
+    monkeypatch.setattr("flarewright.editor.screen.FETCH_S", 60.0)
+    # a page that fetches whatever it is told of
+    session.listeners.append(lambda event: screen.fetched.set() if event["type"] == "picture" else None)
+    screen.final_s = 1.0
+    light = session.project.lights[0].field_deg
+    session.do("move_light", {"light": 0, "x": light[0] + 1.0, "y": light[1]})
+    assert screen.wait(50.0)
+    assert ("final", True) in begun
+    # and where nobody fetches it, the full one comes all the same
+    monkeypatch.setattr("flarewright.editor.screen.FETCH_S", 0.01)
+    session.listeners.pop()
+    begun.clear()
+    screen.final_s = 1.0
+    session.do("move_light", {"light": 0, "x": light[0] + 2.0, "y": light[1]})
+    assert screen.wait(50.0)
+    assert screen.picture.grade == "final"
+    assert ("final", False) in begun

@@ -145,7 +145,7 @@ def test_a_screen_shows_higher_ripples_only(monkeypatch):
     item, rings = SimpleNamespace(source=None), SimpleNamespace(widest_px=1.0)
     assert ripples.ripples_seen(item, rings, None, None)
     assert not ripples.ripples_seen(item, rings, None, None, least=ripples.SCREEN_RIPPLE)
-    rings = SimpleNamespace(widest_px=2.0)
+    rings = SimpleNamespace(widest_px=4.0)
     assert ripples.ripples_seen(item, rings, None, None, least=ripples.SCREEN_RIPPLE)
 
 

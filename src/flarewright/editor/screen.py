@@ -31,6 +31,8 @@ QUALITY = 92
 MOST_EXPOSURES = 30
 # a hand that has not moved for so long is looking, and sees no draft any more
 HOLD_S = 0.15
+# a page that has not fetched a new picture by then is gone, or has other things to do
+FETCH_S = 0.08
 
 
 class Screen:
@@ -66,6 +68,8 @@ class Screen:
         self._busy: tuple[Project, View] | None = None
         # set when a hand has let go of what it held still, or moved on
         self._let_go = threading.Event()
+        # set when a page has the picture that is shown
+        self.fetched = threading.Event()
         session.listeners.append(self._heard)
 
     def start(self) -> None:
@@ -123,7 +127,12 @@ class Screen:
         self.picture, self.problem, self.moved, self.packed = picture, "", None, packed
         self._publish()
 
+    def let_through(self) -> None:
+        """Wait a moment until a page has the picture: what sends it shares the interpreter with what is drawn next."""
+        self.fetched.wait(FETCH_S)
+
     def _publish(self) -> None:
+        self.fetched.clear()
         self.number += 1
         self.session.tell({"type": "picture"})
 

@@ -108,7 +108,9 @@ def _rest(desk: Desk, _request: Request, _body: Any) -> Any:
 
 
 def _picture(desk: Desk, _request: Request, _body: Any) -> Any:
-    return _jpeg(packed(desk.screen))
+    sent = _jpeg(packed(desk.screen))
+    sent.background = BackgroundTask(desk.screen.fetched.set)
+    return sent
 
 
 def _move(desk: Desk, asked: Mapping[str, Any]) -> tuple[Callable[[Project], Project], int]:

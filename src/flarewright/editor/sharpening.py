@@ -118,6 +118,7 @@ def _show_soon(screen: Screen, project: Project, view: View, check: Check) -> No
     soon = studio.take(project, "soon", view, room=screen.room, rings=rings, progress=progress)
     check()
     screen.show(soon)
+    screen.let_through()
 
 
 def _show_final(

@@ -220,14 +220,3 @@ def picture_piece(values: Singles, box: Box) -> Piece:
     found[columns.OUTSIDE], found[columns.CORNERS] = float(np.abs(box).max()), -1.0
     found[columns.FINE] = 0.5 / max(found[columns.PER_MM_X], found[columns.PER_MM_Y])
     return Piece(values.ravel(), found)
-
-
-def joined(values: Sequence[Singles]) -> tuple[Singles, list[int]]:
-    """Join the patterns of a path's crossings: their values, each once, and where they begin."""
-    starts: dict[int, int] = {}
-    parts: list[Singles] = []
-    for one in values:
-        if id(one) not in starts:
-            starts[id(one)] = sum(part.size for part in parts)
-            parts.append(one)
-    return parts[0] if len(parts) == 1 else np.concatenate(parts), [starts[id(one)] for one in values]

@@ -9,11 +9,10 @@ from __future__ import annotations
 
 import math
 import threading
-from collections import OrderedDict
-from collections.abc import Hashable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +21,7 @@ from ..kernels.lit_edge import reached_edges
 from ..kernels.pattern import EDGE, FIRST
 from ..kernels.ringing import draw_ringing
 from ..model import Light
-from ..model.light import Lines
+from ..model.light import Lines, Spectrum
 from ..optics.blade_form import BladeForm, blade_form
 from ..optics.fresnel import (
     SHADOW,
@@ -39,7 +38,8 @@ from ..optics.pack import PackedLens
 from ..optics.paths import LightPath
 from ..optics.ringing import StopToSensor, frft_fresnel_number, stop_to_sensor
 from ..optics.spectrum import band_contents
-from .edge_rings import EdgeCrossing, Piece, edge_crossing, joined, picture_piece, sharp_piece
+from .edge_rings import EdgeCrossing, Piece, edge_crossing, picture_piece, sharp_piece
+from .kept import Kept, Shelf
 
 if TYPE_CHECKING:
     from ..optics.bundle import Bundle
@@ -77,38 +77,12 @@ WINDOW_TEXELS = 3.0
 
 KEPT_BYTES = 60_000_000
 KEPT_GRID_BYTES = 60_000_000
-KEPT_JOINED_BYTES = 20_000_000
+# ghosts, of which hundreds have rings
+KEPT_RINGS = 2048
+# numbers, of which all ghosts of a picture need 10 to 20 million
+SHELF = 12_000_000
 # a crossing is lit where rays come as near to its edge as this part of the circle within it
 LIT = 0.95
-
-
-class _Kept:
-    """The last things that were made, by key, up to a size; threads may share it.
-
-    What it holds depends on the order of the work, what it returns does not.
-    """
-
-    def __init__(self, most: int) -> None:
-        self._most, self._size = most, 0
-        self._held: OrderedDict[Hashable, tuple[Any, int]] = OrderedDict()
-        self._lock = threading.Lock()
-
-    def get(self, key: Hashable) -> Any:
-        with self._lock:
-            if key not in self._held:
-                return None
-            self._held.move_to_end(key)
-            return self._held[key][0]
-
-    def put(self, key: Hashable, value: Any, size: int) -> None:
-        with self._lock:
-            if key in self._held:
-                return
-            self._held[key] = (value, size)
-            self._size += size
-            while self._size > self._most and len(self._held) > 1:
-                _, (_, freed) = self._held.popitem(last=False)
-                self._size -= freed
 
 
 @dataclass(frozen=True)
@@ -128,9 +102,12 @@ class Ringing:
     opening: Opening
     radius: float
     f_number: float
-    _grids: _Kept = field(default_factory=lambda: _Kept(KEPT_GRID_BYTES), compare=False, repr=False)
-    _patterns: _Kept = field(default_factory=lambda: _Kept(KEPT_BYTES), compare=False, repr=False)
-    _joined: _Kept = field(default_factory=lambda: _Kept(KEPT_JOINED_BYTES), compare=False, repr=False)
+    _grids: Kept = field(default_factory=lambda: Kept(KEPT_GRID_BYTES), compare=False, repr=False)
+    _patterns: Kept = field(default_factory=lambda: Kept(KEPT_BYTES), compare=False, repr=False)
+    _rings: Kept = field(default_factory=lambda: Kept(KEPT_RINGS), compare=False, repr=False)
+    _textures: Kept = field(default_factory=lambda: Kept(KEPT_RINGS), compare=False, repr=False)
+    _averages: Kept = field(default_factory=lambda: Kept(KEPT_BYTES), compare=False, repr=False)
+    _shelf: Shelf = field(default_factory=lambda: Shelf(SHELF), compare=False, repr=False)
 
     def of(
         self,
@@ -161,7 +138,14 @@ class Ringing:
             None where the edge of the iris is not lit, where its fringes are far below a pixel, and where the Fresnel
             number is below `LEAST_FRESNEL_NUMBER`: the plain picture is right then.
         """
-        return _rings(self, packed, path, light, bundle, pixels_per_mm, nearness)
+        lit = tuple(_lit(list(bundle.traced.values()), path.stop_crossings, self.opening))
+        # where the light stands is not asked: of a lens that stays every picture finds them
+        key = (path, lit, light.spectrum, pixels_per_mm, nearness, _optics(packed))
+        found: tuple[Rings | None] | None = self._rings.get(key)
+        if found is None:
+            found = (_rings(self, packed, path, light.spectrum, lit, pixels_per_mm, nearness),)
+            self._rings.put(key, found, 1)
+        return found[0]
 
     def sample(self, x: Floats, y: Floats) -> tuple[Floats, Floats]:
         """Sample the opening at x, shape (Nx,), and y, shape (Ny, 1): amplitude and transmittance (`fresnel_grid`)."""
@@ -212,15 +196,34 @@ class Ringing:
         """The blades by one of their corners; None for an image."""
         return None if self.opening.mask is not None else blade_form(self.opening.blades)
 
-    def joined(self, values: tuple[Singles, ...]) -> tuple[Singles, list[int]]:
-        """Join patterns (`edge_rings.joined`); the tables of edges come again and again."""
-        key = tuple(id(one) for one in values)
-        found = self._joined.get(key)
+    def laid(self, pieces: Sequence[Piece]) -> tuple[Singles, Floats]:
+        """Return patterns and their table, as `kernels.ringing` takes them."""
+        patterns, starts = self._shelf.laid([piece.values for piece in pieces])
+        table = np.array([piece.row for piece in pieces])
+        table[:, FIRST] += starts
+        table[:, EDGE] += starts
+        return patterns, table
+
+    def textures(self, rings: Rings, drawn_nm: Floats, windows: tuple[Box | None, ...]) -> Textures:
+        """Return what takes the iris' place in a ghost at some wavelengths, of a part of each of its crossings."""
+        key = (rings, drawn_nm.tobytes(), windows)
+        found = self._textures.get(key)
         if found is None:
-            # what is kept keeps its parts, so that their numbers stay theirs
-            found = (joined(values), values)
-            self._joined.put(key, found, found[0][0].nbytes)
-        kept: tuple[Singles, list[int]] = found[0]
+            found = _textures(rings, drawn_nm, windows)
+            self._textures.put(key, found, 1)
+        kept: Textures = found
+        return kept
+
+    def averaged(self, rings: Rings, crossing: int, window: Box | None, band: tuple[Floats, Floats]) -> Piece:
+        """Return a crossing's pattern, or a part of it, averaged over a band: wavelengths in nm and their shares."""
+        key = (rings, crossing, window, *(column.tobytes() for column in band))
+        found = self._averages.get(key)
+        if found is None:
+            item = rings.crossings[crossing]
+            assert isinstance(item, _Crossing)
+            found = picture_piece(*rings.average(item, window, *band))
+            self._averages.put(key, found, found.values.nbytes)
+        kept: Piece = found
         return kept
 
     def sharp(self, step: float) -> Piece:
@@ -326,14 +329,16 @@ class _Crossing:
         return found[0], found[1]
 
 
-@dataclass(frozen=True)
+# each is made once for its key, and is a key itself
+@dataclass(frozen=True, eq=False)
 class Rings:
     """What takes the iris' place in one path.
 
     Attributes
     ----------
     ringing : Ringing
-    light : Light
+    spectrum : Spectrum
+        The light's.
     wavelengths_nm : ndarray, shape (W,)
         As traced.
     crossings : tuple of EdgeCrossing, _Crossing or Piece
@@ -345,7 +350,7 @@ class Rings:
     """
 
     ringing: Ringing
-    light: Light
+    spectrum: Spectrum
     wavelengths_nm: Floats
     crossings: tuple[EdgeCrossing | _Crossing | Piece, ...]
     fringe_px: float
@@ -369,7 +374,7 @@ class Rings:
     @property
     def white(self) -> bool:
         """Whether few fringes are left, so that a pattern knows only of what is near it."""
-        return not isinstance(self.light.spectrum, Lines)
+        return not isinstance(self.spectrum, Lines)
 
     @property
     def local(self) -> bool:
@@ -378,13 +383,11 @@ class Rings:
 
     def textures(self, drawn_nm: Floats, seen: Sequence[Box | None]) -> Textures:
         """Prepare for drawing at some wavelengths; of each crossing the part that is seen, where known and `local`."""
-        bands = band_contents(self.light.spectrum, drawn_nm)
-        edges = [item.pieces(bands) if isinstance(item, EdgeCrossing) else [] for item in self.crossings]
         windows = [
             item.window(box) if isinstance(item, _Crossing) else None
             for item, box in zip(self.crossings, seen, strict=True)
         ]
-        return Textures(self, bands, tuple(tuple(pieces) for pieces in edges), tuple(windows))
+        return self.ringing.textures(self, drawn_nm, tuple(windows))
 
     def average(self, item: _Crossing, window: Box | None, waves: Floats, shares: Floats) -> Pattern:
         """Average a crossing's pattern over the light of a band."""
@@ -446,18 +449,20 @@ class Textures:
     def _texture(self, k: int) -> tuple[Singles, Floats, float]:
         """Return the k-th patterns and their table, as `kernels.ringing` takes them, and a gain."""
         pieces: list[Piece] = []
-        for item, edges, window in zip(self.rings.crossings, self.edges, self.windows, strict=True):
+        for c, (item, edges) in enumerate(zip(self.rings.crossings, self.edges, strict=True)):
             if isinstance(item, EdgeCrossing):
                 pieces.append(edges[k])
             elif isinstance(item, _Crossing):
-                pieces.append(picture_piece(*self.rings.average(item, window, *self.bands[k])))
+                pieces.append(self.rings.ringing.averaged(self.rings, c, self.windows[c], self.bands[k]))
             else:
                 pieces.append(item)
-        patterns, starts = self.rings.ringing.joined(tuple(piece.values for piece in pieces))
-        table = np.stack([piece.row for piece in pieces])
-        table[:, FIRST] += starts
-        table[:, EDGE] += starts
-        return patterns, table, math.prod(piece.gain for piece in pieces)
+        return (*self.rings.ringing.laid(pieces), math.prod(piece.gain for piece in pieces))
+
+
+def _textures(rings: Rings, drawn_nm: Floats, windows: tuple[Box | None, ...]) -> Textures:
+    bands = band_contents(rings.spectrum, drawn_nm)
+    edges = [item.pieces(bands) if isinstance(item, EdgeCrossing) else [] for item in rings.crossings]
+    return Textures(rings, bands, tuple(tuple(pieces) for pieces in edges), windows)
 
 
 def _narrow(areas: Floats, shares: Floats) -> list[NDArray[np.intp]]:
@@ -473,15 +478,14 @@ def _rings(
     ringing: Ringing,
     packed: PackedLens,
     path: LightPath,
-    light: Light,
-    bundle: Bundle,
+    spectrum: Spectrum,
+    lit: Sequence[bool],
     pixels_per_mm: tuple[float, float],
     nearness: float,
 ) -> Rings | None:
     ways = stop_to_sensor(packed, path, nearness)
-    lit = _lit(list(bundle.traced.values()), path.stop_crossings, ringing.opening)
     found: list[EdgeCrossing | _Crossing | None] = [
-        _crossing(ringing, packed.wavelengths_nm, way, light, pixels_per_mm) if shines else None
+        _crossing(ringing, packed.wavelengths_nm, way, spectrum, pixels_per_mm) if shines else None
         for way, shines in zip(ways, lit, strict=True)
     ]
     if all(item is None for item in found):
@@ -497,7 +501,14 @@ def _rings(
     widest = max(
         m * math.sqrt(0.5 * float(np.abs(item.area).max())) for item, m in zip(found, magnified, strict=True) if item
     )
-    return Rings(ringing, light, packed.wavelengths_nm, tuple(crossings), min(fringes), widest)
+    return Rings(ringing, spectrum, packed.wavelengths_nm, tuple(crossings), min(fringes), widest)
+
+
+def _optics(packed: PackedLens) -> tuple[object, ...]:
+    """Return all of a lens that `stop_to_sensor` reads, as a key."""
+    across = None if packed.curvature_x is None else packed.curvature_x.tobytes()
+    arrays = packed.curvature, packed.z_vertex, packed.n_gap, packed.wavelengths_nm
+    return (across, packed.sensor_z, *(array.tobytes() for array in arrays))
 
 
 def _lit(traced: Sequence[Floats], crossings: int, opening: Opening) -> list[bool]:
@@ -515,7 +526,7 @@ def _edges(opening: Opening) -> tuple[float, float]:
 
 
 def _crossing(
-    ringing: Ringing, wavelengths_nm: Floats, way: StopToSensor, light: Light, pixels_per_mm: tuple[float, float]
+    ringing: Ringing, wavelengths_nm: Floats, way: StopToSensor, spectrum: Spectrum, pixels_per_mm: tuple[float, float]
 ) -> EdgeCrossing | _Crossing | None:
     """Describe a crossing's pattern; None when there is nothing to see of it."""
     middle = len(wavelengths_nm) // 2
@@ -531,16 +542,12 @@ def _crossing(
     crosses = bool((np.sign(area) != np.sign(area[0])).any())
     if crosses or not (fringe.min(axis=0) * magnified).max() >= LEAST_FRINGE_PX:
         return None
-    if (
-        ringing.form is not None
-        and not isinstance(light.spectrum, Lines)
-        and np.allclose(area[:, 0], area[:, 1], rtol=1e-6)
-    ):
+    if ringing.form is not None and not isinstance(spectrum, Lines) and np.allclose(area[:, 0], area[:, 1], rtol=1e-6):
         at_edges = edge_crossing(ringing.form, wavelengths_nm, area[:, 0], 1.0 / float(magnified.max()))
         if at_edges is not None:
             return at_edges
     # the rings of a line are not averaged, so finer ones are seen: twice the samples
-    finer = 2.0 if isinstance(light.spectrum, Lines) else 0.0
+    finer = 2.0 if isinstance(spectrum, Lines) else 0.0
     # half octaves, so that ghosts alike share their patterns; light beyond the traced wavelengths belongs to the ends
     low = [math.floor(2.0 * math.log2(0.92 * side)) / 2.0 for side in np.abs(area).min(axis=0)]
     most = [math.log2(1.12 * side) for side in np.abs(area).max(axis=0)]

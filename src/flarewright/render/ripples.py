@@ -24,8 +24,8 @@ Floats = NDArray[np.float64]
 LEAST_RIPPLE = 0.01
 """A ripple less high than this part of the light that it lies in is not seen: Weber's fraction at its best."""
 
-SCREEN_RIPPLE = 0.03
-"""And of the light on a screen: a step or two of its 255 codes, where rings are a line of a pixel or two."""
+SCREEN_RIPPLE = 0.06
+"""And of the light on a screen: a few steps of its 255 codes, where rings are a line of a pixel or two."""
 
 # directions in which the width of a light's spread is measured, over half a turn
 _DIRECTIONS = 16
