@@ -18,10 +18,11 @@ from ..model.layer import Layer
 from ..render.compose import beauty
 from .carried import carried
 from .glow import halo_at, offsets, star_at
+from .held import held
 from .numbers import bezier_numbers, field, frame, visible
 from .packed import Packed, pack, posed_numbers
 from .specks_drawn import draw_specks
-from .sprites import draw_sprites, sprite_at
+from .sprites import between, draw_sprites, sprite_at
 
 Floats = NDArray[np.float64]
 
@@ -92,26 +93,60 @@ def replay(
         )
     size = size_px or model.size_px
     about: dict[str, str | float] = {"constellation_deg": constellation_deg, "roll_deg": roll_deg}
-    packed = pack(model)
-    pixels = draw_packed(packed, model, constellation_deg, roll_deg, size) * gain
-    layers = [Layer("ghosts", pixels.astype(np.float32), (0, 0, *size), about)]
+    parts = _held(pack(model), model, constellation_deg, roll_deg, size)
+    layers = [
+        Layer(name, (gain * light).astype(np.float32), (0, 0, *size), about if name == "ghosts" else {})
+        for name, light in parts.items()
+    ]
+    whole = beauty(layers, size)
+    singles = _single(model, constellation_deg, roll_deg, size, gain) if single else []
+    drawn = (whole, *layers, *singles)
+    return drawn if colors == "camera" else tuple(_in_rec709(layer, model) for layer in drawn)
+
+
+def _held(
+    packed: Packed, model: GhostModel, constellation_deg: float, roll_deg: float, size: tuple[int, int]
+) -> dict[str, Floats]:
+    """Draw the parts of a flare; between two photographs no place is darker or brighter than these tell."""
+    parts = _parts(packed, model, constellation_deg, roll_deg, size)
+    sprite = next((one for one in model.sprites if one.reaches is not None), None)
+    if sprite is None:
+        return parts
+    angles = np.array(sprite.constellation_deg)
+    # where the light changes sides ghosts turn about the axis
+    crossed = angles.min() < 0.0 < angles.max() and abs(constellation_deg) < np.diff(angles).max()
+    if not angles[0] < constellation_deg < angles[-1] or constellation_deg in angles or crossed:
+        return parts
+    k = int(between(angles, constellation_deg)[0])
+    before, after = (_sum(_parts(packed, model, float(angle), roll_deg, size)) for angle in angles[k : k + 2])
+    whole = _sum(parts)
+    placed = _frame(model, constellation_deg, roll_deg, size)
+    parts["residual"] = parts["residual"] + held(whole, before, after, sprite, k, placed) - whole
+    return parts
+
+
+def _sum(parts: dict[str, Floats]) -> Floats:
+    return np.asarray(np.sum(list(parts.values()), axis=0))
+
+
+def _parts(
+    packed: Packed, model: GhostModel, constellation_deg: float, roll_deg: float, size: tuple[int, int]
+) -> dict[str, Floats]:
+    """Draw ghosts, star, halo and sprites as far as a model has them, by their layers' names."""
+    parts: dict[str, Floats] = {"ghosts": draw_packed(packed, model, constellation_deg, roll_deg, size)}
     scale, top = _fit(model, size)
     at = light_px(model, constellation_deg, roll_deg)
-    x, y = offsets((at[0] * scale, at[1] * scale + top), size, scale)
+    place = at[0] * scale, at[1] * scale + top
+    x, y = offsets(place, size, scale)
     if model.star is not None:
-        light = gain * star_at(model.star, constellation_deg, x, y)
-        layers.append(Layer("starburst", light.astype(np.float32), (0, 0, *size)))
+        parts["starburst"] = np.asarray(star_at(model.star, constellation_deg, x, y))
     if model.halo is not None:
-        light = gain * halo_at(model.halo, constellation_deg, x, y)
-        layers.append(Layer("halo", light.astype(np.float32), (0, 0, *size)))
+        parts["halo"] = np.asarray(halo_at(model.halo, constellation_deg, x, y))
     if model.sprites:
         specks = [one for one in model.sprites if one.follows == "speck"]
         standing = [one for one in model.sprites if one.follows != "speck"]
-        axis = model.axis_px[0] * scale, model.axis_px[1] * scale + top
-        side = np.sign(constellation_deg) or 1.0
-        turn = np.radians(roll_deg)
-        toward = float(side * np.cos(turn)), float(side * np.sin(turn))
-        place = at[0] * scale, at[1] * scale + top
+        placed = _frame(model, constellation_deg, roll_deg, size)
+        axis, toward = (float(placed[0]), float(placed[1])), (float(placed[2]), float(placed[3]))
         pictures = [
             carried(one, packed, model, constellation_deg)
             if one.follows == "ghosts"
@@ -119,13 +154,8 @@ def replay(
             for one in standing
         ]
         rest = draw_sprites(standing, pictures, place, axis, toward, size, scale)
-        placed = _frame(model, constellation_deg, roll_deg, size)
-        rest = gain * (rest + draw_specks(specks, packed, model, constellation_deg, placed, size))
-        layers.append(Layer("residual", np.asarray(rest, dtype=np.float32), (0, 0, *size)))
-    whole = beauty(layers, size)
-    singles = _single(model, constellation_deg, roll_deg, size, gain) if single else []
-    drawn = (whole, *layers, *singles)
-    return drawn if colors == "camera" else tuple(_in_rec709(layer, model) for layer in drawn)
+        parts["residual"] = rest.astype(float) + draw_specks(specks, packed, model, constellation_deg, placed, size)
+    return parts
 
 
 def _in_rec709(layer: Layer, model: GhostModel) -> Layer:

@@ -25,6 +25,8 @@ _COARSE, _AROUND = 44, 24
 _CELL_PX, _MOST_CELLS, _LEAST_CELLS = 3.0, 240, 90
 # cells that reading between cells looks beyond the last one that was seen; they are as that one
 _NEXT = 3
+# what is left is 0 on average: what the next cell tells of one that no view shows, and that one of the one beyond it
+_KEPT = 0.85
 # views for each picture that goes with the light, and how many pictures there are at most: there, and about the axis
 VIEWS, _MOST_LIGHT, _MOST_AXIS = 5, 12, 60
 # how stiff cells are over the constellation against one view: second differences and first
@@ -93,9 +95,7 @@ def axis_sprite(views: Sequence[View], pixels: Sequence[Pixels]) -> Sprite:
     for group in groups:
         light, noise, total = np.zeros((3, rows, columns, 3))
         for k in group:
-            ax, ay, cosine, sine, _ = views[k].frame
-            x, y = ax + cosine * along + sine * down, ay - sine * along + cosine * down
-            mean, variance, weight = _cells(pixels[k], views[k], x, y, grain)
+            mean, variance, weight = _cells(pixels[k], views[k], *_placed(views[k], along, down), grain)
             light, noise, total = light + weight * mean, noise + weight**2 * variance, total + weight
         known = total > 0.0
         pictures.append(np.where(known, light / np.maximum(total, 1e-9), np.nan))
@@ -108,6 +108,27 @@ def axis_sprite(views: Sequence[View], pixels: Sequence[Pixels]) -> Sprite:
         constellation_deg=tuple(float(np.mean([views[k].constellation_deg for k in group])) for group in groups),
         rows=int(rows), columns=int(columns), unit=unit, cells=cells,
     )  # fmt: skip
+
+
+def told(sprite: Sprite, view: View) -> tuple[Floats, Floats]:
+    """Return the light that a view shows in the cells of a sprite about the axis, and its noise.
+
+    Returns
+    -------
+    light, noise : ndarray, shape (rows, columns, 3)
+        Means, and their standard deviations; not a number where nothing was measured.
+    """
+    along, down = _middles(*sprite.corner_px, sprite.grain_px, sprite.rows, sprite.columns)
+    known = np.where(np.isfinite(view.variance), view.pixels, np.float32(np.nan))
+    mean, variance, weight = _cells(known, view, *_placed(view, along, down), sprite.grain_px)
+    seen = weight > 0.0
+    return np.where(seen, mean, np.nan), np.where(seen, np.sqrt(variance), np.nan)
+
+
+def _placed(view: View, along: Floats, down: Floats) -> tuple[Floats, Floats]:
+    """Return columns and rows of places towards the light and at right angles to it, from the axis."""
+    ax, ay, cosine, sine, _ = view.frame
+    return ax + cosine * along + sine * down, ay - sine * along + cosine * down
 
 
 def drawn(sprites: Sequence[Sprite], view: View) -> Pixels:
@@ -319,11 +340,12 @@ def points(picture: Pixels, x: Floats, y: Floats) -> tuple[Floats, Floats]:
 
 
 def beside(pictures: Floats | Pixels, far: int | None = None) -> Pixels:
-    """Fill cells that are not known from known ones beside them, farther and farther; with 0 where there are none.
+    """Fill cells that are not known from known ones beside them, farther off ever less; with 0 where there are none.
 
-    With `far` only so many cells out; the rest stays not a number.
+    With `far` only so many cells out, and as they are; the rest stays not a number.
     """
     out = np.asarray(pictures, dtype=np.float32)
+    kept = np.float32(_KEPT if far is None else 1.0)
     while far is None or far > 0:
         gaps = np.isnan(out)
         if not gaps.any() or gaps.all(axis=(1, 2)).any():
@@ -333,7 +355,7 @@ def beside(pictures: Floats | Pixels, far: int | None = None) -> Pixels:
         around = np.stack([padded[:, :-2, 1:-1], padded[:, 2:, 1:-1], padded[:, 1:-1, :-2], padded[:, 1:-1, 2:]])
         count = np.isfinite(around).sum(axis=0)
         mean = np.nansum(around, axis=0) / np.maximum(count, 1)
-        out = np.where(gaps & (count > 0), mean, out)
+        out = np.where(gaps & (count > 0), kept * mean, out)
     return out
 
 

@@ -28,6 +28,7 @@ from .moves_fit import with_moves
 from .numbers import channel_numbers
 from .pointing import candidate, kept, tell_pointed
 from .pursuit import pursue
+from .reach import with_reaches
 from .replay import draw, light_px
 from .settle import Settling, settle, to_model
 from .speck_sprites import covered, hidden, speck_sprites, specks_of
@@ -291,7 +292,7 @@ def with_rest(model: GhostModel, views: Sequence[View]) -> GhostModel:
     if specks:
         left = [each - drawn(standing, view) for each, view in zip(left, placed, strict=True)]
     sprites = (*standing, *speck_sprites(specks, placed, left, masks_of(placed)))
-    return with_moves(model.replace(sprites=sprites))
+    return with_reaches(with_moves(model.replace(sprites=sprites)), placed)
 
 
 def around_light(view: View, pixels: Pixels) -> Pixels:

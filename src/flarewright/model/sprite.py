@@ -13,6 +13,7 @@ from pydantic import Field, model_validator
 from .base import Frozen
 from .bytes_text import read_bytes, told_bytes
 from .moves import Moves
+from .reaches import Reaches
 
 # bits of a number's fraction that are kept, of the ten of a 16-bit float
 _FRACTION = 4
@@ -47,6 +48,9 @@ class Sprite(Frozen):
         cell is as large as `grain_px`; elsewhere cells are larger or smaller as these are.
     moves : Moves or None
         "ghosts" only: how what is left moves between its pictures.
+    reaches : Reaches or None
+        "ghosts" only: how far all light goes between its pictures, what the ghosts, the star and the other sprites show
+        too. Between two pictures nothing is darker or brighter than what both show so near.
     rows, columns : int
         Cells of each picture.
     unit : float
@@ -65,6 +69,7 @@ class Sprite(Frozen):
     spread_px: tuple[Annotated[float, Field(gt=0.0)], Annotated[float, Field(gt=0.0)]] = (1.0, 1.0)
     constellation_deg: tuple[float, ...] = Field(min_length=1)
     moves: Moves | None = None
+    reaches: Reaches | None = None
     rows: int = Field(ge=1)
     columns: int = Field(ge=1)
     unit: float = Field(gt=0.0)
@@ -76,13 +81,14 @@ class Sprite(Frozen):
             raise ValueError("the constellations of a sprite must rise")
         if (self.follows == "speck") != (self.ghost is not None):
             raise ValueError('a sprite names a ghost if it follows "speck", and only then')
-        if self.moves is not None:
+        for what, told in (("moves", self.moves), ("reaches", self.reaches)):
+            if told is None:
+                continue
             if self.follows != "ghosts":
-                raise ValueError('only a sprite that follows "ghosts" has moves')
-            blocks = tuple(-(-cells // self.moves.block) for cells in (self.rows, self.columns))
-            shape = self.moves.intervals, self.moves.rows, self.moves.columns
-            if shape != (len(self.constellation_deg) - 1, *blocks):
-                raise ValueError("the moves of a sprite do not cover its pictures and cells")
+                raise ValueError(f'only a sprite that follows "ghosts" has {what}')
+            blocks = tuple(-(-cells // told.block) for cells in (self.rows, self.columns))
+            if (told.intervals, told.rows, told.columns) != (len(self.constellation_deg) - 1, *blocks):
+                raise ValueError(f"the {what} of a sprite do not cover its pictures and cells")
         read_bytes(self.cells, self._size, "the cells of a sprite")
         return self
 

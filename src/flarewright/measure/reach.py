@@ -1,0 +1,106 @@
+"""How far light goes from one photograph to the next.
+
+Between two photographs a replay can be wrong by much: what a ghost leaves is carried where it does not belong, and
+lies there as darkness, or a light that is cut off at a border in both is drawn beyond it. What is there in truth lies
+between what both photographs show nearby. How near is told by every photograph that has one on each side: so far as
+one has to look in these for light as bright, and for light as dark.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..model.ghost_model import GhostModel
+from ..model.reaches import ANYWHERE, packed_reaches
+from ..model.sprite import Sprite
+from .held import brightest, darkest
+from .moved import middles
+from .sprite_fit import told
+from .views import View
+
+Floats = NDArray[np.float64]
+Cells = NDArray[np.int64]
+
+# cells that are looked at to each side, one after the other; farther off anything may come from anywhere
+_LOOKED = (0, 1, 2, 3, 4, 6, 8, 11, 15)
+# by which light may be darker or brighter than what is told: times its noise, and part of it
+_NOISY, _PART = 3.0, 0.03
+# cells to each side of a block
+_BLOCK = 4
+# one photograph is compared with two others
+_FEWEST = 3
+
+
+def with_reaches(model: GhostModel, views: Sequence[View]) -> GhostModel:
+    """Return a model whose sprites that follow ghosts know how far light goes between their pictures.
+
+    Parameters
+    ----------
+    model : GhostModel
+    views : sequence of View
+        As photographed. Of several that made one picture, the nearest to its constellation tells.
+
+    Returns
+    -------
+    GhostModel
+        The same where no sprite has three pictures.
+    """
+    sprites = tuple(
+        _learned(one, views) if one.follows == "ghosts" and len(one.constellation_deg) >= _FEWEST else one
+        for one in model.sprites
+    )
+    out: GhostModel = model.replace(sprites=sprites)
+    return out
+
+
+def _learned(sprite: Sprite, views: Sequence[View]) -> Sprite:
+    nearest = [min(views, key=lambda view: abs(view.constellation_deg - at)) for at in sprite.constellation_deg]
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        seen = list(pool.map(lambda view: told(sprite, view), nearest))
+        inner = list(pool.map(lambda k: _gone(seen, k), range(1, len(seen) - 1)))
+    # the first and the last have none beside them on one side
+    gone = np.stack([inner[0], *inner, inner[-1]])
+    cells = _over_blocks(np.maximum(gone[:-1], gone[1:]))
+    out: Sprite = sprite.replace(reaches=packed_reaches(_BLOCK, cells))
+    return out
+
+
+def _over_blocks(cells: Cells) -> Cells:
+    """Return the largest of each block, shape (K, R, C, 2), of cells, shape (K, rows, columns, 2)."""
+    count = [middles(side, _BLOCK).size for side in cells.shape[1:3]]
+    more = [
+        (0, 0),
+        *((0, blocks * _BLOCK - side) for blocks, side in zip(count, cells.shape[1:3], strict=True)),
+        (0, 0),
+    ]
+    return np.asarray(np.pad(cells, more).reshape(-1, count[0], _BLOCK, count[1], _BLOCK, 2).max(axis=(2, 4)))
+
+
+def _gone(seen: Sequence[tuple[Floats, Floats]], k: int) -> Cells:
+    """Tell how far light has come that passes the cells of a photograph, dark and bright, shape (rows, columns, 2)."""
+    here, noise = seen[k]
+    off = _NOISY * noise + _PART * np.abs(here)
+    before, after = seen[k - 1][0], seen[k + 1][0]
+    # what neither shows may be anything
+    low, high = (np.nan_to_num(how(before, after), nan=far) for how, far in ((np.fmin, -np.inf), (np.fmax, np.inf)))
+    hidden = np.isnan(here)
+    dark, bright = np.full((2, *here.shape[:2]), ANYWHERE)
+    for far in reversed(_LOOKED):
+        dark[((here >= darkest(low, far) - off) | hidden).all(axis=2)] = far
+        bright[((here <= brightest(high, far) + off) | hidden).all(axis=2)] = far
+    return np.stack([_passed(dark), _passed(bright)], axis=2)
+
+
+def _passed(found: Cells) -> Cells:
+    """Return how far what passes a cell goes: halfway it has gone half of it, to any side."""
+    out = found.copy()
+    for far in (*_LOOKED[1:], ANYWHERE):
+        half = (min(far, _LOOKED[-1]) + 1) // 2
+        near = brightest((found == far).astype(float)[..., None], half)[..., 0] > 0.0
+        out[near] = np.maximum(out[near], far)
+    return out
