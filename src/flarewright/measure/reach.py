@@ -30,8 +30,10 @@ Cells = NDArray[np.int64]
 _LOOKED = (0, 1, 2, 3, 4, 6, 8, 11, 15)
 # by which light may be darker or brighter than what is told: times its noise, and part of it
 _NOISY, _PART = 3.0, 0.03
+# photographs to each side that tell where light as bright is ever seen, and which part of it is as bright
+_WINDOW, _AS_BRIGHT = 4, 0.3
 # cells to each side of a block
-_BLOCK = 4
+_BLOCK = 2
 # one photograph is compared with two others
 _FEWEST = 3
 
@@ -93,14 +95,38 @@ def _gone(seen: Sequence[tuple[Floats, Floats]], k: int) -> Cells:
     for far in reversed(_LOOKED):
         dark[((here >= darkest(low, far) - off) | hidden).all(axis=2)] = far
         bright[((here <= brightest(high, far) + off) | hidden).all(axis=2)] = far
-    return np.stack([_passed(dark), _passed(bright)], axis=2)
+    light = np.where(hidden, -np.inf, here).max(axis=2)
+    most = _on_its_way([light for light, _ in seen[max(k - _WINDOW, 0) : k + _WINDOW + 1]])
+    return np.stack([_passed(dark), _passed(bright, light, most)], axis=2)
 
 
-def _passed(found: Cells) -> Cells:
-    """Return how far what passes a cell goes: halfway it has gone half of it, to any side."""
+def _on_its_way(lights: Sequence[Floats]) -> Floats:
+    """Return how bright light may be that comes to each cell: as bright as on both its sides, shape (rows, columns).
+
+    Ghosts go along the light's line. Where none ever was, nor beyond, there is an edge that cuts them off.
+    """
+    # what is not seen may be as bright as you like
+    ever = np.max([np.where(np.isnan(light), np.inf, light).max(axis=2) for light in lights], axis=0)
+    far = _LOOKED[-1]
+    wide = np.pad(ever, [(0, 0), (far, far)], constant_values=np.inf)
+    # one after the other, each and those that follow it
+    onward = np.lib.stride_tricks.sliding_window_view(wide, far + 1, axis=1).max(axis=-1)
+    return np.asarray(np.minimum(onward[:, :-far], onward[:, far:]))
+
+
+def _passed(found: Cells, light: Floats | None = None, most: Floats | None = None) -> Cells:
+    """Return how far what passes a cell goes: halfway it has gone half of it, to any side.
+
+    Light goes only where there may be light that is `most` so bright.
+    """
     out = found.copy()
     for far in (*_LOOKED[1:], ANYWHERE):
         half = (min(far, _LOOKED[-1]) + 1) // 2
-        near = brightest((found == far).astype(float)[..., None], half)[..., 0] > 0.0
+        of = found == far
+        if light is None or most is None:
+            near = brightest(of.astype(float)[..., None], half)[..., 0] > 0.0
+        else:
+            passing = brightest(np.where(of, light, -np.inf)[..., None], half)[..., 0]
+            near = (passing > -np.inf) & (most >= _AS_BRIGHT * passing)
         out[near] = np.maximum(out[near], far)
     return out
