@@ -1,0 +1,208 @@
+"""Between two captures a replay shows nothing that both do not lead to; at captures nothing changes."""
+
+from base64 import b64encode
+from dataclasses import replace
+from zlib import compress
+
+import numpy as np
+import pytest
+from planted_run import LARGEST, SIZE, views
+from test_carried import BETWEEN, CAPTURED, TRUE, missed, mistaken, model_of, soft
+
+from flarewright.measure.found import Found
+from flarewright.measure.held import brightest, darkest, held
+from flarewright.measure.moves_fit import with_moves
+from flarewright.measure.numbers import frame
+from flarewright.measure.reach import with_reaches
+from flarewright.measure.replay import replay
+from flarewright.measure.settle import to_model
+from flarewright.measure.sprite_fit import axis_sprite
+from flarewright.model.ghost_model import GhostModel
+from flarewright.model.reaches import ANYWHERE, Reaches, packed_reaches
+from flarewright.model.sprite import Sprite, packed
+
+# columns from which on an edge behind the lens keeps all light off
+EDGE = 190
+
+
+def cut(seen, edge=EDGE):
+    """Return views of ghosts that an edge which does not move cuts off."""
+    column = np.arange(SIZE[0])[None, :, None]
+    return [view.showing(np.where(column < edge, view.pixels, 0.0).astype(np.float32)) for view in seen]
+
+
+@pytest.fixture(scope="module")
+def at_an_edge():
+    """Return a model of ghosts that knows nothing of the edge that cuts them, and the truth between captures."""
+    ghosts = (soft(150.0, 12.0, 1.0), soft(60.0, 18.0, 0.6))
+    seen = cut(views(ghosts, angles=CAPTURED, noise=0.001))
+    known = to_model([Found((one, one, one), 0, len(seen) - 1) for one in ghosts], seen)
+    axis = float(seen[0].frame[0]), float(seen[0].frame[1])
+    model = GhostModel(
+        size_px=SIZE, axis_px=axis, focal_px=1e4, largest_deg=LARGEST,
+        constellation_deg=(float(CAPTURED[0]), float(CAPTURED[-1])), ghosts=known,
+    )  # fmt: skip
+    left = [view.pixels - replay(model, view.constellation_deg)[0].pixels for view in seen]
+    model = with_moves(model.replace(sprites=(axis_sprite(seen, left),)))
+    return model, with_reaches(model, seen), cut(views(ghosts, angles=BETWEEN, noise=0.0))
+
+
+def test_light_that_an_edge_cuts_off_is_not_drawn_beyond_it(at_an_edge):
+    loose, tight, truth = at_an_edge
+    assert missed(tight, truth) < missed(loose, truth)
+    # cells of three pixels leave a little there at captures too
+    between, loosely, captured = (
+        np.mean([np.abs(replay(model, float(angle))[0].pixels[:, EDGE + 4 :]).sum() for angle in angles])
+        for model, angles in ((tight, BETWEEN), (loose, BETWEEN), (tight, CAPTURED))
+    )
+    assert between < 1.1 * captured
+    assert between < 0.8 * loosely
+    # and what it takes away or adds is told as what no ghost explains
+    there = {layer.name: layer.pixels for layer in replay(tight, 17.5)}
+    assert np.abs(there["beauty"] - there["ghosts"] - there["residual"]).max() < 1e-5
+    np.testing.assert_array_equal(there["ghosts"], replay(loose, 17.5)[1].pixels)
+
+
+def test_at_captures_nothing_changes(at_an_edge):
+    loose, tight, _ = at_an_edge
+    for angle in (CAPTURED[0], CAPTURED[9], CAPTURED[-1], CAPTURED[-1] + 0.5):
+        for one, other in zip(replay(loose, float(angle)), replay(tight, float(angle)), strict=True):
+            np.testing.assert_array_equal(one.pixels, other.pixels)
+    # nor is there a leap next to them
+    near, there = (replay(tight, float(angle))[0].pixels for angle in (CAPTURED[9] + 1e-6, CAPTURED[9]))
+    assert np.abs(near - there).max() < 1e-3 * np.abs(there).max()
+
+
+@pytest.mark.parametrize("shapes", [(), TRUE, tuple(mistaken(one) for one in TRUE)])
+def test_ghosts_that_move_are_left_to_move(shapes):
+    model, seen = model_of(shapes)
+    model = with_moves(model)
+    truth = views(TRUE, angles=BETWEEN, noise=0.0)
+    assert missed(with_reaches(model, seen), truth) < 1.01 * missed(model, truth)
+
+
+def test_a_roll_turns_what_is_told_about_the_edge(at_an_edge):
+    _, tight, _ = at_an_edge
+    upright, turned = (replay(tight, 17.5, roll_deg=roll)[0].pixels for roll in (0.0, 180.0))
+    # about the axis, which lies a little beside the middle
+    x, y = (2.0 * (at - 0.5 * side) for at, side in zip(tight.axis_px, SIZE, strict=True))
+    moved = np.roll(turned[::-1, ::-1], (round(y), round(x)), axis=(0, 1))
+    inner = np.s_[30:-30, 30:-30]
+    assert np.abs(moved - upright)[inner].mean() < 0.1 * upright[inner].mean()
+
+
+def bare(pictures, angles):
+    """Return a model of no ghosts whose sprite has these pictures, cells of 3 pixels, and views of them."""
+    _, rows, columns, _ = pictures.shape
+    unit, cells = packed(pictures.astype(np.float32), 1e-3)
+    size = 3 * columns, 3 * rows
+    sprite = Sprite(
+        follows="ghosts", grain_px=3.0, corner_px=(-0.5 * size[0], -0.5 * size[1]),
+        constellation_deg=tuple(map(float, angles)), rows=rows, columns=columns, unit=unit, cells=cells,
+    )  # fmt: skip
+    axis = 0.5 * size[0], 0.5 * size[1]
+    model = GhostModel(
+        size_px=size, axis_px=axis, focal_px=1e3, largest_deg=max(map(abs, angles)),
+        constellation_deg=(min(angles), max(angles)), ghosts=(), sprites=(sprite,),
+    )  # fmt: skip
+    blank = views((), angles=angles, noise=1e-3, size=size)
+    fine = pictures.repeat(3, axis=1).repeat(3, axis=2).astype(np.float32)
+    seen = [replace(view, pixels=fine[k], frame=frame(axis, 0.0, angles[k], 1.0)) for k, view in enumerate(blank)]
+    return model, seen
+
+
+def test_reach_is_how_far_light_goes_and_none_where_nothing_moves():
+    pictures = np.full((7, 24, 80, 3), 0.1)
+    for k in range(7):
+        pictures[k, 10:14, 8 + 6 * k : 12 + 6 * k] = 1.0
+    model, seen = bare(pictures, [float(k) for k in range(1, 8)])
+    reaches = with_reaches(model, seen).sprites[0].reaches
+    dark, bright = np.moveaxis(reaches.within(3), -1, 0)
+    # between the places of photographs 3 and 4, columns 26 to 29 and 32 to 35, blocks of two cells; of its 4 cells
+    # those in the middle have to look 4 cells far for it
+    assert (bright[5:7, 13:18] == 4).all()
+    assert not dark.any()
+    assert not bright[:, 28:].any()
+    assert not bright[:2].any()
+
+
+def test_light_that_vanishes_may_be_where_it_was_but_not_beyond_an_edge():
+    pictures = np.full((7, 24, 80, 3), 0.1)
+    for k in range(4):
+        pictures[k, 10:14, 8 + 6 * k : 12 + 6 * k] = 1.0
+    model, seen = bare(pictures, [float(k) for k in range(1, 8)])
+    bright = with_reaches(model, seen).sprites[0].reaches.within(3)[..., 1]
+    # its far end, column 29, is 6 cells from where it was before, and the next one shows nothing
+    assert (bright[5:7, 13:15] == 6).all()
+    # no photograph shows light there, nor farther on
+    assert not bright[:, 15:].any()
+    # what flashes up once may come from anywhere
+    pictures[:] = 0.1
+    pictures[3, 10:14, 26:30] = 1.0
+    model, seen = bare(pictures, [float(k) for k in range(1, 8)])
+    assert (with_reaches(model, seen).sprites[0].reaches.within(3)[5:7, 13:15, 1] == ANYWHERE).all()
+
+
+def test_nothing_is_held_where_the_light_changes_sides():
+    pictures = np.full((6, 24, 40, 3), 0.1)
+    pictures[::2] = 0.2
+    angles = [-2.5, -1.5, -0.5, 0.5, 1.5, 2.5]
+    model, seen = bare(pictures, angles)
+    tight = with_reaches(model, seen)
+    (sprite,) = tight.sprites
+    bright = np.full((5, *sprite.reaches.within(0).shape), 0)
+    tight = tight.replace(sprites=(sprite.replace(reaches=packed_reaches(sprite.reaches.block, bright)),))
+    np.testing.assert_array_equal(replay(tight, 0.2)[0].pixels, replay(model, 0.2)[0].pixels)
+
+
+def test_what_is_held_lies_between_what_both_photographs_show():
+    pictures = np.full((3, 4, 4, 3), 0.5)
+    model, _ = bare(pictures, [1.0, 2.0, 3.0])
+    block = np.zeros((2, 2, 2, 2), int)
+    block[:, 0, 0] = ANYWHERE
+    block[:, 1, 1, 1] = 2
+    sprite = model.sprites[0].replace(reaches=packed_reaches(2, block))
+    before, after = np.full((2, 12, 12, 3), 1.0)
+    before[0:3] = 0.2
+    before[:, 5] = 3.0
+    wild = np.full((12, 12, 3), 9.0)
+    wild[::2] = -9.0
+    out = held(wild, before, after, sprite, 0, frame((6.0, 6.0), 0.0, 1.0, 1.0))
+    # anything goes in the first block
+    np.testing.assert_array_equal(out[:6, :6], wild[:6, :6])
+    assert out[0, 8] == pytest.approx(0.2)
+    assert out[1, 8] == pytest.approx(1.0)
+    assert out[4, 8] == pytest.approx(1.0)
+    # two cells of three pixels, half of it: three pixels to each side
+    assert out[7, 8] == pytest.approx(3.0)
+    assert out[7, 9] == pytest.approx(1.0)
+    assert out[8, 8] == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("far", [0, 1, 2, 3, 7])
+def test_largest_and_smallest_of_squares(far):
+    pixels = np.random.default_rng(5).random((11, 14, 3))
+    wide = np.pad(pixels, [(far, far), (far, far), (0, 0)], mode="edge")
+    squares = np.lib.stride_tricks.sliding_window_view(wide, (2 * far + 1, 2 * far + 1), axis=(0, 1))
+    np.testing.assert_array_equal(brightest(pixels, far), squares.max(axis=(-2, -1)))
+    np.testing.assert_array_equal(darkest(pixels, far), squares.min(axis=(-2, -1)))
+
+
+def test_reaches_come_back_from_a_file_and_broken_ones_are_told(at_an_edge):
+    loose, tight, _ = at_an_edge
+    assert GhostModel.model_validate_json(tight.model_dump_json()) == tight
+    sprite = tight.sprites[0]
+    with pytest.raises(ValueError, match="not base64 of zlib"):
+        sprite.reaches.replace(numbers="?")
+    with pytest.raises(ValueError, match="reaches of a sprite hold 8 bytes instead of"):
+        sprite.reaches.replace(numbers=b64encode(compress(bytes(8))).decode())
+    with pytest.raises(ValueError, match="reaches of a sprite do not cover"):
+        sprite.replace(reaches=packed_reaches(4, np.zeros((1, 3, 3, 2), int)))
+    with pytest.raises(ValueError, match='only a sprite that follows "ghosts" has reaches'):
+        loose.sprites[0].replace(follows="axis", moves=None, reaches=sprite.reaches)
+    assert isinstance(sprite.reaches, Reaches)
+
+
+def test_two_pictures_tell_no_reaches():
+    model, seen = bare(np.full((2, 8, 8, 3), 0.1), [1.0, 2.0])
+    assert with_reaches(model, seen).sprites[0].reaches is None
