@@ -25,8 +25,6 @@ _COARSE, _AROUND = 44, 24
 _CELL_PX, _MOST_CELLS, _LEAST_CELLS = 3.0, 240, 90
 # cells that reading between cells looks beyond the last one that was seen; they are as that one
 _NEXT = 3
-# what is left is 0 on average: what the next cell tells of one that no view shows, and that one of the one beyond it
-_KEPT = 0.85
 # views for each picture that goes with the light, and how many pictures there are at most: there, and about the axis
 VIEWS, _MOST_LIGHT, _MOST_AXIS = 5, 12, 60
 # how stiff cells are over the constellation against one view: second differences and first
@@ -340,12 +338,11 @@ def points(picture: Pixels, x: Floats, y: Floats) -> tuple[Floats, Floats]:
 
 
 def beside(pictures: Floats | Pixels, far: int | None = None) -> Pixels:
-    """Fill cells that are not known from known ones beside them, farther off ever less; with 0 where there are none.
+    """Fill cells that are not known from known ones beside them, farther and farther; with 0 where there are none.
 
-    With `far` only so many cells out, and as they are; the rest stays not a number.
+    With `far` only so many cells out; the rest stays not a number.
     """
     out = np.asarray(pictures, dtype=np.float32)
-    kept = np.float32(_KEPT if far is None else 1.0)
     while far is None or far > 0:
         gaps = np.isnan(out)
         if not gaps.any() or gaps.all(axis=(1, 2)).any():
@@ -355,7 +352,7 @@ def beside(pictures: Floats | Pixels, far: int | None = None) -> Pixels:
         around = np.stack([padded[:, :-2, 1:-1], padded[:, 2:, 1:-1], padded[:, 1:-1, :-2], padded[:, 1:-1, 2:]])
         count = np.isfinite(around).sum(axis=0)
         mean = np.nansum(around, axis=0) / np.maximum(count, 1)
-        out = np.where(gaps & (count > 0), kept * mean, out)
+        out = np.where(gaps & (count > 0), mean, out)
     return out
 
 
