@@ -8,20 +8,23 @@ rendering), "neighborhood clamping"; there the nearest pixels are the neighbourh
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from math import ceil
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..model.reaches import ANYWHERE
 from ..model.sprite import Sprite
+from .sprites import Pixels
 
 Floats = NDArray[np.float64]
 
 
 def held(
-    pixels: Floats, before: Floats, after: Floats, sprite: Sprite, interval: int, frame: Floats
-) -> Floats:  # fmt: skip
+    pixels: Floats, before: Pixels | Floats, after: Pixels | Floats, sprite: Sprite, interval: int, frame: Floats
+) -> Floats:
     """Return a replay between two photographs, held to what these show.
 
     Parameters
@@ -43,7 +46,7 @@ def held(
     assert sprite.reaches is not None
     reaches = _over_pixels(sprite, interval, frame, pixels.shape[:2])
     low, high = np.minimum(before, after), np.maximum(before, after)
-    out = pixels.copy()
+    out: Floats = pixels.copy()
     side = sprite.grain_px * float(frame[4])
     grown = 0
     for cells in np.unique(reaches[reaches < ANYWHERE]):
@@ -73,21 +76,21 @@ def _over_pixels(sprite: Sprite, interval: int, frame: Floats, size: tuple[int, 
     return out
 
 
-def brightest(pixels: Floats, far: int) -> Floats:
+def brightest(pixels: Pixels | Floats, far: int) -> Floats:
     """Return the largest value of each colour within a square, so many pixels to each side; the border goes on."""
     return _swept(np.maximum, pixels, far)
 
 
-def darkest(pixels: Floats, far: int) -> Floats:
+def darkest(pixels: Pixels | Floats, far: int) -> Floats:
     """Return the smallest value, as `brightest` does the largest."""
     return _swept(np.minimum, pixels, far)
 
 
-def _swept(how: np.ufunc, pixels: Floats, far: int) -> Floats:
+def _swept(how: Callable[[Any, Any], Any], pixels: Pixels | Floats, far: int) -> Floats:
     """Compare all within a square, along one side after the other; twice as far at each step."""
     if far == 0:
-        return pixels
-    out, count = pixels, 2 * far + 1
+        return np.asarray(pixels)
+    out, count = np.asarray(pixels), 2 * far + 1
     for axis in (0, 1):
         out = np.pad(out, [(far, far) if m == axis else (0, 0) for m in range(out.ndim)], mode="edge").swapaxes(0, axis)
         width = 1

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import lru_cache
 from typing import Literal, cast
 
 import numpy as np
@@ -118,11 +119,22 @@ def _held(
     if not angles[0] < constellation_deg < angles[-1] or constellation_deg in angles or crossed:
         return parts
     k = int(between(angles, constellation_deg)[0])
-    before, after = (_sum(_parts(packed, model, float(angle), roll_deg, size)) for angle in angles[k : k + 2])
+    before, after = (_photographed(model, float(angle), roll_deg, size) for angle in angles[k : k + 2])
     whole = _sum(parts)
     placed = _frame(model, constellation_deg, roll_deg, size)
     parts["residual"] = parts["residual"] + held(whole, before, after, sprite, k, placed) - whole
     return parts
+
+
+# the replays of an interval share both, and those of the next one the second
+@lru_cache(maxsize=2)
+def _photographed(
+    model: GhostModel, constellation_deg: float, roll_deg: float, size: tuple[int, int]
+) -> NDArray[np.float32]:
+    """Draw all light at a constellation that was photographed, shape (H, W, 3); not to be changed."""
+    light = _sum(_parts(pack(model), model, constellation_deg, roll_deg, size)).astype(np.float32)
+    light.flags.writeable = False
+    return light
 
 
 def _sum(parts: dict[str, Floats]) -> Floats:
