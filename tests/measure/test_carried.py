@@ -46,6 +46,11 @@ def mistaken(one: Shape) -> Shape:
 def model_of(shapes: tuple[Shape, ...]) -> tuple[GhostModel, list]:
     """Return a model of some ghosts, and what the captures show beside it."""
     seen = views(TRUE, angles=CAPTURED, noise=0.001)
+    return model_beside(shapes, seen), seen
+
+
+def model_beside(shapes: tuple[Shape, ...], seen: list) -> GhostModel:
+    """Return a model of some ghosts and of what captures show beside them."""
     ghosts = to_model([Found((one, one, one), 0, len(seen) - 1) for one in shapes], seen)
     axis = float(seen[0].frame[0]), float(seen[0].frame[1])
     model = GhostModel(
@@ -53,7 +58,7 @@ def model_of(shapes: tuple[Shape, ...]) -> tuple[GhostModel, list]:
         constellation_deg=(float(CAPTURED[0]), float(CAPTURED[-1])), ghosts=ghosts,
     )  # fmt: skip
     left = [view.pixels - replay(model, view.constellation_deg)[0].pixels for view in seen]
-    return model.replace(sprites=(axis_sprite(seen, left),)), seen
+    return model.replace(sprites=(axis_sprite(seen, left),))
 
 
 def missed(model: GhostModel, truth: list) -> float:

@@ -6,17 +6,14 @@ from zlib import compress
 
 import numpy as np
 import pytest
-from planted_run import LARGEST, SIZE, views
-from test_carried import BETWEEN, CAPTURED, TRUE, missed, mistaken, model_of, soft
+from planted_run import SIZE, views
+from test_carried import BETWEEN, CAPTURED, TRUE, missed, mistaken, model_beside, model_of, soft
 
-from flarewright.measure.found import Found
 from flarewright.measure.held import brightest, darkest, held
 from flarewright.measure.moves_fit import with_moves
 from flarewright.measure.numbers import frame
 from flarewright.measure.reach import with_reaches
 from flarewright.measure.replay import replay
-from flarewright.measure.settle import to_model
-from flarewright.measure.sprite_fit import axis_sprite
 from flarewright.model.ghost_model import GhostModel
 from flarewright.model.reaches import ANYWHERE, Reaches, packed_reaches
 from flarewright.model.sprite import Sprite, packed
@@ -36,14 +33,7 @@ def at_an_edge():
     """Return a model of ghosts that knows nothing of the edge that cuts them, and the truth between captures."""
     ghosts = (soft(150.0, 12.0, 1.0), soft(60.0, 18.0, 0.6))
     seen = cut(views(ghosts, angles=CAPTURED, noise=0.001))
-    known = to_model([Found((one, one, one), 0, len(seen) - 1) for one in ghosts], seen)
-    axis = float(seen[0].frame[0]), float(seen[0].frame[1])
-    model = GhostModel(
-        size_px=SIZE, axis_px=axis, focal_px=1e4, largest_deg=LARGEST,
-        constellation_deg=(float(CAPTURED[0]), float(CAPTURED[-1])), ghosts=known,
-    )  # fmt: skip
-    left = [view.pixels - replay(model, view.constellation_deg)[0].pixels for view in seen]
-    model = with_moves(model.replace(sprites=(axis_sprite(seen, left),)))
+    model = with_moves(model_beside(ghosts, seen))
     return model, with_reaches(model, seen), cut(views(ghosts, angles=BETWEEN, noise=0.0))
 
 

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from functools import cached_property
-from math import prod
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, model_validator
+from pydantic import model_validator
 
-from .base import Frozen
-from .bytes_text import read_bytes, told_bytes
+from .blocks import Blocks
+from .bytes_text import told_bytes
 
 # of a move, cells; a signed byte then goes to 15.9 of them
 _STEP = 1.0 / 8.0
@@ -20,28 +19,20 @@ _WHOLE = 127.0
 _NUMBERS = 8
 
 
-class Moves(Frozen):
+class Moves(Blocks):
     """How what is left moves between the pictures of a sprite that follows ghosts, block by block.
 
     Attributes
     ----------
-    block : int
-        Cells to each side of a block.
-    intervals, rows, columns : int
-        Pictures of the sprite less one, and blocks that cover its cells.
+    block, intervals, rows, columns
+        As of `Blocks`.
     numbers : str
-        Base64 of zlib of signed bytes in the order interval, row, column, number: where what is in a block halfway
+        As of `Blocks`, signed: where what is in a block halfway
         between two pictures moves from the one to the other, across the light's direction (down when the light is
         right) and towards the light, eighths of a cell, and its weight: of blocks that come to one place, the one of
         the largest weight is seen. These three of what is left, and of it together with the ghosts; then the shares of
         127 that these two ways have. What lacks to 127 goes with the ghosts' boxes.
     """
-
-    block: int = Field(ge=1)
-    intervals: int = Field(ge=1)
-    rows: int = Field(ge=1)
-    columns: int = Field(ge=1)
-    numbers: str
 
     @model_validator(mode="after")
     def _fits(self) -> Moves:
@@ -52,8 +43,7 @@ class Moves(Frozen):
         return self
 
     def _read(self) -> NDArray[np.int8]:
-        shape = self.intervals, self.rows, self.columns, _NUMBERS
-        return np.frombuffer(read_bytes(self.numbers, prod(shape), "the moves of a sprite"), np.int8).reshape(shape)
+        return self.read(_NUMBERS, "the moves of a sprite").view(np.int8)
 
     @cached_property
     def _bytes(self) -> NDArray[np.int8]:
