@@ -120,7 +120,8 @@ def test_the_circle_of_a_wish_goes_with_the_light(tab):
     tab.page.mouse.move(x, y)
     tab.page.mouse.down()
     tab.page.mouse.move(x - 150, y + 90, steps=10)
-    tab.until("flarewright.view.mover.live && flarewright.view.shownGrade === 'final'")
+    # not the one of before: the hand's own pictures have come
+    tab.until("(v => v.mover.live && v.mover.lights && !v.mover.busy() && v.shownGrade === 'final')(flarewright.view)")
     during = tab.js(where)
     tab.page.mouse.up()
     tab.rest()
