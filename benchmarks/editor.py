@@ -116,13 +116,10 @@ def measure(chrome, lens):
             [pid for pid in family(os.getpid()) if pid not in (os.getpid(), server)] if Path("/proc").exists() else []
         )
         before = None
-
-        def told():
-            return (tab.js("flarewright.view.stats.shown.length"), processor_s([server]), processor_s(others))
-
         for now in circles(page, x, y, SECONDS):
             if now > SETTLE_S and before is None:
-                before = (now, *told())
+                shown = tab.js("flarewright.view.stats.shown.length")
+                before = now, shown, processor_s([server]), processor_s(others)
         stats = tab.js("JSON.parse(JSON.stringify(flarewright.view.stats))")
         begun_at, shown, server_s, browser_s = before
         spent = SECONDS - begun_at

@@ -1,25 +1,53 @@
 """What pictures keep for the next one."""
 
+from concurrent.futures import ThreadPoolExecutor
+from threading import Barrier
+
 import numpy as np
 
 from flarewright.render.kept import Kept, Shelf
 
 
 def test_what_was_asked_for_longest_ago_is_let_go_of():
-    kept = Kept(10)
-    for name, size in (("a", 4), ("b", 4)):
-        kept.put(name, name.upper(), size)
-    assert kept.get("a") == "A"
-    kept.put("c", "C", 4)
-    assert kept.get("b") is None
-    assert (kept.get("a"), kept.get("c")) == ("A", "C")
-    # a key stands for one thing
-    kept.put("a", "other", 1)
-    assert kept.get("a") == "A"
+    kept, asked = Kept(10), []
+
+    def made(name, size):
+        def make():
+            asked.append(name)
+            return name.upper()
+
+        return kept.made(name, make, lambda _: size)
+
+    assert (made("a", 4), made("b", 4), made("a", 4)) == ("A", "B", "A")
+    assert asked == ["a", "b"]
+    made("c", 4)
+    # b was asked for longest ago; a and c are still there
+    assert (made("a", 4), made("c", 4)) == ("A", "C")
+    assert asked == ["a", "b", "c"]
+    # a key stands for one thing, nothing among them
+    assert kept.made("a", lambda: "other") == "A"
+    assert made("b", 4) == "B"
+    assert asked == ["a", "b", "c", "b"]
+    none = Kept(10)
+    assert none.made("n", lambda: None) is None
+    assert none.made("n", lambda: "other") is None
     # what is larger than all that may be held is held alone
-    kept.put("d", "D", 20)
-    assert kept.get("d") == "D"
-    assert kept.get("a") is None
+    assert made("d", 20) == "D"
+    assert made("d", 20) == "D"
+    made("a", 4)
+    assert asked[4:] == ["d", "a"]
+
+
+def test_threads_that_ask_at_once_get_the_same():
+    kept, both = Kept(10), Barrier(2)
+
+    def make():
+        both.wait(10.0)
+        return object()
+
+    with ThreadPoolExecutor(2) as pool:
+        one, other = pool.map(lambda _: kept.made("a", make), range(2))
+    assert one is other
 
 
 def numbers(*sizes):

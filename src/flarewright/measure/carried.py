@@ -18,7 +18,7 @@ from ..model.sprite import Sprite
 from .moved import mixed
 from .numbers import field, visible
 from .packed import Packed, one_colour, posed_numbers
-from .sprites import Pixels, between, cells_frame, samples, sprite_at
+from .sprites import Pixels, cells_frame, interval, samples, sprite_at
 
 Floats = NDArray[np.float64]
 
@@ -61,13 +61,11 @@ def carried(sprite: Sprite, packed: Packed, model: GhostModel, constellation_deg
     is, from the picture before and from the one after; where one of them did not show it, the other tells alone. A
     sprite that has moves goes with them where they foretold photographs better (`moved.mixed`).
     """
-    angles = np.array(sprite.constellation_deg)
-    inside = angles[0] < constellation_deg < angles[-1] and constellation_deg not in angles
+    k = interval(sprite, constellation_deg)
     stands = sprite.moves is None and not packed[0]
     # of a single row or column nothing tells how steep a ghost is
-    if not inside or stands or min(sprite.rows, sprite.columns) < 2:
+    if k is None or stands or min(sprite.rows, sprite.columns) < 2:
         return sprite_at(sprite, constellation_deg)
-    k = int(between(angles, constellation_deg)[0])
     with_boxes = boxed(sprite, packed, model, (k, k + 1), constellation_deg)
     if sprite.moves is None:
         return np.asarray(with_boxes, dtype=np.float32)

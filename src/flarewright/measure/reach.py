@@ -64,7 +64,9 @@ def _learned(sprite: Sprite, views: Sequence[View]) -> Sprite:
     nearest = [min(views, key=lambda view: abs(view.constellation_deg - at)) for at in sprite.constellation_deg]
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         seen = list(pool.map(lambda view: told(sprite, view), nearest))
-        inner = list(pool.map(lambda k: _gone(seen, k), range(1, len(seen) - 1)))
+        # what is not seen may be as bright as you like
+        brights = [np.where(np.isnan(light), np.inf, light).max(axis=2) for light, _ in seen]
+        inner = list(pool.map(lambda k: _gone(seen, brights, k), range(1, len(seen) - 1)))
     # the first and the last have none beside them on one side
     gone = np.stack([inner[0], *inner, inner[-1]])
     cells = _over_blocks(np.maximum(gone[:-1], gone[1:]))
@@ -74,16 +76,13 @@ def _learned(sprite: Sprite, views: Sequence[View]) -> Sprite:
 
 def _over_blocks(cells: Cells) -> Cells:
     """Return the largest of each block, shape (K, R, C, 2), of cells, shape (K, rows, columns, 2)."""
-    count = [middles(side, _BLOCK).size for side in cells.shape[1:3]]
-    more = [
-        (0, 0),
-        *((0, blocks * _BLOCK - side) for blocks, side in zip(count, cells.shape[1:3], strict=True)),
-        (0, 0),
-    ]
-    return np.asarray(np.pad(cells, more).reshape(-1, count[0], _BLOCK, count[1], _BLOCK, 2).max(axis=(2, 4)))
+    rows, columns = (middles(side, _BLOCK).size for side in cells.shape[1:3])
+    wide = np.zeros((len(cells), rows * _BLOCK, columns * _BLOCK, 2), np.int64)
+    wide[:, : cells.shape[1], : cells.shape[2]] = cells
+    return np.asarray(wide.reshape(-1, rows, _BLOCK, columns, _BLOCK, 2).max(axis=(2, 4)))
 
 
-def _gone(seen: Sequence[tuple[Floats, Floats]], k: int) -> Cells:
+def _gone(seen: Sequence[tuple[Floats, Floats]], brights: Sequence[Floats], k: int) -> Cells:
     """Tell how far light has come that passes the cells of a photograph, dark and bright, shape (rows, columns, 2)."""
     here, noise = seen[k]
     off = _NOISY * noise + _PART * np.abs(here)
@@ -96,18 +95,16 @@ def _gone(seen: Sequence[tuple[Floats, Floats]], k: int) -> Cells:
         dark[((here >= darkest(low, far) - off) | hidden).all(axis=2)] = far
         bright[((here <= brightest(high, far) + off) | hidden).all(axis=2)] = far
     light = np.where(hidden, -np.inf, here).max(axis=2)
-    most = _on_its_way([light for light, _ in seen[max(k - _WINDOW, 0) : k + _WINDOW + 1]])
+    most = _on_its_way(brights[max(k - _WINDOW, 0) : k + _WINDOW + 1])
     return np.stack([_passed(dark), _passed(bright, light, most)], axis=2)
 
 
-def _on_its_way(lights: Sequence[Floats]) -> Floats:
+def _on_its_way(brights: Sequence[Floats]) -> Floats:
     """Return how bright light may be that comes to each cell: as bright as on both its sides, shape (rows, columns).
 
     Ghosts go along the light's line. Where none ever was, nor beyond, there is an edge that cuts them off.
     """
-    # what is not seen may be as bright as you like
-    ever = np.max([np.where(np.isnan(light), np.inf, light).max(axis=2) for light in lights], axis=0)
-    far = _LOOKED[-1]
+    ever, far = np.max(brights, axis=0), _LOOKED[-1]
     wide = np.pad(ever, [(0, 0), (far, far)], constant_values=np.inf)
     # one after the other, each and those that follow it
     onward = np.lib.stride_tricks.sliding_window_view(wide, far + 1, axis=1).max(axis=-1)

@@ -23,7 +23,7 @@ from .held import held
 from .numbers import bezier_numbers, field, frame, visible
 from .packed import Packed, pack, posed_numbers
 from .specks_drawn import draw_specks
-from .sprites import between, draw_sprites, sprite_at
+from .sprites import draw_sprites, interval, sprite_at
 
 Floats = NDArray[np.float64]
 
@@ -113,13 +113,13 @@ def _held(
     sprite = next((one for one in model.sprites if one.reaches is not None), None)
     if sprite is None:
         return parts
-    angles = np.array(sprite.constellation_deg)
+    angles = sprite.constellation_deg
     # where the light changes sides ghosts turn about the axis
-    crossed = angles.min() < 0.0 < angles.max() and abs(constellation_deg) < np.diff(angles).max()
-    if not angles[0] < constellation_deg < angles[-1] or constellation_deg in angles or crossed:
+    crossed = angles[0] < 0.0 < angles[-1] and abs(constellation_deg) < np.diff(angles).max()
+    k = interval(sprite, constellation_deg)
+    if k is None or crossed:
         return parts
-    k = int(between(angles, constellation_deg)[0])
-    before, after = (_photographed(model, float(angle), roll_deg, size) for angle in angles[k : k + 2])
+    before, after = (_photographed(model, angle, roll_deg, size) for angle in angles[k : k + 2])
     whole = _sum(parts)
     placed = _frame(model, constellation_deg, roll_deg, size)
     parts["residual"] = parts["residual"] + held(whole, before, after, sprite, k, placed) - whole

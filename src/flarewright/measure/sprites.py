@@ -24,6 +24,14 @@ def between(
     return k, np.clip((constellation_deg - knots[k]) / (knots[k + 1] - knots[k]), 0.0, 1.0)
 
 
+def interval(sprite: Sprite, constellation_deg: float) -> int | None:
+    """Return the index of a sprite's picture before a constellation; None at a picture and where none is after it."""
+    angles = np.array(sprite.constellation_deg)
+    if not angles[0] < constellation_deg < angles[-1] or constellation_deg in angles:
+        return None
+    return int(between(angles, constellation_deg)[0])
+
+
 def cells_frame(sprite: Sprite) -> NDArray[np.float64]:
     """Return the axis, the light's direction and the scale of a sprite's cells, as `numbers.frame` does of pictures."""
     grain = sprite.grain_px

@@ -27,11 +27,11 @@ class Moves(Blocks):
     block, intervals, rows, columns
         As of `Blocks`.
     numbers : str
-        As of `Blocks`, signed: where what is in a block halfway
-        between two pictures moves from the one to the other, across the light's direction (down when the light is
-        right) and towards the light, eighths of a cell, and its weight: of blocks that come to one place, the one of
-        the largest weight is seen. These three of what is left, and of it together with the ghosts; then the shares of
-        127 that these two ways have. What lacks to 127 goes with the ghosts' boxes.
+        As of `Blocks`, signed: where what is in a block halfway between two pictures moves from the one to the other,
+        across the light's direction (down when the light is right) and towards the light, eighths of a cell, and its
+        weight: of blocks that come to one place, the one of the largest weight is seen. These three of what is left,
+        and of it together with the ghosts; then the shares of 127 that these two ways have. What lacks to 127 goes with
+        the ghosts' boxes.
     """
 
     @model_validator(mode="after")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import model_validator
@@ -27,15 +29,20 @@ class Reaches(Blocks):
 
     @model_validator(mode="after")
     def _fits(self) -> Reaches:
+        # not kept, for what is kept is compared where records are
         self._read()
         return self
 
     def _read(self) -> NDArray[np.uint8]:
         return self.read(2, "the reaches of a sprite")
 
+    @cached_property
+    def _bytes(self) -> NDArray[np.uint8]:
+        return self._read()
+
     def within(self, interval: int) -> NDArray[np.uint8]:
         """Return the reaches of an interval, shape (rows, columns, 2): cells, or `ANYWHERE`."""
-        return np.asarray(self._read()[interval])
+        return np.asarray(self._bytes[interval])
 
 
 def packed_reaches(block: int, cells: NDArray[np.int64]) -> Reaches:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import threading
 from collections import OrderedDict
-from collections.abc import Hashable, Sequence
-from typing import Any
+from collections.abc import Callable, Hashable, Sequence
+from typing import Any, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 Singles = NDArray[np.float32]
+T = TypeVar("T")
 
 
 class Kept:
@@ -21,7 +22,7 @@ class Kept:
     Parameters
     ----------
     most : int
-        Of the sizes of all that is held, in whatever unit `put` is told.
+        Of the sizes of all that is held, in whatever unit `made` is told.
     """
 
     def __init__(self, most: int) -> None:
@@ -29,24 +30,32 @@ class Kept:
         self._held: OrderedDict[Hashable, tuple[Any, int]] = OrderedDict()
         self._lock = threading.Lock()
 
-    def get(self, key: Hashable) -> Any:
-        """Return what is held, or None."""
-        with self._lock:
-            if key not in self._held:
-                return None
-            self._held.move_to_end(key)
-            return self._held[key][0]
+    def made(self, key: Hashable, make: Callable[[], T], size: Callable[[T], int] = lambda _: 1) -> T:
+        """Return what is held under a key, or make and hold it, and let go of what was asked for longest ago.
 
-    def put(self, key: Hashable, value: Any, size: int) -> None:
-        """Hold something, unless its key is held already, and let go of what was asked for longest ago."""
+        Parameters
+        ----------
+        key : hashable
+            Stands for one thing.
+        make : callable
+            Threads that ask at once may each make one; all get the first.
+        size : callable
+            Of what was made.
+        """
         with self._lock:
             if key in self._held:
-                return
-            self._held[key] = (value, size)
-            self._size += size
+                self._held.move_to_end(key)
+                return cast(T, self._held[key][0])
+        new = make()
+        with self._lock:
+            if key not in self._held:
+                self._held[key] = (new, size(new))
+                self._size += self._held[key][1]
+            found = cast(T, self._held[key][0])
             while self._size > self._most and len(self._held) > 1:
                 _, (_, freed) = self._held.popitem(last=False)
                 self._size -= freed
+        return found
 
 
 class Shelf:

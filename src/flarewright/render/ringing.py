@@ -141,11 +141,9 @@ class Ringing:
         lit = tuple(_lit(list(bundle.traced.values()), path.stop_crossings, self.opening))
         # where the light stands is not asked: of a lens that stays every picture finds them
         key = (path, lit, light.spectrum, pixels_per_mm, nearness, _optics(packed))
-        found: tuple[Rings | None] | None = self._rings.get(key)
-        if found is None:
-            found = (_rings(self, packed, path, light.spectrum, lit, pixels_per_mm, nearness),)
-            self._rings.put(key, found, 1)
-        return found[0]
+        return self._rings.made(
+            key, lambda: _rings(self, packed, path, light.spectrum, lit, pixels_per_mm, nearness)
+        )  # fmt: skip
 
     def sample(self, x: Floats, y: Floats) -> tuple[Floats, Floats]:
         """Sample the opening at x, shape (Nx,), and y, shape (Ny, 1): amplitude and transmittance (`fresnel_grid`)."""
@@ -158,16 +156,14 @@ class Ringing:
 
     def grid(self, octaves: Octaves, shown: float, window: Box | None) -> FresnelGrid:
         """Return the grid of areas from 2 ** low to 2 ** high mm^2, in x and in y; the rest as `fresnel_grid`."""
-        key = (octaves, shown, window)
-        found = self._grids.get(key)
-        if found is None:
+
+        def laid() -> FresnelGrid:
             least, most = (tuple(2.0 ** pair[end] for pair in octaves) for end in (0, 1))
-            found = fresnel_grid(
+            return fresnel_grid(
                 self.sample, self.opening.radius, self.radius, (least[0], least[1]), (most[0], most[1]), shown, window
             )
-            self._grids.put(key, found, found.spectrum.nbytes)
-        kept: FresnelGrid = found
-        return kept
+
+        return self._grids.made((octaves, shown, window), laid, lambda grid: grid.spectrum.nbytes)
 
     def pattern(self, item: _Crossing, window: Box | None, areas: Floats, shares: Floats | None) -> Pattern:
         """Return the opening's pattern, of a window of the stop or of all that is lit.
@@ -179,17 +175,16 @@ class Ringing:
         halvings = [int(np.clip(math.log2(side / grid.step), 0, 6)) for side in item.texel]
         times = (halvings[0], halvings[1])
         key = (item.octaves, item.shown, window, times, areas.tobytes(), None if shares is None else shares.tobytes())
-        found = self._patterns.get(key)
-        if found is None:
+
+        def drawn() -> Pattern:
             part = item.whole if window is None else window
             if shares is None:
                 whole = crop(grid, fresnel_intensity(grid, (float(areas[0, 0]), float(areas[0, 1]))), part)
             else:
                 whole = band_pattern(grid, areas, shares, part)
-            found = halved(*whole, times)
-            self._patterns.put(key, found, found[0].nbytes)
-        kept: Pattern = found
-        return kept
+            return halved(*whole, times)
+
+        return self._patterns.made(key, drawn, lambda pattern: pattern[0].nbytes)
 
     @cached_property
     def form(self) -> BladeForm | None:
@@ -207,24 +202,16 @@ class Ringing:
     def textures(self, rings: Rings, drawn_nm: Floats, windows: tuple[Box | None, ...]) -> Textures:
         """Return what takes the iris' place in a ghost at some wavelengths, of a part of each of its crossings."""
         key = (rings, drawn_nm.tobytes(), windows)
-        found = self._textures.get(key)
-        if found is None:
-            found = _textures(rings, drawn_nm, windows)
-            self._textures.put(key, found, 1)
-        kept: Textures = found
-        return kept
+        return self._textures.made(key, lambda: _textures(rings, drawn_nm, windows))
 
     def averaged(self, rings: Rings, crossing: int, window: Box | None, band: tuple[Floats, Floats]) -> Piece:
         """Return a crossing's pattern, or a part of it, averaged over a band: wavelengths in nm and their shares."""
         key = (rings, crossing, window, *(column.tobytes() for column in band))
-        found = self._averages.get(key)
-        if found is None:
-            item = rings.crossings[crossing]
-            assert isinstance(item, _Crossing)
-            found = picture_piece(*rings.average(item, window, *band))
-            self._averages.put(key, found, found.values.nbytes)
-        kept: Piece = found
-        return kept
+        item = rings.crossings[crossing]
+        assert isinstance(item, _Crossing)
+        return self._averages.made(
+            key, lambda: picture_piece(*rings.average(item, window, *band)), lambda piece: piece.values.nbytes
+        )
 
     def sharp(self, step: float) -> Piece:
         """Return the opening itself as a pattern, its border a few steps wide."""
