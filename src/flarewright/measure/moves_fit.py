@@ -151,15 +151,26 @@ def _about(missed: Floats, unit: float) -> Floats:
     The first and the last photograph are foretold by none.
     """
     rows, columns = (middles(count, _BLOCK) for count in missed.shape[1:])
-    about = _mean(missed)[:, rows[:, None], columns]
+    about = mean_about(missed, _ABOUT)[:, rows[:, None], columns]
     ends = np.concatenate([about[:1], about, about[-1:]])
     return np.asarray(0.5 * (ends[1:] + ends[:-1]) + (_FORETELL * unit) ** 2)
 
 
-def _mean(missed: Floats) -> Floats:
-    """Return means over squares of cells, shape (K - 2, rows, columns); beyond the border as at the border."""
-    side = 2 * _ABOUT + 1
-    sums = np.pad(missed, [(0, 0), (_ABOUT, _ABOUT), (_ABOUT, _ABOUT)], mode="edge")
+def mean_about(values: Floats, cells: int) -> Floats:
+    """Return means over squares of so many cells to each side, of values that are 0 or more.
+
+    Parameters
+    ----------
+    values : ndarray, shape (K, rows, columns)
+    cells : int
+
+    Returns
+    -------
+    ndarray, shape (K, rows, columns)
+        Beyond the border values are as at the border.
+    """
+    side = 2 * cells + 1
+    sums = np.pad(values, [(0, 0), (cells, cells), (cells, cells)], mode="edge")
     for axis in (1, 2):
         sums = np.pad(sums.cumsum(axis=axis), [(0, 0), *[(1, 0) if m == axis else (0, 0) for m in (1, 2)]])
         count = sums.shape[axis]

@@ -18,6 +18,7 @@ from ..model.ghost_model import AberrationGhost, BezierGhost, GhostModel
 from ..model.layer import Layer
 from ..render.compose import beauty
 from .carried import carried
+from .detail import detail_at
 from .glow import halo_at, offsets, star_at
 from .held import held
 from .numbers import bezier_numbers, field, frame, visible
@@ -165,6 +166,9 @@ def _parts(
             else sprite_at(one, constellation_deg)
             for one in standing
         ]
+        for one in standing:
+            if one.detail is not None:
+                standing, pictures = [*standing, one], [*pictures, detail_at(one, one.detail, constellation_deg)]
         rest = draw_sprites(standing, pictures, place, axis, toward, size, scale)
         parts["residual"] = rest.astype(float) + draw_specks(specks, packed, model, constellation_deg, placed, size)
     return parts

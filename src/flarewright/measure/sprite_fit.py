@@ -123,6 +123,30 @@ def told(sprite: Sprite, view: View) -> tuple[Floats, Floats]:
     return np.where(seen, mean, np.nan), np.where(seen, np.sqrt(variance), np.nan)
 
 
+def fine_cells(sprite: Sprite, view: View, pixels: Pixels, parts: int) -> tuple[Floats, Floats]:
+    """Return what lies in the parts of a sprite's cells, and its variance.
+
+    Parameters
+    ----------
+    sprite : Sprite
+        About the axis.
+    view : View
+    pixels : ndarray, shape (H, W, 3)
+        What is left of it; not a number where that is not known.
+    parts : int
+        Along each side of a cell.
+
+    Returns
+    -------
+    light, variance : ndarray, shape (parts rows, parts columns, 3)
+        Means; light that was not measured is not a number.
+    """
+    grain = sprite.grain_px / parts
+    along, down = _middles(*sprite.corner_px, grain, sprite.rows * parts, sprite.columns * parts)
+    mean, variance, weight = _cells(pixels, view, *_placed(view, along, down), grain)
+    return np.where(weight > 0.0, mean, np.nan), variance
+
+
 def _placed(view: View, along: Floats, down: Floats) -> tuple[Floats, Floats]:
     """Return columns and rows of places towards the light and at right angles to it, from the axis."""
     ax, ay, cosine, sine, _ = view.frame

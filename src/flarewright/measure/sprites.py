@@ -64,7 +64,7 @@ def draw_sprites(
     ----------
     sprites : sequence of Sprite
     pictures : sequence of ndarray, shape (rows, columns, 3)
-        Of each sprite, at one constellation.
+        Of each sprite, at one constellation; or of its cells divided, as many times along both sides.
     light_px, axis_px : tuple of float
         Pixels of the picture.
     direction : tuple of float
@@ -86,11 +86,12 @@ def draw_sprites(
         goes = sprite.follows == "light"
         cosine, sine = (float(np.cos(turn)), float(np.sin(turn))) if goes else direction
         x0, y0 = light_px if goes else axis_px
-        step = 1.0 / (scale * sprite.grain_px)
+        grain = sprite.grain_px * sprite.columns / cells.shape[1]
+        step = 1.0 / (scale * grain)
         # along = cos dx - sin dy and down = sin dx + cos dy, dx and dy counted right and down
         sides = np.array([1.0, 1.0 / sprite.stretch])
         matrix = step * sides[:, None] * np.array([[cosine, sine], [-sine, cosine]])
-        corner = np.array(sprite.corner_px[::-1]) * sides / sprite.grain_px
+        corner = np.array(sprite.corner_px[::-1]) * sides / grain
         begin = matrix @ np.array([0.5 - y0, 0.5 - x0]) - corner - 0.5
         top, left, rows, columns = _window(matrix, begin, cells.shape[:2], (height, width))
         if not (rows and columns):

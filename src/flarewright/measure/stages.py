@@ -17,6 +17,7 @@ from ..kernels.measure_pupil import FIRST_DISC, FIRST_I, SOFT
 from ..model.capture import MergedRun
 from ..model.corrections import Corrections
 from ..model.ghost_model import AberrationGhost, Blades, GhostModel, Halo, Reference, Star
+from .detail_fit import with_detail
 from .fit import Shape, light_of
 from .found import Found
 from .fragments import joined
@@ -26,12 +27,14 @@ from .joint import lit
 from .journal import Journal
 from .moves_fit import with_moves
 from .numbers import channel_numbers
+from .packed import pack
 from .pointing import candidate, kept, tell_pointed
 from .pursuit import pursue
 from .reach import with_reaches
 from .replay import draw, light_px
 from .settle import Settling, settle, to_model
 from .speck_sprites import covered, hidden, speck_sprites, specks_of
+from .specks_drawn import draw_specks
 from .spike_fit import spike_sprites
 from .sprite_fit import axis_sprite, drawn, light_sprites
 from .views import Pixels, View, halved, views_of
@@ -284,15 +287,18 @@ def with_rest(model: GhostModel, views: Sequence[View]) -> GhostModel:
     going = light_sprites(placed, [around_light(view, each) for view, each in zip(placed, seen, strict=True)])
     seen = [each - drawn(going, view) for each, view in zip(seen, placed, strict=True)]
     # next to the light a pixel's error is brighter than all that turns about the axis
-    apart = [
-        hidden(each, _off_light(view) < NEXT_TO_LIGHT * view.size_px[0])
-        for each, view in zip(seen, placed, strict=True)
-    ]
+    beside_light = [_off_light(view) < NEXT_TO_LIGHT * view.size_px[0] for view in placed]
+    apart = [hidden(each, mask) for each, mask in zip(seen, beside_light, strict=True)]
     standing = (*spikes, *going, axis_sprite(placed, apart))
-    if specks:
-        left = [each - drawn(standing, view) for each, view in zip(left, placed, strict=True)]
-    sprites = (*standing, *speck_sprites(specks, placed, left, masks_of(placed)))
-    return with_reaches(with_moves(model.replace(sprites=sprites)), placed)
+    left = [each - drawn(standing, view) for each, view in zip(left, placed, strict=True)]
+    small = speck_sprites(specks, placed, left, masks_of(placed))
+    moving = with_moves(model.replace(sprites=(*standing, *small)))
+    packed = pack(moving)
+    left = [
+        hidden(each - draw_specks(small, packed, moving, view.constellation_deg, view.frame, view.size_px), mask)
+        for each, view, mask in zip(left, placed, beside_light, strict=True)
+    ]
+    return with_reaches(with_detail(moving, placed, left), placed)
 
 
 def around_light(view: View, pixels: Pixels) -> Pixels:

@@ -12,6 +12,7 @@ from pydantic import Field, model_validator
 
 from .base import Frozen
 from .bytes_text import read_bytes, told_bytes
+from .detail import Detail
 from .moves import Moves
 from .reaches import Reaches
 
@@ -51,6 +52,8 @@ class Sprite(Frozen):
     reaches : Reaches or None
         "ghosts" only: how far all light goes between its pictures, what the ghosts, the star and the other sprites show
         too. Between two pictures nothing is darker or brighter than what both show so near.
+    detail : Detail or None
+        Only with `moves`: what is finer than cells.
     rows, columns : int
         Cells of each picture.
     unit : float
@@ -70,6 +73,7 @@ class Sprite(Frozen):
     constellation_deg: tuple[float, ...] = Field(min_length=1)
     moves: Moves | None = None
     reaches: Reaches | None = None
+    detail: Detail | None = None
     rows: int = Field(ge=1)
     columns: int = Field(ge=1)
     unit: float = Field(gt=0.0)
@@ -81,7 +85,7 @@ class Sprite(Frozen):
             raise ValueError("the constellations of a sprite must rise")
         if (self.follows == "speck") != (self.ghost is not None):
             raise ValueError('a sprite names a ghost if it follows "speck", and only then')
-        for what, told in (("moves", self.moves), ("reaches", self.reaches)):
+        for what, told in (("moves", self.moves), ("reaches", self.reaches), ("detail", self.detail)):
             if told is None:
                 continue
             if self.follows != "ghosts":
@@ -89,6 +93,10 @@ class Sprite(Frozen):
             blocks = tuple(-(-cells // told.block) for cells in (self.rows, self.columns))
             if (told.intervals, told.rows, told.columns) != (len(self.constellation_deg) - 1, *blocks):
                 raise ValueError(f"the {what} of a sprite do not cover its pictures and cells")
+        if self.detail is not None:
+            if self.moves is None or self.detail.block != self.moves.block:
+                raise ValueError("the detail of a sprite must come with moves of the same blocks")
+            self.detail.check(self.rows, self.columns)
         read_bytes(self.cells, self._size, "the cells of a sprite")
         return self
 
