@@ -28,6 +28,14 @@ _BESIDE = 2
 _FAR, _GROWN = 20000, 3.0
 
 
+# rows and columns of a sprite's cells
+_Window = tuple[slice, slice]
+# values of a window
+_Part = tuple[_Window, Floats]
+# light of a window, and 1 for rows and for columns of all cells that the photograph showed, 0 for others
+_Moved = tuple[_Window, Floats, tuple[Floats, Floats]]
+
+
 @dataclass(frozen=True)
 class _Box:
     """Where a ghost is: its middle towards the light and at right angles, and half its sizes, pixels from the axis."""
@@ -90,7 +98,7 @@ def boxed(sprite: Sprite, packed: Packed, model: GhostModel, ends: tuple[int, in
     part = (constellation_deg - angles[0]) / (angles[1] - angles[0])
     now = _boxes(packed, model, constellation_deg)
     out = np.zeros(sprite.pictures.shape[1:])
-    moved: dict[int, list[tuple[float, Floats, Floats]]] = {}
+    moved: dict[int, list[tuple[float, _Moved]]] = {}
     for n, then, weight in zip(ends, angles, (1.0 - part, part), strict=True):
         picture = sprite.pictures[n]
         before = _boxes(packed, model, then)
@@ -100,24 +108,26 @@ def boxed(sprite: Sprite, packed: Packed, model: GhostModel, ends: tuple[int, in
             if g in now and g in before and _alike(before[g], now[g])
         }
         whole: Floats = np.full(picture.shape[:2], sprite.unit**2)
-        for edge in steep.values():
-            whole = whole + edge**2
+        for window, edge in steep.values():
+            whole[window] += edge**2
         out += weight * (sprite.unit**2 / whole)[..., None] * picture
-        for g, edge in steep.items():
-            share = (edge**2 / whole)[..., None] * picture
-            light, shown = _moved(share, sprite, model, then, before[g], now[g])
-            moved.setdefault(g, []).append((weight, light, shown))
+        for g, (window, edge) in steep.items():
+            share = (edge**2 / whole[window])[..., None] * picture[window]
+            moved.setdefault(g, []).append((weight, _moved(share, window, sprite, model, then, before[g], now[g])))
     for pair in moved.values():
-        if len(pair) == 1:
-            # it is born or dies between the two, and comes or goes with its light
-            weight, light, _ = pair[0]
-            out += weight * light
-            continue
-        counts = [weight * shown for weight, _, shown in pair]
-        both = np.maximum(counts[0] + counts[1], 1e-9)
-        for count, (_, light, _) in zip(counts, pair, strict=True):
-            out += (count / both)[..., None] * light
+        for weight, (window, light, shown) in pair:
+            if len(pair) == 1:
+                # it is born or dies between the two, and comes or goes with its light
+                out[window] += weight * light
+                continue
+            both = sum(each * _shown(told, window) for each, (_, _, told) in pair)
+            out[window] += (weight * _shown(shown, window) / np.maximum(both, 1e-9))[..., None] * light
     return out
+
+
+def _shown(lines: tuple[Floats, Floats], window: _Window) -> Floats:
+    """Return 1 for cells of a window that a photograph showed, 0 for others."""
+    return np.outer(lines[0][window[0]], lines[1][window[1]])
 
 
 def _alike(one: _Box, other: _Box) -> bool:
@@ -144,18 +154,28 @@ def _boxes(packed: Packed, model: GhostModel, constellation_deg: float) -> dict[
     return found
 
 
-def _edges(sprite: Sprite, packed: Packed, model: GhostModel, constellation_deg: float) -> dict[int, Floats]:
+def _edges(sprite: Sprite, packed: Packed, model: GhostModel, constellation_deg: float) -> dict[int, _Part]:
     """Return how steep each ghost's green is around each cell of a sprite, radiance a cell; flat ones left out."""
     green, counts, sigma = _greens(packed, model, constellation_deg)
     there = visible(packed[0], constellation_deg)
-    frame, shape = cells_frame(sprite), (sprite.rows, sprite.columns)
+    frame = cells_frame(sprite)
     found = {}
     for g in np.flatnonzero(there):
+        lit = window_of(green[g], counts[g], sigma, frame, sprite.columns, sprite.rows)
+        if not (lit[2] and lit[3]):
+            continue
+        # as far beyond its light as its edge goes
+        rows, columns = (
+            slice(max(begin - _BESIDE - 2, 0), min(begin + size + _BESIDE + 2, most))
+            for begin, size, most in ((lit[1], lit[3], sprite.rows), (lit[0], lit[2], sprite.columns))
+        )
         one = slice(g, g + 1)
-        light = np.maximum(one_colour(green[one], counts[one], there[one], sigma, frame, shape), 0.0)
+        shifted = frame - np.array([columns.start, rows.start, 0.0, 0.0, 0.0])
+        shape = rows.stop - rows.start, columns.stop - columns.start
+        light = np.maximum(one_colour(green[one], counts[one], there[one], sigma, shifted, shape), 0.0)
         edge = _most_around(np.hypot(*np.gradient(light)))
         if edge.max() > sprite.unit:
-            found[int(g)] = edge
+            found[int(g)] = (rows, columns), edge
     return found
 
 
@@ -170,9 +190,9 @@ def _most_around(values: Floats) -> Floats:
 
 
 def _moved(
-    share: Floats, sprite: Sprite, model: GhostModel, then: float, before: _Box, now: _Box
-) -> tuple[Floats, Floats]:
-    """Move a picture as a box moves; return it, and 1 for cells that the photograph showed, 0 for others."""
+    share: Floats, window: _Window, sprite: Sprite, model: GhostModel, then: float, before: _Box, now: _Box
+) -> _Moved:
+    """Move what a window of a picture holds as a box moves."""
     grain = sprite.grain_px
     along = sprite.corner_px[0] + grain * (np.arange(sprite.columns) + 0.5)
     down = sprite.corner_px[1] + grain * (np.arange(sprite.rows) + 0.5)
@@ -180,14 +200,15 @@ def _moved(
     down = before.across + (down - now.across) * (before.width / now.width)
     side = -1.0 if then < 0.0 else 1.0
     x, y = model.axis_px[0] + side * along, model.axis_px[1] + side * down
-    shown = np.outer((y >= 0.0) & (y <= model.size_px[1]), (x >= 0.0) & (x <= model.size_px[0]))
-    column, row = (along - sprite.corner_px[0]) / grain - 0.5, (down - sprite.corner_px[1]) / grain - 0.5
-    rows, columns = np.flatnonzero(share.any(axis=(1, 2))), np.flatnonzero(share.any(axis=(0, 2)))
-    light = np.zeros(share.shape)
-    if rows.size and columns.size:
-        near_r = np.flatnonzero((row > rows[0] - 2.0) & (row < rows[-1] + 2.0))
-        near_c = np.flatnonzero((column > columns[0] - 2.0) & (column < columns[-1] + 2.0))
-        at_r, at_c = np.meshgrid(row[near_r], column[near_c], indexing="ij")
-        moved = samples(share.astype(np.float32), at_c.ravel(), at_r.ravel())
-        light[np.ix_(near_r, near_c)] = moved.reshape(*at_r.shape, 3)
-    return light, shown.astype(float)
+    shown = ((y >= 0.0) & (y <= model.size_px[1])).astype(float), ((x >= 0.0) & (x <= model.size_px[0])).astype(float)
+    column = (along - sprite.corner_px[0]) / grain - 0.5 - window[1].start
+    row = (down - sprite.corner_px[1]) / grain - 0.5 - window[0].start
+    near_r = np.flatnonzero((row > -2.0) & (row < share.shape[0] + 1.0))
+    near_c = np.flatnonzero((column > -2.0) & (column < share.shape[1] + 1.0))
+    if not (near_r.size and near_c.size):
+        return (slice(0, 0), slice(0, 0)), np.zeros((0, 0, 3)), shown
+    at_r, at_c = np.meshgrid(row[near_r], column[near_c], indexing="ij")
+    light = samples(share.astype(np.float32), at_c.ravel(), at_r.ravel()).reshape(*at_r.shape, 3)
+    # they follow each other, for a box keeps their order
+    to = slice(int(near_r[0]), int(near_r[-1]) + 1), slice(int(near_c[0]), int(near_c[-1]) + 1)
+    return to, light.astype(float), shown

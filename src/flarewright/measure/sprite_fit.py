@@ -162,9 +162,9 @@ def drawn(sprites: Sequence[Sprite], view: View) -> Pixels:
 
 
 def darkest_noise(views: Sequence[View]) -> float:
-    """Return the standard deviation of the darkest pixels."""
-    known = [view.variance[np.isfinite(view.variance)] for view in views]
-    return float(np.sqrt(min((np.percentile(each, 5) for each in known if each.size), default=0.0)))
+    """Return the standard deviation of the darkest pixels; 0 where nothing was measured."""
+    least = min((view.darkest_noise for view in views), default=0.0)
+    return least if np.isfinite(least) else 0.0
 
 
 def even_knots(views: Sequence[View], count: int) -> tuple[float, ...]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,6 +45,12 @@ class View:
     def size_px(self) -> tuple[int, int]:
         """Width and height."""
         return self.pixels.shape[1], self.pixels.shape[0]
+
+    @cached_property
+    def darkest_noise(self) -> float:
+        """Standard deviation of its darkest pixels; infinite where nothing was measured."""
+        known = self.variance[np.isfinite(self.variance)]
+        return float(np.sqrt(np.percentile(known, 5))) if known.size else np.inf
 
     def showing(self, pixels: Pixels) -> View:
         """Return the same view with other pixels."""

@@ -5,10 +5,13 @@ from __future__ import annotations
 import base64
 import zlib
 
+# the last level makes texts 2 % shorter, and takes three to nine times as long
+_LEVEL = 6
+
 
 def told_bytes(whole: bytes) -> str:
     """Return bytes as text."""
-    return base64.b64encode(zlib.compress(whole, 9)).decode("ascii")
+    return base64.b64encode(zlib.compress(whole, _LEVEL)).decode("ascii")
 
 
 def read_bytes(text: str, size: int, what: str) -> bytes:
