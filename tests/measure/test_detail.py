@@ -135,6 +135,13 @@ def test_a_roll_turns_detail_and_a_larger_picture_enlarges_it(grains):
     np.testing.assert_allclose(large[1::3, 1::3], upright, atol=1e-4)
 
 
+def test_a_picture_with_pixels_too_large_for_detail_has_none(grains):
+    coarse, fine, _ = grains
+    for size, seen in (((135, 60), False), ((216, 96), True)):
+        differ = replay(fine, 3.0, size_px=size)[0].pixels - replay(coarse, 3.0, size_px=size)[0].pixels
+        assert differ.any() == seen
+
+
 def test_detail_comes_back_from_a_file_to_its_step(grains):
     _, fine, _ = grains
     assert GhostModel.model_validate_json(fine.model_dump_json()) == fine

@@ -30,6 +30,8 @@ Floats = NDArray[np.float64]
 
 # farther beyond the measured range than this, degrees, nothing is replayed
 BEYOND_DEG = 1.0
+# most cells of detail to a pixel
+_CELLS = 1.5
 _NOTHING = np.empty((0, 0, 3, 19))
 
 
@@ -166,10 +168,10 @@ def _parts(
             else sprite_at(one, constellation_deg)
             for one in standing
         ]
-        for one in standing:
-            if one.detail is not None:
-                standing, pictures = [*standing, one], [*pictures, detail_at(one, one.detail, constellation_deg)]
-        rest = draw_sprites(standing, pictures, place, axis, toward, size, scale)
+        # what is narrower than a pixel is not seen, and would shimmer
+        fine = [one for one in standing if one.detail and one.detail.parts <= _CELLS * scale * one.grain_px]
+        pictures += [detail_at(one, one.detail, constellation_deg) for one in fine if one.detail]
+        rest = draw_sprites([*standing, *fine], pictures, place, axis, toward, size, scale)
         parts["residual"] = rest.astype(float) + draw_specks(specks, packed, model, constellation_deg, placed, size)
     return parts
 
