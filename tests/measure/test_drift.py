@@ -12,11 +12,15 @@ from flarewright.model.capture import MergedFrame
 ANGLES = tuple(0.5 * k for k in range(10))
 
 
-def merged(folder, gains):
+def merged(folder, gains, near=None):
+    """Merge photographs of a light with gains; with `near`, what is within 14 pixels of it has those too."""
     scenes = {
         angle: star(light_px(angle)) * np.float32(gain * (1.0 - 0.02 * angle))
         for angle, gain in zip(ANGLES, gains, strict=True)
     }
+    for (angle, scene), gain in zip(scenes.items(), () if near is None else near, strict=near is not None):
+        x, y = np.arange(96) + 0.5 - light_px(angle)[0], np.arange(64)[:, None] + 0.5 - light_px(angle)[1]
+        scene[np.hypot(x, y) < 14.0] *= np.float32(gain)
     captures = read_captures(shoot(folder, scenes))
     return merge_captures(captures, folder, folder / "run"), scenes
 
@@ -52,3 +56,20 @@ def test_a_steady_light_is_left_alone(tmp_path):
     run, _ = merged(tmp_path, np.ones(len(ANGLES)))
     assert {info.gain for info in run.frames} == {1.0}
     assert not any("drifted by" in remark for remark in run.remarks)
+
+
+def test_what_changes_near_the_light_alone_is_none_of_the_light(tmp_path):
+    ghost = 1.0 + 0.03 * np.random.default_rng(4).normal(size=len(ANGLES))
+    run, _ = merged(tmp_path, np.ones(len(ANGLES)), near=ghost)
+    assert {info.gain for info in run.frames} == {1.0}
+
+
+def test_a_drift_is_found_beside_what_else_changes_near_the_light(tmp_path):
+    rng = np.random.default_rng(4)
+    planted, ghost = 1.0 + 0.04 * rng.normal(size=(2, len(ANGLES)))
+    run, _ = merged(tmp_path, planted, near=ghost)
+    line = np.polynomial.polynomial.polyfit(ANGLES, np.log(planted), 1)
+    expected = planted / np.exp(np.polynomial.polynomial.polyval(ANGLES, line))
+    found = np.array([info.gain for info in run.frames])
+    assert found.std() > 0.02
+    assert np.abs(found - expected).mean() < 0.25 * np.abs(expected - 1.0).mean()

@@ -1,7 +1,10 @@
-"""How the light drifted from one constellation to the next, from the glow around its image.
+"""How the light drifted from one constellation to the next, from the glow around its image and from the whole picture.
 
 What lies right around the light's image is haze and the star's wings: in proportion to the light, and apart from it
-only slowly changing with the constellation. So what neighbouring frames do not foretell of it is the light's own doing.
+only slowly changing with the constellation. So what neighbouring frames do not foretell of it is the light's own doing,
+or that of a ghost that comes near the light. Half of all other pixels grow or fade by more than the light does, half by
+less, but for what many ghosts do together. What both tell alike is the light's, and as far as they differ neither is
+believed.
 """
 
 from __future__ import annotations
@@ -25,6 +28,8 @@ _RING, _LEAST_PX = (0.015, 0.06), (6.0, 14.0)
 _SECTORS, _LEAST_PIXELS = 8, 8
 # slower changes than over so many degrees are the lens', not the light's
 _SLOW_DEG = 6.0
+# light over noise from which on a pixel of the whole picture counts, and which part of them must
+_SEEN, _MOST_DARK = 5.0, 0.1
 # a drift is believed when it is so many times its error, and corrected where it is known to this part
 _SURE, _WORST = 2.0, 0.01
 # fewer frames foretell nothing
@@ -76,26 +81,55 @@ def without_drift(folder: Path, run: MergedRun) -> MergedRun:
 def _gains_of(folder: Path, line: Sequence[FrameInfo], width: int) -> dict[str, tuple[float, float]]:
     if len(line) < _FEWEST:
         return {}
-    ratios, before = [_Ratio(0.0, 0.0)], None
+    near, whole = [_Ratio(0.0, 0.0)], [0.0]
+    before: tuple[MergedFrame, tuple[Floats, Floats]] | None = None
     for info in line:
-        ring = _ring(read_frame(folder, info), width)
+        frame = read_frame(folder, info)
+        here = frame, _ring(frame, width)
         if before is not None:
-            one = _ratio(before, ring)
-            if one is None:
+            one, other = _ratio(before[1], here[1]), _whole_ratio(before[0], frame)
+            if one is None or other is None:
                 return {}
-            ratios.append(one)
-        before = ring
+            near.append(one)
+            whole.append(other)
+        before = here
     angle = np.array([info.constellation_deg for info in line])
-    logs = np.cumsum([one.log for one in ratios])
+    logs = np.cumsum([[one.log for one in near], whole], axis=1).T
     knots = 2 + int((angle[-1] - angle[0]) / _SLOW_DEG)
     if len(line) < knots + 3:
         return {}
     basis = spline_basis(angle, (float(angle[0]), float(angle[-1])), knots)
     off = logs - basis @ np.linalg.lstsq(basis, logs, rcond=None)[0]
-    error = float(np.median([one.error for one in ratios[1:]]))
-    if error > _WORST or float(np.sqrt(np.mean(off**2))) < _SURE * error:
+    drift, error = _both(off[:, 0], off[:, 1], float(np.median([one.error for one in near[1:]])))
+    if error > _WORST or float(np.sqrt(np.mean(drift**2))) <= _SURE * error:
         return {}
-    return {info.file: (float(np.exp(each)), error) for info, each in zip(line, off, strict=True)}
+    return {info.file: (float(np.exp(each)), error) for info, each in zip(line, drift, strict=True)}
+
+
+def _both(one: Floats, other: Floats, error: float) -> tuple[Floats, float]:
+    """Return what two series tell of a third, and its standard error; neither is known better than to `error`.
+
+    Errors that have nothing to do with each other leave the mean product of both to what they share, and the rest of
+    each one's squares to itself. So weighted, squares are least (Wiener).
+    """
+    shared = max(float(np.mean(one * other)), 0.0)
+    if shared == 0.0:
+        return np.zeros_like(one), 0.0
+    own = [max(float(np.mean(each**2)) - shared, error**2, 1e-12) for each in (one, other)]
+    known = 1.0 / shared + 1.0 / own[0] + 1.0 / own[1]
+    return (one / own[0] + other / own[1]) / known, float(np.sqrt(1.0 / known))
+
+
+def _whole_ratio(one: MergedFrame, other: MergedFrame) -> float | None:
+    """Return the median of the logarithm by which pixels are brighter; None where too few are seen well."""
+    seen = [
+        np.isfinite(each.variance) & (each.radiance > _SEEN * np.sqrt(np.maximum(each.variance, 0.0)))
+        for each in (one, other)
+    ]
+    both = seen[0] & seen[1]
+    if np.count_nonzero(both) < _MOST_DARK * both.size:
+        return None
+    return float(np.median(np.log(other.radiance[both]) - np.log(one.radiance[both])))
 
 
 def _ring(frame: MergedFrame, width: int) -> tuple[Floats, Floats]:
