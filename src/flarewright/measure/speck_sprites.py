@@ -42,8 +42,9 @@ _CELL_PX, _BESIDE_PX = 1.0 / 3.0, 3.0
 _AROUND_PX = 1.0
 # views for each picture
 _VIEWS = 3
-# how stiff cells are against what one view tells of them: over the constellation, and towards 0
-_BEND, _DAMP = 0.1, 0.05
+# how stiff cells are against what one view tells of them: over the constellation, towards 0, and against their
+# neighbours, for a pixel tells nothing of waves that are as long as it is wide
+_BEND, _DAMP, _ROUGH = 0.1, 0.05, 0.2
 # part of its light by which a pixel may be off beside its noise
 _OFF = 0.01
 # steps of the solver, and the part of the first residual at which it ends
@@ -240,7 +241,7 @@ def _learned(
     told = _told(grid, angles, shown, speck, pixels, masks)
     if told is None:
         return None
-    solved = _solved(told, len(angles), grid.rows * grid.columns)
+    solved = _solved(told, len(angles), grid)
     pictures = _bright(solved.reshape(len(angles), grid.rows, grid.columns, 3))
     if not np.abs(pictures).max() > step:
         return None
@@ -279,17 +280,18 @@ def _told(
     return _Told(cells, weights, *(np.concatenate([part[n] for part in parts]) for n in (2, 3, 4, 5)))
 
 
-def _solved(told: _Told, count: int, cells: int) -> Floats:
+def _solved(told: _Told, count: int, grid: Grid) -> Floats:
     """Solve for pictures, shape (count, cells, 3), by conjugate gradients on the normal equations.
 
     Hestenes and Stiefel (1952), Methods of conjugate gradients for solving linear systems; the system has the form of
     Tikhonov's. Colours are solved side by side.
     """
-    how = told.cells, told.weights, told.before, told.part, told.sure
+    how, cells = (told.cells, told.weights, told.before, told.part, told.sure), grid.rows * grid.columns
     squares = np.zeros((count, cells))
     square_cells(*how, squares)
     # so that every cell is as stiff, whether it is bright and little known or dark and well known
     size = np.sqrt(np.maximum(squares.mean(axis=0), 1e-12 * squares.max()))[None, :, None]
+    shape, known = (count, grid.rows, grid.columns, 3), size.reshape(1, grid.rows, grid.columns, 1)
     bend = np.diff(np.eye(count), min(2, count - 1), axis=0)
     stiff = _BEND**2 * bend.T @ bend + _DAMP**2 * np.eye(count)
 
@@ -301,7 +303,8 @@ def _solved(told: _Told, count: int, cells: int) -> Floats:
     def normal(scaled: Floats) -> Floats:
         out = np.zeros((len(told.sure), 3))
         read_cells(*how, scaled / size, out)
-        return back(out) + np.tensordot(stiff, scaled, axes=1)
+        rough = _bends(known**2 * _bends((scaled / size).reshape(shape))).reshape(scaled.shape) / size
+        return np.asarray(back(out) + np.tensordot(stiff, scaled, axes=1) + _ROUGH**2 * rough)
 
     rest = back(told.values * told.sure[:, None])
     found, way = np.zeros_like(rest), rest
@@ -317,6 +320,16 @@ def _solved(told: _Told, count: int, cells: int) -> Floats:
         way = rest + now / np.maximum(power, 1e-300) * way
         power = now
     return np.asarray(found / size)
+
+
+def _bends(pictures: Floats) -> Floats:
+    """Return by how much each cell differs from those beside it, added up, shape (K, rows, columns, 3); 0 beyond."""
+    out = 4.0 * pictures
+    out[:, 1:] -= pictures[:, :-1]
+    out[:, :-1] -= pictures[:, 1:]
+    out[:, :, 1:] -= pictures[:, :, :-1]
+    out[:, :, :-1] -= pictures[:, :, 1:]
+    return out
 
 
 def _bright(pictures: Floats) -> Pixels:
