@@ -228,3 +228,37 @@ def test_what_hides_the_light_is_filled_by_what_is_as_far_from_it():
     assert np.isnan(filled[beyond & (x > 60.0)]).all()
     known = np.isfinite(seen)
     assert np.array_equal(filled[known], seen[known])
+
+
+def test_next_to_the_axis_what_is_left_lies_as_it_was_photographed():
+    pictures = np.random.default_rng(5).uniform(0.0, 1.0, (3, 20, 20, 3)).astype(np.float32)
+    unit, cells = packed(pictures, 1e-4)
+    sprite = Sprite(
+        follows="ghosts", grain_px=3.0, corner_px=(-30.0, -30.0), rolls_deg=(350.0, 10.0, 10.0),
+        constellation_deg=(0.1, 0.5, 5.0), rows=20, columns=20, unit=unit, cells=cells,
+    )  # fmt: skip
+    model = GhostModel(
+        size_px=(60, 60), axis_px=(30.0, 30.0), focal_px=60.0, largest_deg=5.0, constellation_deg=(0.0, 5.0), ghosts=(),
+        sprites=(sprite,),
+    )  # fmt: skip
+    turning = model.replace(sprites=(sprite.replace(rolls_deg=()),))
+    inner = np.s_[15:-15, 15:-15]
+
+    def both(angle, roll):
+        return (replay(one, angle, roll_deg=roll)[0].pixels[inner] for one in (model, turning))
+
+    # as photographed where it was, whatever the roll; between two rolls that are 20 degrees apart, not 340
+    there, photographed = next(both(0.1, 77.0)), replay(turning, 0.1, roll_deg=350.0)[0].pixels[inner]
+    assert np.abs(there - photographed).mean() < 0.01 * photographed.mean()
+    between = replay(turning, 0.3, roll_deg=0.0)[0].pixels[inner]
+    assert np.abs(next(both(0.3, 77.0)) - between).mean() < 0.05 * between.mean()
+    # at the roll of the photograph, and farther off the axis, nothing changes
+    for angle, roll in ((0.5, 10.0), (5.0, 77.0)):
+        mine, plain = both(angle, roll)
+        np.testing.assert_allclose(mine, plain, atol=1e-6)
+    # nothing leaps: neither where the light crosses the axis nor where turning begins
+    for one, other, roll in ((1e-7, 1e-7, 180.0), (2.2905, 2.2915, 0.0)):
+        near, beyond = (replay(model, angle, roll_deg=to)[0].pixels for angle, to in ((one, 0.0), (other, roll)))
+        assert np.abs(near - beyond).max() < 1e-3
+    with pytest.raises(ValueError, match="one for each picture"):
+        sprite.replace(rolls_deg=(1.0, 2.0))

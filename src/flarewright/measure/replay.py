@@ -16,6 +16,7 @@ from ..kernels.measure_edges import sum_into
 from ..kernels.measure_mesh import draw_ghosts
 from ..model.ghost_model import AberrationGhost, BezierGhost, GhostModel
 from ..model.layer import Layer
+from ..model.sprite import Sprite
 from ..render.compose import beauty
 from .carried import carried
 from .detail import detail_at
@@ -24,12 +25,14 @@ from .held import held
 from .numbers import bezier_numbers, field, frame, visible
 from .packed import Packed, pack, posed_numbers
 from .specks_drawn import draw_specks
-from .sprites import draw_sprites, interval, sprite_at
+from .sprites import draw_sprites, interval, roll_at, sprite_at
 
 Floats = NDArray[np.float64]
 
 # farther beyond the measured range than this, degrees, nothing is replayed
 BEYOND_DEG = 1.0
+# where the light is within this part of the picture's width of the axis, not all that is left turns with it
+_NEAR_AXIS = 0.04
 # most cells of detail to a pixel
 _CELLS = 1.5
 _NOTHING = np.empty((0, 0, 3, 19))
@@ -161,7 +164,6 @@ def _parts(
         specks = [one for one in model.sprites if one.follows == "speck"]
         standing = [one for one in model.sprites if one.follows != "speck"]
         placed = _frame(model, constellation_deg, roll_deg, size)
-        axis, toward = (float(placed[0]), float(placed[1])), (float(placed[2]), float(placed[3]))
         pictures = [
             carried(one, packed, model, constellation_deg)
             if one.follows == "ghosts"
@@ -171,9 +173,30 @@ def _parts(
         # what is narrower than a pixel is not seen, and would shimmer
         fine = [one for one in standing if one.detail and one.detail.parts <= _CELLS * scale * one.grain_px]
         pictures += [detail_at(one, one.detail, constellation_deg) for one in fine if one.detail]
-        rest = draw_sprites([*standing, *fine], pictures, place, axis, toward, size, scale)
-        parts["residual"] = rest.astype(float) + draw_specks(specks, packed, model, constellation_deg, placed, size)
+        rest = np.zeros((size[1], size[0], 3))
+        for one, picture in zip([*standing, *fine], pictures, strict=True):
+            for share, roll in _rolls(one, model, constellation_deg, roll_deg):
+                ax, ay, cosine, sine, _ = map(float, _frame(model, constellation_deg, roll, size))
+                light = draw_sprites([one], [picture], place, (ax, ay), (cosine, sine), size, scale)
+                rest += share * light
+        parts["residual"] = rest + draw_specks(specks, packed, model, constellation_deg, placed, size)
     return parts
+
+
+def _rolls(
+    sprite: Sprite, model: GhostModel, constellation_deg: float, roll_deg: float
+) -> tuple[tuple[float, float], ...]:
+    """Return in which directions a sprite is drawn, and the share of each.
+
+    Next to the axis a flare hardly knows from where the light comes: what is left there, of polygons above all, lies as
+    it was photographed, and turns with the light from there on.
+    """
+    photographed = roll_at(sprite, constellation_deg)
+    off = abs(np.tan(np.radians(constellation_deg))) * model.focal_px / (_NEAR_AXIS * model.size_px[0])
+    if photographed is None or photographed == roll_deg or off >= 1.0:
+        return ((1.0, roll_deg),)
+    turned = float(off * off * (3.0 - 2.0 * off))
+    return (turned, roll_deg), (1.0 - turned, photographed)
 
 
 def _in_rec709(layer: Layer, model: GhostModel) -> Layer:

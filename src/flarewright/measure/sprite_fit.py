@@ -101,8 +101,10 @@ def axis_sprite(views: Sequence[View], pixels: Sequence[Pixels]) -> Sprite:
     unit, cells = packed(
         beside(_filled(beside(sure(np.stack(pictures), np.stack(noises)), _NEXT))), DIGIT * darkest_noise(views) / grain
     )
+    rolls = np.unwrap([view.roll_deg for view in views], period=360.0)
     return Sprite(
         follows="ghosts", grain_px=grain, corner_px=(float(low[0] * grain), float(low[1] * grain)),
+        rolls_deg=tuple(float(rolls[group].mean()) for group in groups),
         constellation_deg=tuple(float(np.mean([views[k].constellation_deg for k in group])) for group in groups),
         rows=int(rows), columns=int(columns), unit=unit, cells=cells,
     )  # fmt: skip

@@ -49,6 +49,14 @@ def sprite_at(sprite: Sprite, constellation_deg: float) -> Pixels:
     return np.asarray((1.0 - part) * pictures[k] + part * pictures[k + 1], dtype=np.float32)
 
 
+def roll_at(sprite: Sprite, constellation_deg: float) -> float | None:
+    """Return the light's direction in which a sprite's picture was photographed; None where that is not known."""
+    if not sprite.rolls_deg:
+        return None
+    angles, rolls = np.array(sprite.constellation_deg), np.unwrap(sprite.rolls_deg, period=360.0)
+    return float(np.interp(constellation_deg, angles, rolls))
+
+
 def draw_sprites(
     sprites: Sequence[Sprite],
     pictures: Sequence[Pixels],

@@ -272,11 +272,9 @@ def with_rest(model: GhostModel, views: Sequence[View]) -> GhostModel:
     """
     left, placed = [], []
     for view in views:
-        turn = float(np.degrees(np.arctan2(view.frame[3], view.frame[2])))
-        roll = turn - (180.0 if view.constellation_deg < 0.0 else 0.0)
-        ghosts = draw(model, view.constellation_deg, roll, view.size_px)
+        ghosts = draw(model, view.constellation_deg, view.roll_deg, view.size_px)
         known = np.where(np.isfinite(view.variance), view.pixels, np.nan)
-        placed.append(replace(view, light_px=_light_of(model, view, roll)))
+        placed.append(replace(view, light_px=_light_of(model, view, view.roll_deg)))
         left.append((known - ghosts - _light(model.halo, model.star, placed[-1])).astype(np.float32))
     specks = specks_of(model, placed)
     # a speck is so much brighter than what is around it that coarse cells would spread its errors over that

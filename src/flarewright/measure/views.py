@@ -46,6 +46,12 @@ class View:
         """Width and height."""
         return self.pixels.shape[1], self.pixels.shape[0]
 
+    @property
+    def roll_deg(self) -> float:
+        """Direction of the line from the axis to a light of positive constellation, counterclockwise from the right."""
+        turn = float(np.degrees(np.arctan2(self.frame[3], self.frame[2])))
+        return turn - (180.0 if self.constellation_deg < 0.0 else 0.0)
+
     @cached_property
     def darkest_noise(self) -> float:
         """Standard deviation of its darkest pixels; infinite where nothing was measured."""

@@ -38,6 +38,9 @@ class Sprite(Frozen):
         down when the light is right.
     turn_deg : float
         "light" only: direction in which rows run, counterclockwise from the right in the upright picture.
+    rolls_deg : tuple of float
+        "ghosts" only: direction of the light in each picture, counterclockwise from the right in the upright picture.
+        Next to the axis what is left lies as it was photographed; without rolls it turns with the light everywhere.
     stretch : float
         Length of a cell along its row over `grain_px`.
     constellation_deg : tuple of float
@@ -67,6 +70,7 @@ class Sprite(Frozen):
     grain_px: float = Field(gt=0.0)
     corner_px: tuple[float, float]
     turn_deg: float = 0.0
+    rolls_deg: tuple[float, ...] = ()
     stretch: float = Field(default=1.0, gt=0.0)
     ghost: str | None = None
     spread_px: tuple[Annotated[float, Field(gt=0.0)], Annotated[float, Field(gt=0.0)]] = (1.0, 1.0)
@@ -83,6 +87,8 @@ class Sprite(Frozen):
     def _fits(self) -> Sprite:
         if any(b <= a for a, b in zip(self.constellation_deg, self.constellation_deg[1:], strict=False)):
             raise ValueError("the constellations of a sprite must rise")
+        if self.rolls_deg and (self.follows != "ghosts" or len(self.rolls_deg) != len(self.constellation_deg)):
+            raise ValueError('the rolls of a sprite are one for each picture, and only if it follows "ghosts"')
         if (self.follows == "speck") != (self.ghost is not None):
             raise ValueError('a sprite names a ghost if it follows "speck", and only then')
         for what, told in (("moves", self.moves), ("reaches", self.reaches), ("detail", self.detail)):
