@@ -80,7 +80,11 @@ def test_two_pictures_give_no_moves(unknown):
     sprite = before.sprites[0]
     unit, cells = packed(sprite.pictures[:2], sprite.unit)
     short = before.replace(
-        sprites=(sprite.replace(constellation_deg=sprite.constellation_deg[:2], unit=unit, cells=cells),)
+        sprites=(
+            sprite.replace(
+                constellation_deg=sprite.constellation_deg[:2], rolls_deg=sprite.rolls_deg[:2], unit=unit, cells=cells
+            ),
+        )
     )
     assert with_moves(short).sprites[0].moves is None
 

@@ -39,7 +39,7 @@ class Sprite(Frozen):
     turn_deg : float
         "light" only: direction in which rows run, counterclockwise from the right in the upright picture.
     rolls_deg : tuple of float
-        "ghosts" only: direction of the light in each picture, counterclockwise from the right in the upright picture.
+        "axis" and "ghosts" only: direction of the light in each picture, counterclockwise from the right when upright.
         Next to the axis what is left lies as it was photographed; without rolls it turns with the light everywhere.
     stretch : float
         Length of a cell along its row over `grain_px`.
@@ -87,8 +87,6 @@ class Sprite(Frozen):
     def _fits(self) -> Sprite:
         if any(b <= a for a, b in zip(self.constellation_deg, self.constellation_deg[1:], strict=False)):
             raise ValueError("the constellations of a sprite must rise")
-        if self.rolls_deg and (self.follows != "ghosts" or len(self.rolls_deg) != len(self.constellation_deg)):
-            raise ValueError('the rolls of a sprite are one for each picture, and only if it follows "ghosts"')
         if (self.follows == "speck") != (self.ghost is not None):
             raise ValueError('a sprite names a ghost if it follows "speck", and only then')
         for what, told in (("moves", self.moves), ("reaches", self.reaches), ("detail", self.detail)):
@@ -103,6 +101,10 @@ class Sprite(Frozen):
             if self.moves is None or self.detail.block != self.moves.block:
                 raise ValueError("the detail of a sprite must come with moves of the same blocks")
             self.detail.check(self.rows, self.columns)
+        if self.rolls_deg and (
+            self.follows not in ("axis", "ghosts") or len(self.rolls_deg) != len(self.constellation_deg)
+        ):
+            raise ValueError("the rolls of a sprite are one for each picture, and only of one about the axis")
         read_bytes(self.cells, self._size, "the cells of a sprite")
         return self
 
