@@ -21,8 +21,8 @@ from ..model.sprite import Sprite
 from .detail import fine, ways_on
 from .moved import displaced
 from .moves_fit import mean_about
-from .sprite_fit import darkest_noise, fine_cells, sure
-from .sprites import Pixels
+from .sprite_fit import darkest_noise, fine_cells, nearest_views, sure
+from .sprites import Pixels, where_foretold
 from .views import View
 
 Floats = NDArray[np.float64]
@@ -34,8 +34,6 @@ _PARTS = 3
 _DIGIT = 3.0
 # blocks to each side that tell about a block
 _ABOUT = 1
-# one photograph is foretold from two others
-_FEWEST = 3
 
 
 def with_detail(model: GhostModel, views: Sequence[View], left: Sequence[Pixels]) -> GhostModel:
@@ -55,19 +53,11 @@ def with_detail(model: GhostModel, views: Sequence[View], left: Sequence[Pixels]
     GhostModel
         The same where no sprite has three pictures.
     """
-    sprites = tuple(
-        _learned(one, one.moves, views, left)
-        if one.moves is not None and len(one.constellation_deg) >= _FEWEST
-        else one
-        for one in model.sprites
-    )
-    out: GhostModel = model.replace(sprites=sprites)
-    return out
+    return where_foretold(model, lambda one: one if one.moves is None else _learned(one, one.moves, views, left))
 
 
 def _learned(sprite: Sprite, moves: Moves, views: Sequence[View], left: Sequence[Pixels]) -> Sprite:
     angles = np.array(sprite.constellation_deg)
-    nearest = [min(range(len(views)), key=lambda k: abs(views[k].constellation_deg - at)) for at in angles]
     unit = _DIGIT * darkest_noise(views) * _PARTS / sprite.grain_px
 
     def keep(k: int) -> tuple[str, Pixels, Mask]:
@@ -77,7 +67,7 @@ def _learned(sprite: Sprite, moves: Moves, views: Sequence[View], left: Sequence
         return text, picture, known
 
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        cells, pictures, known = zip(*pool.map(keep, nearest), strict=True)
+        cells, pictures, known = zip(*pool.map(keep, nearest_views(sprite, views)), strict=True)
         inner = range(1, len(angles) - 1)
         foretold = list(pool.map(lambda k: _foretold(sprite, moves, pictures, known[k], angles, k), inner))
     ways, shares = _chosen(np.stack(foretold))
@@ -108,12 +98,13 @@ def _foretold(sprite: Sprite, moves: Moves, pictures: Sequence[Pixels], known: M
 
 
 def _blocks(values: Floats, moves: Moves) -> Floats:
-    """Add up values of cells over blocks of moves and those around, shape (rows, columns)."""
+    """Add up values of cells over blocks of moves and those around, shape (rows, columns); 0 or more."""
     side = moves.block * _PARTS
     wide = np.zeros((moves.rows * side, moves.columns * side))
     wide[: values.shape[0], : values.shape[1]] = values
     sums = wide.reshape(moves.rows, side, moves.columns, side).sum(axis=(1, 3))
-    return np.asarray(mean_about(sums[None], _ABOUT)[0])
+    # what is foretold the wrong way about tells nothing, and does not count against the photograph beside
+    return np.asarray(np.maximum(mean_about(sums[None], _ABOUT)[0], 0.0))
 
 
 def _chosen(foretold: Floats) -> tuple[NDArray[np.int64], Floats]:

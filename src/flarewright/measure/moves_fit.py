@@ -20,7 +20,7 @@ from ..model.sprite import Sprite
 from .carried import boxed
 from .moved import displaced, ghosts_light, landed, middles, spread
 from .packed import Packed, pack
-from .sprites import Pixels, samples
+from .sprites import Pixels, samples, where_foretold
 
 Floats = NDArray[np.float64]
 
@@ -38,8 +38,6 @@ _ABOUT, _STEEP = 5, 4.0
 _MATCH, _FORETELL = 3.0, 2.0
 # a move's weight: so many for each factor of 2 by which the misfit without it stands out of the noise, and at most
 _LOUD, _LOUDEST = 4.0, 127.0
-# one photograph is foretold from two others
-_FEWEST = 3
 
 
 def with_moves(model: GhostModel) -> GhostModel:
@@ -55,12 +53,7 @@ def with_moves(model: GhostModel) -> GhostModel:
         The same where no sprite has three pictures.
     """
     packed = pack(model)
-    sprites = tuple(
-        _learned(one, packed, model) if one.follows == "ghosts" and len(one.constellation_deg) >= _FEWEST else one
-        for one in model.sprites
-    )
-    out: GhostModel = model.replace(sprites=sprites)
-    return out
+    return where_foretold(model, lambda one: _learned(one, packed, model))
 
 
 def _learned(sprite: Sprite, packed: Packed, model: GhostModel) -> Sprite:
@@ -151,13 +144,14 @@ def _about(missed: Floats, unit: float) -> Floats:
     The first and the last photograph are foretold by none.
     """
     rows, columns = (middles(count, _BLOCK) for count in missed.shape[1:])
-    about = mean_about(missed, _ABOUT)[:, rows[:, None], columns]
+    # differences of sums may end a little below 0
+    about = np.maximum(mean_about(missed, _ABOUT), 0.0)[:, rows[:, None], columns]
     ends = np.concatenate([about[:1], about, about[-1:]])
     return np.asarray(0.5 * (ends[1:] + ends[:-1]) + (_FORETELL * unit) ** 2)
 
 
 def mean_about(values: Floats, cells: int) -> Floats:
-    """Return means over squares of so many cells to each side, of values that are 0 or more.
+    """Return means over squares of so many cells to each side.
 
     Parameters
     ----------
@@ -175,8 +169,7 @@ def mean_about(values: Floats, cells: int) -> Floats:
         sums = np.pad(sums.cumsum(axis=axis), [(0, 0), *[(1, 0) if m == axis else (0, 0) for m in (1, 2)]])
         count = sums.shape[axis]
         sums = sums.take(range(side, count), axis) - sums.take(range(count - side), axis)
-    # differences of sums may end a little below 0
-    return np.asarray(np.maximum(sums, 0.0) / side**2)
+    return np.asarray(sums / side**2)
 
 
 def _shares(about: Sequence[Floats]) -> Floats:

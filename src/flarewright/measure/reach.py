@@ -20,7 +20,8 @@ from ..model.reaches import ANYWHERE, packed_reaches
 from ..model.sprite import Sprite
 from .held import brightest, darkest
 from .moved import middles
-from .sprite_fit import told
+from .sprite_fit import nearest_views, told
+from .sprites import where_foretold
 from .views import View
 
 Floats = NDArray[np.float64]
@@ -34,8 +35,6 @@ _NOISY, _PART = 3.0, 0.03
 _WINDOW, _AS_BRIGHT = 4, 0.3
 # cells to each side of a block
 _BLOCK = 2
-# one photograph is compared with two others
-_FEWEST = 3
 
 
 def with_reaches(model: GhostModel, views: Sequence[View]) -> GhostModel:
@@ -52,18 +51,12 @@ def with_reaches(model: GhostModel, views: Sequence[View]) -> GhostModel:
     GhostModel
         The same where no sprite has three pictures.
     """
-    sprites = tuple(
-        _learned(one, views) if one.follows == "ghosts" and len(one.constellation_deg) >= _FEWEST else one
-        for one in model.sprites
-    )
-    out: GhostModel = model.replace(sprites=sprites)
-    return out
+    return where_foretold(model, lambda one: _learned(one, views))
 
 
 def _learned(sprite: Sprite, views: Sequence[View]) -> Sprite:
-    nearest = [min(views, key=lambda view: abs(view.constellation_deg - at)) for at in sprite.constellation_deg]
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        seen = list(pool.map(lambda view: told(sprite, view), nearest))
+        seen = list(pool.map(lambda k: told(sprite, views[k]), nearest_views(sprite, views)))
         # what is not seen may be as bright as you like
         brights = [np.where(np.isnan(light), np.inf, light).max(axis=2) for light, _ in seen]
         inner = list(pool.map(lambda k: _gone(seen, brights, k), range(1, len(seen) - 1)))

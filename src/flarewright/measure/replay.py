@@ -25,7 +25,7 @@ from .held import held
 from .numbers import bezier_numbers, field, frame, visible
 from .packed import Packed, pack, posed_numbers
 from .specks_drawn import draw_specks
-from .sprites import draw_sprites, interval, roll_at, sprite_at
+from .sprites import Pixels, draw_sprites, interval, roll_at, sprite_at
 
 Floats = NDArray[np.float64]
 
@@ -173,12 +173,15 @@ def _parts(
         # what is narrower than a pixel is not seen, and would shimmer
         fine = [one for one in standing if one.detail and one.detail.parts <= _CELLS * scale * one.grain_px]
         pictures += [detail_at(one, one.detail, constellation_deg) for one in fine if one.detail]
+        alike: dict[tuple[float, float], list[tuple[Sprite, Pixels]]] = {}
+        for pair in zip([*standing, *fine], pictures, strict=True):
+            for how in _rolls(pair[0], model, constellation_deg, roll_deg):
+                alike.setdefault(how, []).append(pair)
         rest = np.zeros((size[1], size[0], 3))
-        for one, picture in zip([*standing, *fine], pictures, strict=True):
-            for share, roll in _rolls(one, model, constellation_deg, roll_deg):
-                ax, ay, cosine, sine, _ = map(float, _frame(model, constellation_deg, roll, size))
-                light = draw_sprites([one], [picture], place, (ax, ay), (cosine, sine), size, scale)
-                rest += share * light
+        for (share, roll), pairs in alike.items():
+            ax, ay, cosine, sine, _ = map(float, _frame(model, constellation_deg, roll, size))
+            sprites, cells = zip(*pairs, strict=True)
+            rest += share * draw_sprites(sprites, cells, place, (ax, ay), (cosine, sine), size, scale)
         parts["residual"] = rest + draw_specks(specks, packed, model, constellation_deg, placed, size)
     return parts
 
@@ -276,10 +279,12 @@ def _single(
 ) -> Sequence[Layer]:
     """Draw each visible ghost on a layer of its own, cropped to what it touches."""
     layers = []
+    # a copy is validated, and the cells of what is no ghost take long
+    bare = model.replace(sprites=())
     for ghost, there in zip(model.ghosts, _there(model, model.ghosts, constellation_deg), strict=True):
         if not there:
             continue
-        alone = cast(GhostModel, model.replace(ghosts=(ghost,)))
+        alone = cast(GhostModel, bare.replace(ghosts=(ghost,)))
         pixels = draw(alone, constellation_deg, roll_deg, size) * gain
         lit = np.argwhere(pixels.any(axis=2))
         if not lit.size:

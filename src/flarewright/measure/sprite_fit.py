@@ -110,6 +110,12 @@ def axis_sprite(views: Sequence[View], pixels: Sequence[Pixels]) -> Sprite:
     )  # fmt: skip
 
 
+def nearest_views(sprite: Sprite, views: Sequence[View]) -> list[int]:
+    """Return which view is nearest to the constellation of each picture of a sprite."""
+    angles = [view.constellation_deg for view in views]
+    return [int(np.argmin(np.abs(np.subtract(angles, at)))) for at in sprite.constellation_deg]
+
+
 def told(sprite: Sprite, view: View) -> tuple[Floats, Floats]:
     """Return the light that a view shows in the cells of a sprite about the axis, and its noise.
 

@@ -2,15 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..kernels.measure_sprite import cubic_samples
+from ..model.ghost_model import GhostModel
 from ..model.sprite import Sprite
 
 Pixels = NDArray[np.float32]
+
+
+# one photograph is compared with the one before and the one after
+_FEWEST = 3
+
+
+def where_foretold(model: GhostModel, learn: Callable[[Sprite], Sprite]) -> GhostModel:
+    """Return a model whose sprites that follow ghosts have learned; those of fewer than three pictures stay."""
+    sprites = tuple(
+        learn(one) if one.follows == "ghosts" and len(one.constellation_deg) >= _FEWEST else one
+        for one in model.sprites
+    )
+    out: GhostModel = model.replace(sprites=sprites)
+    return out
 
 
 def between(

@@ -17,6 +17,7 @@ from ..kernels.measure_pupil import FIRST_DISC, FIRST_I, SOFT
 from ..model.capture import MergedRun
 from ..model.corrections import Corrections
 from ..model.ghost_model import AberrationGhost, Blades, GhostModel, Halo, Reference, Star
+from ..model.sprite import Sprite
 from .detail_fit import with_detail
 from .fit import Shape, light_of
 from .found import Found
@@ -278,25 +279,35 @@ def with_rest(model: GhostModel, views: Sequence[View]) -> GhostModel:
         left.append((known - ghosts - _light(model.halo, model.star, placed[-1])).astype(np.float32))
     specks = specks_of(model, placed)
     # a speck is so much brighter than what is around it that coarse cells would spread its errors over that
-    seen = [hidden(each, mask) for each, mask in zip(left, covered(specks, placed, left), strict=True)]
-    spikes = spike_sprites(placed, seen, model.star)
-    seen = [each - drawn(spikes, view) for each, view in zip(seen, placed, strict=True)]
+    masks = covered(specks, placed, left)
+    spikes = spike_sprites(placed, _all_hidden(left, masks), model.star)
+    left = _beside_sprites(left, spikes, placed)
     # coarse pictures overshoot beside the light's image, which finer ones only mend where something is known
-    going = light_sprites(placed, [around_light(view, each) for view, each in zip(placed, seen, strict=True)])
-    seen = [each - drawn(going, view) for each, view in zip(seen, placed, strict=True)]
+    around = [around_light(view, each) for view, each in zip(placed, _all_hidden(left, masks), strict=True)]
+    going = light_sprites(placed, around)
+    left = _beside_sprites(left, going, placed)
     # next to the light a pixel's error is brighter than all that turns about the axis
-    beside_light = [_off_light(view) < NEXT_TO_LIGHT * view.size_px[0] for view in placed]
-    apart = [hidden(each, mask) for each, mask in zip(seen, beside_light, strict=True)]
-    standing = (*spikes, *going, axis_sprite(placed, apart))
-    left = [each - drawn(standing, view) for each, view in zip(left, placed, strict=True)]
+    next_to_light = [_off_light(view) < NEXT_TO_LIGHT * view.size_px[0] for view in placed]
+    axis = axis_sprite(placed, _all_hidden(_all_hidden(left, masks), next_to_light))
+    left = _beside_sprites(left, (axis,), placed)
     small = speck_sprites(specks, placed, left, masks_of(placed))
-    moving = with_moves(model.replace(sprites=(*standing, *small)))
+    moving = with_moves(model.replace(sprites=(*spikes, *going, axis, *small)))
     packed = pack(moving)
     left = [
-        hidden(each - draw_specks(small, packed, moving, view.constellation_deg, view.frame, view.size_px), mask)
-        for each, view, mask in zip(left, placed, beside_light, strict=True)
+        each - draw_specks(small, packed, moving, view.constellation_deg, view.frame, view.size_px)
+        for each, view in zip(left, placed, strict=True)
     ]
-    return with_reaches(with_detail(moving, placed, left), placed)
+    return with_reaches(with_detail(moving, placed, _all_hidden(left, next_to_light)), placed)
+
+
+def _all_hidden(pictures: Sequence[Pixels], masks: Sequence[NDArray[np.bool_]]) -> list[Pixels]:
+    """Return pictures with what is in their masks not measured."""
+    return [hidden(each, mask) for each, mask in zip(pictures, masks, strict=True)]
+
+
+def _beside_sprites(left: Sequence[Pixels], sprites: Sequence[Sprite], views: Sequence[View]) -> list[Pixels]:
+    """Take sprites off what is left of views."""
+    return [each - drawn(sprites, view) for each, view in zip(left, views, strict=True)]
 
 
 def around_light(view: View, pixels: Pixels) -> Pixels:

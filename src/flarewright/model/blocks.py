@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from math import prod
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from .base import Frozen
 from .bytes_text import read_bytes
@@ -25,19 +27,30 @@ class Blocks(Frozen):
         Base64 of zlib of bytes in the order interval, row, column, number.
     """
 
+    # bytes of each block, and what is said of them when there are more or fewer
+    count: ClassVar[int]
+    what: ClassVar[str]
+
     block: int = Field(ge=1)
     intervals: int = Field(ge=1)
     rows: int = Field(ge=1)
     columns: int = Field(ge=1)
     numbers: str
 
-    def read(self, count: int, what: str) -> NDArray[np.uint8]:
-        """Return the bytes, so many of each block, shape (intervals, rows, columns, count).
+    @model_validator(mode="after")
+    def _fits(self) -> Blocks:
+        # not kept, for what is kept is compared where records are
+        self._sound(self._read())
+        return self
 
-        Raises
-        ------
-        ValueError
-            When there are more or fewer; `what` is said of them.
-        """
-        shape = self.intervals, self.rows, self.columns, count
-        return np.frombuffer(read_bytes(self.numbers, prod(shape), what), np.uint8).reshape(shape)
+    def _sound(self, numbers: NDArray[np.uint8]) -> None:
+        """Raise ValueError where bytes, shape (intervals, rows, columns, count), are none of this kind."""
+
+    def _read(self) -> NDArray[np.uint8]:
+        shape = self.intervals, self.rows, self.columns, self.count
+        return np.frombuffer(read_bytes(self.numbers, prod(shape), self.what), np.uint8).reshape(shape)
+
+    @cached_property
+    def bytes_of_blocks(self) -> NDArray[np.uint8]:
+        """Shape (intervals, rows, columns, count)."""
+        return self._read()

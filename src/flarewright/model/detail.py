@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from functools import cached_property
-
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from .blocks import Blocks
 from .bytes_text import read_bytes, told_bytes
@@ -38,37 +36,31 @@ class Detail(Blocks):
         is left, of all light, tell), and how much of it is there halfway, of 255.
     """
 
+    count = 2
+    what = "the blocks of a sprite's detail"
+
     parts: int = Field(ge=2)
     unit: float = Field(gt=0.0)
     cells: tuple[str, ...]
 
-    @model_validator(mode="after")
-    def _fits(self) -> Detail:
+    def _sound(self, numbers: NDArray[np.uint8]) -> None:
         if len(self.cells) != self.intervals + 1:
             raise ValueError("the detail of a sprite must have one picture more than intervals")
-        if (self._read()[..., 0] >= WAYS).any():
+        if (numbers[..., 0] >= WAYS).any():
             raise ValueError(f"ways in the detail of a sprite must be below {WAYS}")
-        return self
 
     def check(self, rows: int, columns: int) -> None:
         """Raise ValueError unless the pictures divide so many cells of a sprite."""
         for picture in range(len(self.cells)):
             self._bytes_of(picture, rows, columns)
 
-    def _read(self) -> NDArray[np.uint8]:
-        return self.read(2, "the blocks of a sprite's detail")
-
-    @cached_property
-    def _blocks(self) -> NDArray[np.uint8]:
-        return self._read()
-
     def ways(self, interval: int) -> NDArray[np.int64]:
         """Return in which way each block's detail goes, shape (rows, columns)."""
-        return self._blocks[interval, ..., 0].astype(np.int64)
+        return self.bytes_of_blocks[interval, ..., 0].astype(np.int64)
 
     def shares(self, interval: int) -> NDArray[np.float64]:
         """Return how much of each block's detail is there halfway, shape (rows, columns)."""
-        return np.asarray(self._blocks[interval, ..., 1] / _WHOLE)
+        return np.asarray(self.bytes_of_blocks[interval, ..., 1] / _WHOLE)
 
     def picture(self, index: int, rows: int, columns: int) -> NDArray[np.float32]:
         """Return the detail of one picture of a sprite of so many cells, shape (parts rows, parts columns, 3)."""

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-from functools import cached_property
-
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import model_validator
 
 from .blocks import Blocks
 from .bytes_text import told_bytes
@@ -15,8 +12,6 @@ from .bytes_text import told_bytes
 _STEP = 1.0 / 8.0
 # a share of 1
 _WHOLE = 127.0
-# down, along and weight, of what is left and of the whole light; then the shares of both
-_NUMBERS = 8
 
 
 class Moves(Blocks):
@@ -34,29 +29,26 @@ class Moves(Blocks):
         the ghosts' boxes.
     """
 
-    @model_validator(mode="after")
-    def _fits(self) -> Moves:
-        # not kept, for what is kept is compared where records are
-        shares = self._read()[..., 6:].astype(int)
+    # down, along and weight, of what is left and of the whole light; then the shares of both
+    count = 8
+    what = "the moves of a sprite"
+
+    def _sound(self, numbers: NDArray[np.uint8]) -> None:
+        shares = numbers.view(np.int8)[..., 6:].astype(int)
         if (shares < 0).any() or (shares.sum(axis=-1) > _WHOLE).any():
             raise ValueError("shares in the moves of a sprite must be 0 or more and 127 at most together")
-        return self
-
-    def _read(self) -> NDArray[np.int8]:
-        return self.read(_NUMBERS, "the moves of a sprite").view(np.int8)
-
-    @cached_property
-    def _bytes(self) -> NDArray[np.int8]:
-        return self._read()
 
     def steps(self, interval: int) -> NDArray[np.float64]:
         """Return moves, cells down and along, and weights of what is left and of it with ghosts, shape (2, R, C, 3)."""
-        numbers = self._bytes[interval, ..., :6].reshape(self.rows, self.columns, 2, 3) * np.array([_STEP, _STEP, 1.0])
-        return np.asarray(np.moveaxis(numbers, 2, 0))
+        told = self._signed(interval)[..., :6].reshape(self.rows, self.columns, 2, 3)
+        return np.asarray(np.moveaxis(told * np.array([_STEP, _STEP, 1.0]), 2, 0))
 
     def shares(self, interval: int) -> NDArray[np.float64]:
         """Return the shares of the two ways, shape (2, rows, columns)."""
-        return np.asarray(np.moveaxis(self._bytes[interval, ..., 6:] / _WHOLE, -1, 0))
+        return np.asarray(np.moveaxis(self._signed(interval)[..., 6:] / _WHOLE, -1, 0))
+
+    def _signed(self, interval: int) -> NDArray[np.int8]:
+        return np.asarray(self.bytes_of_blocks[interval].view(np.int8))
 
 
 def packed_moves(block: int, steps: NDArray[np.float64], shares: NDArray[np.float64]) -> Moves:
@@ -71,7 +63,7 @@ def packed_moves(block: int, steps: NDArray[np.float64], shares: NDArray[np.floa
     shares : ndarray, shape (intervals, 2, rows, columns)
     """
     intervals, _, rows, columns, _ = steps.shape
-    whole = np.empty((intervals, rows, columns, _NUMBERS), np.int8)
+    whole = np.empty((intervals, rows, columns, Moves.count), np.int8)
     numbers = np.rint(np.clip(steps / np.array([_STEP, _STEP, 1.0]), -127.0, 127.0)).astype(np.int8)
     whole[..., :6] = np.moveaxis(numbers, 1, 3).reshape(intervals, rows, columns, 6)
     # cut off, so that both together are never more than all

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-from functools import cached_property
-
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import model_validator
 
 from .blocks import Blocks
 from .bytes_text import told_bytes
@@ -27,22 +24,12 @@ class Reaches(Blocks):
         the next; 255: it may come from anywhere.
     """
 
-    @model_validator(mode="after")
-    def _fits(self) -> Reaches:
-        # not kept, for what is kept is compared where records are
-        self._read()
-        return self
-
-    def _read(self) -> NDArray[np.uint8]:
-        return self.read(2, "the reaches of a sprite")
-
-    @cached_property
-    def _bytes(self) -> NDArray[np.uint8]:
-        return self._read()
+    count = 2
+    what = "the reaches of a sprite"
 
     def within(self, interval: int) -> NDArray[np.uint8]:
         """Return the reaches of an interval, shape (rows, columns, 2): cells, or `ANYWHERE`."""
-        return np.asarray(self._bytes[interval])
+        return np.asarray(self.bytes_of_blocks[interval])
 
 
 def packed_reaches(block: int, cells: NDArray[np.int64]) -> Reaches:
