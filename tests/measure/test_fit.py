@@ -7,6 +7,7 @@ import pytest
 from planted_run import GHOSTS, LARGEST, NOISE, SIZE, shape, views
 
 from flarewright.kernels.measure_pupil import SOFT
+from flarewright.measure import pursuit
 from flarewright.measure.compress import compress
 from flarewright.measure.find import Candidate, candidates, slopes_of
 from flarewright.measure.fit import Shape, free_numbers, patches_of, presence, refine, render
@@ -152,6 +153,37 @@ def test_all_ghosts_are_found_and_none_besides():
 def test_noise_alone_has_no_ghosts():
     shown = views((), angles=FEW)
     assert pursue(shown, masks(shown)) == []
+
+
+def test_a_ghost_that_is_bright_at_its_rim_is_found():
+    # its law falls a little below 0 in the middle of the pupil, as that of a lens' ghost may where it bends
+    ring = shape(-50.0, 30.0, 0.5)
+    ring.numbers[20:22] = -0.1 * ring.numbers[20], 2.2 * ring.numbers[20]
+    shown = views((ring,), angles=FEW)
+    found = pursue(shown, masks(shown), most=1)
+    assert len(found) == 1
+    assert found[0].shapes[1].numbers[0] == pytest.approx(-50.0, abs=2.0)
+
+
+def test_what_was_refused_is_tried_again_when_more_is_known(monkeypatch):
+    tried, votes = [], [Candidate(80.0 * k, 10.0, 0, 8, 9.0 - k) for k in range(4)]
+
+    def trial(candidate, views, rest, pool):
+        # the best one explains enough only beside all others
+        tried.append(candidate)
+        if candidate is votes[0] and len({*map(id, tried)}) < len(votes):
+            return None
+        return Found((GHOSTS[0],) * 3, 0, 1)
+
+    def left(*_):
+        return [each for each in votes if each not in tried or (each is votes[0] and tried[-1] is not each)]
+
+    monkeypatch.setattr(pursuit, "_try", trial)
+    monkeypatch.setattr(pursuit, "_candidates", left)
+    shown = views(GHOSTS[:1], angles=FEW)
+    found = pursue(shown, masks(shown), most=4)
+    assert len(found) == 4
+    assert tried[0] is tried[-1] is votes[0]
 
 
 def test_a_rolled_camera_sees_the_same_ghosts():

@@ -55,6 +55,17 @@ def test_a_ghost_that_others_stand_in_for_is_left_out():
     assert lit([], shown) == []
 
 
+def test_a_ghost_is_judged_by_the_light_that_its_rims_let_through():
+    # a disc leaves the middle of the pupil, where it is bright; beyond, its law falls below 0 and nothing is drawn
+    core = shape(-40.0, 30.0, 0.5)
+    core.numbers[21] = -3.0 * core.numbers[20]
+    core.numbers[30:33] = 0.0, 0.0, 0.4
+    shown = views((GHOSTS[0], core := Shape(core.numbers, 1)), angles=FEW)
+    kept = lit([found(GHOSTS[0]), found(core)], shown)
+    assert len(kept) == 2
+    assert misfit(kept, shown) < 1.2
+
+
 def test_ghosts_are_lit_only_where_they_are():
     shown = views((GHOSTS[0],), angles=FEW[:5]) + views((), angles=FEW[5:])
     assert misfit(lit([found(dimmer(GHOSTS[0], 0.5), 5)], shown), shown) < 1.2

@@ -143,6 +143,11 @@ def light_of(shape: Shape, view: View) -> tuple[Part, Floats]:
     return np.s_[top : top + height, left : left + width], plane[:, :width].copy()
 
 
+def brightens(shape: Shape, views: Sequence[View]) -> bool:
+    """Tell whether a shape adds light to views, all in all: its rims may leave only a part of what its numbers say."""
+    return sum(float(light_of(shape, view)[1].sum()) for view in views) > 0.0
+
+
 def scaled(frame: Floats, times: int) -> Floats:
     """Return the frame of a picture halved so often."""
     factor = 0.5**times

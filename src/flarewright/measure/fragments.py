@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..kernels.measure_pupil import FIRST_G, FIRST_I
-from .fit import Patch, Shape, cost_of, free_numbers, improve, patches_of, render
+from .fit import Patch, Shape, brightens, cost_of, free_numbers, improve, patches_of, render
 from .found import Found, by_light, rest_of
 from .numbers import Floats
 from .views import Pixels, View
@@ -112,7 +112,7 @@ def _as_one(
     larger = fitted(np.zeros_like(core.numbers), apart)
     two = _cost(larger, apart)
     explained = _cost(larger, patches) - two
-    if best.numbers[FIRST_I] <= 0.0 or _cost(best, patches) - two > _LOST * explained:
+    if not brightens(best, as_one) or _cost(best, patches) - two > _LOST * explained:
         return None
     return replace(both, shapes=(best, best, best))
 

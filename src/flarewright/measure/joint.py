@@ -36,11 +36,12 @@ class _Picture:
     """One view and the G `ghosts` that it shows: what each number of their light would add, shape (P, 4 G).
 
     An even background is nobody's: the means are taken off. `there`, shape (P, G), is where the ghosts are, `pixels` is
-    what is seen.
+    what is seen, `light`, shape (4 G,), is what each number adds in all.
     """
 
     ghosts: Indices
     basis: NDArray[np.float32]
+    light: Floats
     there: NDArray[np.bool_]
     pixels: Floats
     weight: Floats
@@ -111,16 +112,17 @@ def _needed(matrix: Floats, side: Floats, pictures: Sequence[_Picture], least: f
         values = inverse @ side[at]
         everything = np.zeros(side.size)
         everything[at] = values
-        rests = np.zeros(side.size // _TERMS.size)
+        rests, light = np.zeros(side.size // _TERMS.size), np.zeros(side.size // _TERMS.size)
         for one in pictures:
             missed = one.pixels - one.basis @ everything[one.columns]
             rests[one.ghosts] += (one.weight * missed**2) @ one.there
+            light[one.ghosts] += (one.light * everything[one.columns]).reshape(-1, _TERMS.size).sum(axis=1)
         gains = np.empty(kept.size)
         for n, k in enumerate(kept):
             own = slice(_TERMS.size * n, _TERMS.size * (n + 1))
             grown = float(values[own] @ np.linalg.solve(inverse[own, own], values[own]))
-            # u is 1/2 on average over the pupil; a ghost that darkens is none
-            gains[n] = grown / max(grown + rests[k], 1e-300) if values[own][0] + 0.5 * values[own][1] > 0.0 else -1.0
+            # a ghost that darkens is none: what its rims let through counts, not what its law says of the whole pupil
+            gains[n] = grown / max(grown + rests[k], 1e-300) if light[k] > 0.0 else -1.0
         worst = int(np.argmin(gains))
         if gains[worst] >= least:
             break
@@ -151,8 +153,9 @@ def _pictures(
         total = max(float(weight.sum()), 1e-300)
         seen = np.where(weight > 0.0, pixels.ravel(), 0.0)
         there = columns[:, :: _TERMS.size] != 0.0
+        light = columns.sum(axis=0, dtype=np.float64)
         columns = columns - ((weight @ columns) / total).astype(np.float32)
-        return _Picture(shown, columns, there, seen - float(weight @ seen) / total, weight)
+        return _Picture(shown, columns, light, there, seen - float(weight @ seen) / total, weight)
 
     return list((map if pool is None else pool.map)(one, [int(k) for k in few]))
 

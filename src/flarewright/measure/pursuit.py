@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ..kernels.measure_pupil import FIRST_G, FIRST_I
 from ..model.ghost_model import Blades
 from .find import Candidate, candidates, slopes_of
-from .fit import Shape, cost_of, light_of, patches_of, presence
+from .fit import Shape, brightens, cost_of, light_of, patches_of, presence
 from .found import Found, darkened, rest_of
 from .grow import Growth, grow
 from .journal import Journal
@@ -35,6 +35,8 @@ THERE = 0.35
 LEFT_BEHIND = 0.08
 # and as specks, so many pixels around the light
 LEFT_AS_SPECKS, _BESIDE = 0.2, 3
+# who was refused is tried again when twice as many ghosts are known, and so many more
+_SOON = 2
 # views that a first fit looks at
 _FEW = 16
 # how far a candidate grows: most of what lies beside it is not known yet, so its misfit tells nothing of it
@@ -106,13 +108,15 @@ def pursue(
     ]
     rest = rest_of(known, shown, 1)
     found: list[Found] = []
-    refused: list[Candidate] = []
+    # and how many ghosts were known then
+    refused: list[tuple[Candidate, int]] = []
     waiting = list(first)
     steps = journal or Journal()
     fallen = _Fallen(progress)
     while len(found) < most:
         votes = steps.step(partial(_candidates, shown, rest, masks, 12 + len(refused), iris, pool))
-        trials = [each for each in votes if each.score > SCORE and not any(_same(each, other) for other in refused)]
+        likely = [each for each in votes if each.score > SCORE]
+        trials = _open(likely, refused, len(found) // 2 - _SOON) or _open(likely, refused, len(found) - 1)
         fallen(trials[0].score if trials else SCORE, len(found))
         taken = 0
         trials, waiting = [*waiting[:4], *trials], waiting[4:]
@@ -121,7 +125,7 @@ def pursue(
                 break
             ghost = steps.step(partial(_try, trial, shown, rest, pool))
             if ghost is None:
-                refused.append(trial)
+                refused = [*((one, then) for one, then in refused if not _same(one, trial)), (trial, len(found))]
                 continue
             taken += 1
             found.append(ghost)
@@ -137,6 +141,15 @@ def pursue(
         if taken:
             found = touch_up(found, shown, rest, steps=4, pool=pool, journal=steps)
     return found
+
+
+def _open(votes: Sequence[Candidate], refused: Sequence[tuple[Candidate, int]], known: int) -> list[Candidate]:
+    """Return candidates that were not refused, or when no more ghosts than `known` were known.
+
+    Beside ghosts that are not known yet one explains little of what is in its windows, and runs off to their light.
+    """
+    barred = [one for one, then in refused if then > known]
+    return [each for each in votes if not any(_same(each, other) for other in barred)]
 
 
 class _Fallen:
@@ -202,7 +215,7 @@ def _try(
     shown = _alone(views, rest, list(few))
     start = beginning(trial, shown, [rest[k] for k in few])
     fit = grow(start, shown, 1, most=_FIRST, pool=pool)
-    if fit is None or fit.shape.numbers[FIRST_I] <= 0.0:
+    if fit is None or not brightens(fit.shape, shown):
         return None
     shape = fit.shape
     patches = patches_of(shape, shown, 1)
