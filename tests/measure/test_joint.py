@@ -60,8 +60,9 @@ def test_a_ghost_is_judged_by_the_light_that_its_rims_let_through():
     core = shape(-40.0, 30.0, 0.5)
     core.numbers[21] = -3.0 * core.numbers[20]
     core.numbers[30:33] = 0.0, 0.0, 0.4
-    shown = views((GHOSTS[0], core := Shape(core.numbers, 1)), angles=FEW)
-    kept = lit([found(GHOSTS[0]), found(core)], shown)
+    planted = (GHOSTS[0], Shape(core.numbers, 1))
+    shown = views(planted, angles=FEW)
+    kept = lit([found(one) for one in planted], shown)
     assert len(kept) == 2
     assert misfit(kept, shown) < 1.2
 

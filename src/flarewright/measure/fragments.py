@@ -112,7 +112,7 @@ def _as_one(
     larger = fitted(np.zeros_like(core.numbers), apart)
     two = _cost(larger, apart)
     explained = _cost(larger, patches) - two
-    if not brightens(best, as_one) or _cost(best, patches) - two > _LOST * explained:
+    if _cost(best, patches) - two > _LOST * explained or not brightens(best, as_one):
         return None
     return replace(both, shapes=(best, best, best))
 

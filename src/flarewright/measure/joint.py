@@ -106,23 +106,25 @@ def _needed(matrix: Floats, side: Floats, pictures: Sequence[_Picture], least: f
     and C their part of the inverse matrix.
     """
     kept = np.arange(side.size // _TERMS.size)
+    adds = np.zeros(side.size)
+    for one in pictures:
+        adds[one.columns] += one.light
     while kept.size:
         at = _columns(kept)
         inverse = np.linalg.inv(matrix[np.ix_(at, at)])
         values = inverse @ side[at]
         everything = np.zeros(side.size)
         everything[at] = values
-        rests, light = np.zeros(side.size // _TERMS.size), np.zeros(side.size // _TERMS.size)
+        rests = np.zeros(side.size // _TERMS.size)
         for one in pictures:
             missed = one.pixels - one.basis @ everything[one.columns]
             rests[one.ghosts] += (one.weight * missed**2) @ one.there
-            light[one.ghosts] += (one.light * everything[one.columns]).reshape(-1, _TERMS.size).sum(axis=1)
         gains = np.empty(kept.size)
         for n, k in enumerate(kept):
             own = slice(_TERMS.size * n, _TERMS.size * (n + 1))
             grown = float(values[own] @ np.linalg.solve(inverse[own, own], values[own]))
             # a ghost that darkens is none: what its rims let through counts, not what its law says of the whole pupil
-            gains[n] = grown / max(grown + rests[k], 1e-300) if light[k] > 0.0 else -1.0
+            gains[n] = grown / max(grown + rests[k], 1e-300) if adds[at][own] @ values[own] > 0.0 else -1.0
         worst = int(np.argmin(gains))
         if gains[worst] >= least:
             break

@@ -108,15 +108,14 @@ def pursue(
     ]
     rest = rest_of(known, shown, 1)
     found: list[Found] = []
-    # and how many ghosts were known then
+    # each with how many ghosts were known when it was
     refused: list[tuple[Candidate, int]] = []
     waiting = list(first)
     steps = journal or Journal()
     fallen = _Fallen(progress)
     while len(found) < most:
         votes = steps.step(partial(_candidates, shown, rest, masks, 12 + len(refused), iris, pool))
-        likely = [each for each in votes if each.score > SCORE]
-        trials = _open(likely, refused, len(found) // 2 - _SOON) or _open(likely, refused, len(found) - 1)
+        trials = _open([each for each in votes if each.score > SCORE], refused, len(found))
         fallen(trials[0].score if trials else SCORE, len(found))
         taken = 0
         trials, waiting = [*waiting[:4], *trials], waiting[4:]
@@ -144,12 +143,17 @@ def pursue(
 
 
 def _open(votes: Sequence[Candidate], refused: Sequence[tuple[Candidate, int]], known: int) -> list[Candidate]:
-    """Return candidates that were not refused, or when no more ghosts than `known` were known.
+    """Return the candidates to try while so many ghosts are known.
 
-    Beside ghosts that are not known yet one explains little of what is in its windows, and runs off to their light.
+    Beside ghosts that are not known yet one explains little of what is in its windows, and runs off to their light. So
+    one that was refused waits until many more are known; where nothing else is left, until any more are.
     """
-    barred = [one for one, then in refused if then > known]
-    return [each for each in votes if not any(_same(each, other) for other in barred)]
+    for latest in (known // 2 - _SOON, known - 1):
+        barred = [one for one, then in refused if then > latest]
+        trials = [each for each in votes if not any(_same(each, other) for other in barred)]
+        if trials:
+            return trials
+    return []
 
 
 class _Fallen:
