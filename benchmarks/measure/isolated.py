@@ -21,9 +21,10 @@ from numpy.typing import NDArray
 from synthetic_camera import Pose, Setup, ghost_layers, poses, project_of, scale_of
 
 from flarewright.kernels.measure_pupil import FIRST_DISC, FIRST_I
-from flarewright.measure.fit import Fit, Shape, free_numbers, patches_of, refine, render
+from flarewright.measure.fit import Fit, Shape, free_numbers, parted, patches_of, refine, render
 from flarewright.measure.grow import Growth, grow
 from flarewright.measure.numbers import field, frame
+from flarewright.measure.orders import can_go
 from flarewright.measure.pursuit import pursue
 from flarewright.measure.settle import kinds_of
 from flarewright.measure.views import View
@@ -44,6 +45,8 @@ _LEAST_VIEWS = 8
 # every so many constellations tell which ghosts are the brightest
 _GLANCE = 8
 _ROUNDS = 200
+# by which a ghost may be described
+NUMBERS = 27
 
 
 def brightest(setup: Setup) -> list[str]:
@@ -153,15 +156,26 @@ def _alone(views: list[View], iris: Blades | None) -> tuple[dict[str, Any], Shap
 
 
 def _fitted(start: Shape, views: list[View]) -> Fit | None:
-    """Fit a ghost as far as 27 numbers go, until noise hides every step."""
+    """Fit a ghost as far as `NUMBERS` go, until noise hides every step."""
     grown = grow(start, views, 1, most=Growth(order=2, discs=1))
     if grown is None:
         return None
-    patches = patches_of(grown.shape, views, 1)
-    free = free_numbers(2, grown.shape.discs, 1, True)
-    # a rim costs three numbers, and 25 are taken: its centre moves evenly with the field
+    shape, width = parted(grown.shape), views[0].size_px[0]
+    patches = patches_of(shape, views, 1)
+    if not patches:
+        return None
+    # a rim's centre moves evenly with the field
+    free = free_numbers(2, shape.discs, 2, True, True)
     free = free[free != FIRST_DISC + 1]
-    return refine(grown.shape, patches, free, width=views[0].size_px[0], steps=30, error=0.0) if patches else None
+    fit = refine(shape, patches, free, width=width, steps=20, error=0.0)
+    while free.size > NUMBERS:
+        # of what may go, what is least sure to be there
+        may_go = free[can_go(free)]
+        least = may_go[np.argmin(np.abs(fit.shape.numbers[may_go]) / np.maximum(fit.uncertainty[may_go], 1e-300))]
+        free, numbers = free[free != least], fit.shape.numbers.copy()
+        numbers[least] = 0.0
+        fit = refine(replace(fit.shape, numbers=numbers), patches, free, width=width, steps=8, error=0.0)
+    return refine(fit.shape, patches, free, width=width, steps=20, error=0.0)
 
 
 def _against_walch(
@@ -216,7 +230,7 @@ def _colours(wanted: Floats, level: float) -> tuple[Floats, Floats]:
 
 def summary(rows: list[dict[str, Any]]) -> dict[str, Any]:
     """Return the table's rows of many ghosts."""
-    good = [row for row in rows if row["gain dB"] is not None and row["gain dB"] >= 10.0 and row["numbers"] <= 27]
+    good = [row for row in rows if row["gain dB"] is not None and row["gain dB"] >= 10.0 and row["numbers"] <= NUMBERS]
 
     def median(key: str) -> float | None:
         told = [row[key] for row in rows if key in row]

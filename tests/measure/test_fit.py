@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from planted_run import GHOSTS, LARGEST, NOISE, SIZE, shape, views
 
-from flarewright.kernels.measure_pupil import SOFT
+from flarewright.kernels.measure_pupil import LATERAL, SOFT
 from flarewright.measure import pursuit
 from flarewright.measure.compress import compress
 from flarewright.measure.find import Candidate, candidates, slopes_of
-from flarewright.measure.fit import Shape, free_numbers, patches_of, presence, refine, render
+from flarewright.measure.fit import Shape, free_numbers, parted, patches_of, presence, refine, render
 from flarewright.measure.found import Found
 from flarewright.measure.grow import Growth
 from flarewright.measure.numbers import channel_numbers, channel_of
@@ -118,6 +118,43 @@ def test_softness_comes_back_within_its_uncertainty_and_through_a_model(variance
     # sharp borders cannot stand in for soft ones
     sharp = refine(GHOSTS[0], patches_of(planted, shown, 1), free[:-1], width=SIZE[0], steps=30, error=0.0)
     assert sharp.cost > 2.0 * fit.cost
+
+
+def test_lateral_colour_comes_back_within_its_uncertainty_and_through_a_model():
+    numbers = GHOSTS[0].numbers.copy()
+    numbers[SOFT], numbers[LATERAL:] = 0.3, (4.0, -1.0)
+    planted = Shape(numbers)
+    shown = views((planted,), angles=FEW)
+    patches = patches_of(planted, shown, 1)
+    soft = free_numbers(1, 0, 1, True)
+    free = np.append(soft, [LATERAL, LATERAL + 1])
+    fits = []
+    # both signs are one ghost, so either is found
+    for sign in (1.0, -1.0):
+        start = numbers.copy()
+        start[SOFT], start[LATERAL:] = 1.0, (1.0, sign)
+        fits.append(refine(Shape(start), patches, free, width=SIZE[0], steps=40, offset=False, error=0.0))
+    for fit in fits:
+        turned = fit.shape.numbers.copy()
+        turned[LATERAL:] *= np.sign(turned[LATERAL])
+        assert np.abs((turned - numbers)[free] / fit.uncertainty[free]).max() < 4.0
+        assert fit.cost / fit.count == pytest.approx(1.0, abs=0.03)
+        assert fit.uncertainty[LATERAL:].max() < 0.3
+    written = channel_of(fits[0].shape.numbers, 0, fits[0].uncertainty)
+    assert len(written.uncertainty) == 33
+    assert channel_numbers(written, None) == pytest.approx(fits[0].shape.numbers)
+    # borders that are as soft all around cannot stand in for it
+    even = refine(Shape(numbers * (np.arange(numbers.size) < LATERAL)), patches, soft, width=SIZE[0], error=0.0)
+    assert even.cost > 1.5 * fits[0].cost
+
+
+def test_wavelengths_part_before_a_search_for_how_far():
+    numbers = GHOSTS[0].numbers.copy()
+    numbers[SOFT] = 0.5
+    apart = parted(Shape(numbers))
+    assert apart.numbers[SOFT] == 0.25
+    assert (apart.numbers[LATERAL:] == 0.5).all()
+    assert np.array_equal(parted(apart).numbers, apart.numbers)
 
 
 def test_replay_equals_the_fit_at_captured_angles():

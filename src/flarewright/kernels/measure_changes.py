@@ -8,6 +8,7 @@ import numpy as np
 
 from ._jit import compiled, inner
 from .measure_edges import add_edge_changes
+from .measure_lateral import beyond, draw_rim_changes, draw_rims, shifts_of, wavelengths_of
 from .measure_mesh import (
     area_of,
     cell_areas,
@@ -21,7 +22,7 @@ from .measure_mesh import (
     soften_mesh,
     steadied,
 )
-from .measure_pupil import DISC_NUMBERS, FIRST_DISC, FIRST_G, FIRST_I, SOFT, TERMS, monomials, place, slopes
+from .measure_pupil import FIRST_DISC, FIRST_G, FIRST_I, SOFT, TERMS, monomials, place, pupil_change, slopes
 from .measure_soft import add_spreading
 
 
@@ -37,7 +38,7 @@ def _spot_changes(parameters, sigma, free, frame, pupil, pupil_by, spots_by):
             _, _, a_xi, a_eta, c_xi, c_eta = place(parameters, xi, eta, sigma)
             for q in range(free.size):
                 n = free[q]
-                if n == SOFT:
+                if n >= SOFT:
                     along, across = 0.0, 0.0
                 elif n < FIRST_G:
                     along, across = sigma * terms[n], 0.0
@@ -46,20 +47,10 @@ def _spot_changes(parameters, sigma, free, frame, pupil, pupil_by, spots_by):
                 elif n < FIRST_DISC:
                     along, across = 0.0, 0.0
                 else:
-                    dxi, deta = _pupil_change(n, sigma, pupil_by, i, j)
+                    dxi, deta = pupil_change(n, sigma, pupil_by, i, j)
                     along, across = a_xi * dxi + a_eta * deta, c_xi * dxi + c_eta * deta
                 spots_by[i, j, 0, q] = frame[4] * (frame[2] * along - frame[3] * across)
                 spots_by[i, j, 1, q] = -frame[4] * (frame[3] * along + frame[2] * across)
-
-
-@inner
-def _pupil_change(n, sigma, pupil_by, i, j):
-    """Return how a pupil point moves with parameter n of a disc."""
-    disc, which = (n - FIRST_DISC) // DISC_NUMBERS + 1, (n - FIRST_DISC) % DISC_NUMBERS
-    if which == 2:
-        return pupil_by[i, j, 0, 2 * disc + 1], pupil_by[i, j, 1, 2 * disc + 1]
-    by = sigma if which == 0 else sigma * sigma * sigma
-    return by * pupil_by[i, j, 0, 2 * disc], by * pupil_by[i, j, 1, 2 * disc]
 
 
 @inner
@@ -93,14 +84,14 @@ def _add_triangle(
     monomials(u, v, w, terms)
     for q in range(free.size):
         n = free[q]
-        if n < FIRST_I or n == SOFT:
+        if n < FIRST_I or n >= SOFT:
             continue
         if n < FIRST_DISC:
             flux_by[q] += terms[n - FIRST_I] * part
             continue
-        dax, day = _pupil_change(n, sigma, pupil_by, ia, ja)
-        dbx, dby = _pupil_change(n, sigma, pupil_by, ib, jb)
-        dcx, dcy = _pupil_change(n, sigma, pupil_by, ic, jc)
+        dax, day = pupil_change(n, sigma, pupil_by, ia, ja)
+        dbx, dby = pupil_change(n, sigma, pupil_by, ib, jb)
+        dcx, dcy = pupil_change(n, sigma, pupil_by, ic, jc)
         grown = 0.5 * (
             (dbx - dax) * (pcy - pay) + (pbx - pax) * (dcy - day) - (dcx - dax) * (pby - pay)
             - (pcx - pax) * (dby - day)
@@ -142,8 +133,8 @@ def _density_changes(parameters, sigma, free, pupil, pupil_by, spots, spots_by, 
 
 
 @inner
-def _draw_changes(spots, spots_by, densities, changes, span, left, top, width, height, out):
-    """Draw every edge's derivatives once."""
+def _draw_changes(spots, spots_by, densities, changes, span, rim, left, top, width, height, out):
+    """Draw every edge's derivatives once; without `rim` the outline's are left out."""
     rings, spokes = densities.shape[0], densities.shape[1]
     count = changes.shape[3]
     step, sweep = np.empty(count), np.empty((2, count))
@@ -163,13 +154,14 @@ def _draw_changes(spots, spots_by, densities, changes, span, left, top, width, h
                     ax, ay, bx, by, densities[i, j, 0] - densities[i, before, half], step, spots_by[i, j],
                     spots_by[i + 1, j], left, top, width, height, sweep, out,
                 )  # fmt: skip
-            outer = densities[i + 1, j, 1] if i + 1 < rings else 0.0
-            for q in range(count):
-                step[q] = changes[i, j, 0, q] - (changes[i + 1, j, 1, q] if i + 1 < rings else 0.0)
-            add_edge_changes(
-                bx, by, cx, cy, densities[i, j, 0] - outer, step, spots_by[i + 1, j], spots_by[i + 1, k], left, top,
-                width, height, sweep, out,
-            )  # fmt: skip
+            if rim or i + 1 < rings:
+                outer = densities[i + 1, j, 1] if i + 1 < rings else 0.0
+                for q in range(count):
+                    step[q] = changes[i, j, 0, q] - (changes[i + 1, j, 1, q] if i + 1 < rings else 0.0)
+                add_edge_changes(
+                    bx, by, cx, cy, densities[i, j, 0] - outer, step, spots_by[i + 1, j], spots_by[i + 1, k], left, top,
+                    width, height, sweep, out,
+                )  # fmt: skip
             if i > 0 and span == 0:
                 for q in range(count):
                     step[q] = changes[i, j, 1, q] - changes[i, j, 0, q]
@@ -225,15 +217,25 @@ def draw_with_changes(parameters, disc_count, sigma, free, frame, left, top, pla
     if span > 0:
         join(spots, span, densities)
     densities *= scale
-    draw_mesh(spots, densities, span, True, True, left, top, width, height, plane)
+    shifts = np.empty((spokes, 2))
+    far = shifts_of(parameters, sigma, frame, pupil, shifts)
+    band = wavelengths_of(far)
+    draw_mesh(spots, densities, span, True, far == 0.0, left, top, width, height, plane)
+    if far > 0.0:
+        draw_rims(spots, shifts, band, densities, left, top, width, height, plane)
     variance = parameters[SOFT] * scale
     if variance > 0.0:
-        soften_mesh(plane.reshape((height, width + 1, 1)), variance, spots, left, top)
+        soften_mesh(plane.reshape((height, width + 1, 1)), variance, spots, beyond(far), left, top)
     if not derive:
         return
-    _draw_changes(spots, spots_by, densities, changes, span, left, top, width, height, out)
+    _draw_changes(spots, spots_by, densities, changes, span, far == 0.0, left, top, width, height, out)
+    if far > 0.0:
+        draw_rim_changes(
+            parameters, sigma, free, frame, pupil, pupil_by, spots, spots_by, shifts, band, densities, changes, span,
+            left, top, width, height, out,
+        )  # fmt: skip
     if variance > 0.0:
-        soften_mesh(out, variance, spots, left, top)
+        soften_mesh(out, variance, spots, beyond(far), left, top)
     for q in range(free.size):
         if free[q] == SOFT:
             add_spreading(plane, scale, out[:, :, q])

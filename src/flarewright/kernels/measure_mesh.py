@@ -12,6 +12,7 @@ import numpy as np
 
 from ._jit import compiled, inner
 from .measure_edges import add_edge
+from .measure_lateral import beyond, draw_rims, shifts_of, wavelengths_of
 from .measure_pupil import (
     BLADES,
     FIRST_G,
@@ -267,11 +268,15 @@ def _least_radius(spots):
 
 
 @inner
-def _draw_soft_rim(spots, densities, variance, width, height, plane):
-    """Draw an outline many times, moved outwards and inwards by whole pixels, by the weights of its spread."""
+def _draw_soft_rim(spots, densities, variance, shifts, far, width, height, plane):
+    """Draw an outline many times, moved outwards and inwards, by the weights of its spread.
+
+    Where it is softest by whole pixels; `shifts` and `far` as `measure_lateral.shifts_of` fills and returns them.
+    """
     rings, spokes = densities.shape[0], densities.shape[1]
-    taps = np.empty(reach_of(variance) + 1)
-    taps_of(variance, taps)
+    most = variance + far * far
+    taps = np.empty(reach_of(most) + 1)
+    taps_of(most, taps)
     # the unit normals of the sides, and of each corner the way that moves both of its sides by one
     sides, away = np.empty((spokes, 2)), np.empty((spokes, 2))
     turn = 0.0
@@ -287,6 +292,9 @@ def _draw_soft_rim(spots, densities, variance, width, height, plane):
         before = j - 1 if j > 0 else spokes - 1
         x, y = sides[j, 0] + sides[before, 0], sides[j, 1] + sides[before, 1]
         stretch = 2.0 / max(x * x + y * y, 1.0)
+        if far > 0.0:
+            outwards = (x * shifts[j, 0] + y * shifts[j, 1]) ** 2 / max(x * x + y * y, 1.0)
+            stretch *= sqrt(min((variance + outwards) / most, 1.0))
         away[j, 0], away[j, 1] = stretch * x, stretch * y
     # what is too faint to be drawn is shared by the others: the steps shall add up to the whole
     last = 0
@@ -400,21 +408,26 @@ def draw_ghosts(parameters, disc_counts, visible, sigma, frame, plane):
         # the model's irradiance is per pixel of the model: a finer picture keeps it
         densities *= visible[g] * frame[4] * frame[4]
         variance = parameters[g, SOFT] * frame[4] * frame[4]
-        if not variance > 0.0:
+        shifts = np.empty((spokes, 2))
+        far = shifts_of(parameters[g], sigma, frame, pupil, shifts)
+        if not (variance > 0.0 or far > 0.0):
             draw_mesh(spots, densities, span, False, True, 0, 0, width, height, plane)
             continue
-        if span > 0 and _least_radius(spots) > _WIDE * sqrt(variance):
+        if span > 0 and _least_radius(spots) > _WIDE * sqrt(variance + far * far):
             # without folds, and wide: only the outline's step is steep enough to be seen spread
             draw_mesh(spots, densities, span, False, False, 0, 0, width, height, plane)
-            _draw_soft_rim(spots, densities, variance, width, height, plane)
+            _draw_soft_rim(spots, densities, variance, shifts, far, width, height, plane)
             continue
         # spread alone, and then laid over the others
-        left, top, w, h = _box(spots, reach_of(variance), width, height)
+        left, top, w, h = _box(spots, reach_of(variance) + beyond(far), width, height)
         if w == 0:
             continue
         own = np.zeros((h, w + 1))
-        draw_mesh(spots, densities, span, False, True, left, top, w, h, own)
-        soften_mesh(own.reshape((h, w + 1, 1)), variance, spots, left, top)
+        draw_mesh(spots, densities, span, False, far == 0.0, left, top, w, h, own)
+        if far > 0.0:
+            draw_rims(spots, shifts, wavelengths_of(far), densities, left, top, w, h, own)
+        if variance > 0.0:
+            soften_mesh(own.reshape((h, w + 1, 1)), variance, spots, beyond(far), left, top)
         for y in range(h):
             for c in range(w):
                 plane[top + y, left + c] += own[y, c]
@@ -445,7 +458,8 @@ def window_of(parameters, disc_count, sigma, frame, width, height):
     if not fill_mesh(parameters, disc_count, sigma, frame, spokes, rings, False, pupil, np.empty((0, 0, 0, 0))):
         return 0, 0, 0, 0
     land(parameters, pupil, sigma, frame, spots)
-    return _box(spots, reach_of(parameters[SOFT] * frame[4] * frame[4]), width, height)
+    far = shifts_of(parameters, sigma, frame, pupil, np.empty((spokes, 2)))
+    return _box(spots, reach_of(parameters[SOFT] * frame[4] * frame[4]) + beyond(far), width, height)
 
 
 @inner
@@ -472,13 +486,13 @@ def _box(spots, reach, width, height):
 
 
 @inner
-def soften_mesh(differences, variance, spots, left, top):
-    """Spread a mesh that was drawn into a window, in place."""
+def soften_mesh(differences, variance, spots, around, left, top):
+    """Spread a mesh that was drawn into a window, and `around` pixels beyond where it lands, in place."""
     taps = np.empty(reach_of(variance) + 1)
     taps_of(variance, taps)
     x0, y0, x1, y1 = _bounds(spots)
     far = 1 << 20
     soften(
-        differences, taps, int(floor(max(x0, -far))) - left - 1, int(floor(max(y0, -far))) - top - 1,
-        int(ceil(min(x1, far))) - left + 2, int(ceil(min(y1, far))) - top + 2,
+        differences, taps, int(floor(max(x0, -far))) - left - 1 - around, int(floor(max(y0, -far))) - top - 1 - around,
+        int(ceil(min(x1, far))) - left + 2 + around, int(ceil(min(y1, far))) - top + 2 + around,
     )  # fmt: skip

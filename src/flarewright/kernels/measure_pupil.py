@@ -15,15 +15,16 @@ from .measure_iris import ends, nearest_side, side_and_disc, side_corner
 
 # monomials of u = p.p, v = p.s, w = s.s up to second order: of f, of g and of the intensity
 TERMS = 10
-# parameters: f, g, intensity, then three a disc: centre by s, centre by s (s.s), radius; last the blades of the iris,
-# 0 for a round one, the direction of a side's normal in the picture, radians counterclockwise from the right, and the
-# variance by which the light is spread, pixels of the model squared
+# parameters: f, g, intensity, then three a disc: centre by s, centre by s (s.s), radius; the blades of the iris, 0 for a
+# round one, the direction of a side's normal in the picture, radians counterclockwise from the right, the variance by
+# which the light is spread, pixels of the model squared, and f' and g' of lateral colour (`measure_lateral`)
 FIRST_G, FIRST_I, FIRST_DISC = TERMS, 2 * TERMS, 3 * TERMS
 DISC_NUMBERS = 3
 MOST_DISCS = 4
 BLADES = FIRST_DISC + DISC_NUMBERS * MOST_DISCS
 TURN = BLADES + 1
 SOFT = TURN + 1
+LATERAL = SOFT + 1
 
 
 @inner
@@ -219,6 +220,16 @@ def _snap(discs, spokes, blades, turn, active, middle, points, by):
         at = j if away < pi / spokes else after
         points[at, 0], points[at, 1] = spot[0], spot[1]
         by[at] = change
+
+
+@inner
+def pupil_change(n, sigma, pupil_by, i, j):
+    """Return how a pupil point moves with parameter n of a disc."""
+    disc, which = (n - FIRST_DISC) // DISC_NUMBERS + 1, (n - FIRST_DISC) % DISC_NUMBERS
+    if which == 2:
+        return pupil_by[i, j, 0, 2 * disc + 1], pupil_by[i, j, 1, 2 * disc + 1]
+    by = sigma if which == 0 else sigma * sigma * sigma
+    return by * pupil_by[i, j, 0, 2 * disc], by * pupil_by[i, j, 1, 2 * disc]
 
 
 @inner

@@ -15,7 +15,7 @@ from ..kernels.measure_edges import sum_along_rows
 from ..kernels.measure_mesh import window_of
 from ..kernels.measure_misfit import weigh_misfit
 from ..kernels.measure_normal import normal_equations
-from ..kernels.measure_pupil import DISC_NUMBERS, FIRST_DISC, FIRST_G, FIRST_I, SOFT
+from ..kernels.measure_pupil import DISC_NUMBERS, FIRST_DISC, FIRST_G, FIRST_I, LATERAL, SOFT
 from .normal import inverse, solution
 from .numbers import NUMBERS, Floats
 from .room import Room
@@ -33,6 +33,8 @@ MODEL_ERROR = 0.03
 OUTLIER = 4.0
 # what softness is usual, part of the picture's width
 _SOFTNESS = 0.005
+# by which wavelengths of a colour may shift a ghost and make it larger, part of its size
+_PART = np.array([1.0, 0.25])
 # pixels that miss a model alike: noise is every pixel's own, what cannot be drawn is not
 _ALIKE = 64.0
 _NONE = np.zeros(0, np.int64)
@@ -46,7 +48,7 @@ class Shape:
 
     Attributes
     ----------
-    numbers : ndarray, shape (45,)
+    numbers : ndarray, shape (47,)
         See `kernels.measure_pupil`.
     discs : int
     """
@@ -83,7 +85,7 @@ class Fit:
 
     @property
     def uncertainty(self) -> Floats:
-        """Standard deviation of all 45 numbers; 0 for those that were not fitted."""
+        """Standard deviation of all 47 numbers; 0 for those that were not fitted."""
         deviation = np.zeros(NUMBERS)
         # pixels that the model misses by more than noise make all numbers less certain
         excess = max(self.doubt, self.cost / max(self.count - self.free.size, 1))
@@ -103,7 +105,9 @@ class Patch:
     weight: Floats
 
 
-def free_numbers(order: int, discs: int, intensity_order: int, soft: bool = False) -> Indices:
+def free_numbers(
+    order: int, discs: int, intensity_order: int, soft: bool = False, lateral: bool = False
+) -> Indices:
     """Return which numbers to fit.
 
     Parameters
@@ -115,12 +119,15 @@ def free_numbers(order: int, discs: int, intensity_order: int, soft: bool = Fals
         0: even; 1: first order in u, v, w; 2: all.
     soft : bool
         Also how soft the borders are.
+    lateral : bool
+        And how far the channel's wavelengths part.
     """
     geometry = {0: (0, 3), 1: (0, 1, 2, 3), 2: tuple(range(10))}[order]
     light = {0: (0,), 1: (0, 1, 2, 3), 2: tuple(range(10))}[intensity_order]
     picked = [*geometry, *(FIRST_G + k for k in geometry), *(FIRST_I + k for k in light)]
     picked += [FIRST_DISC + k for k in range(DISC_NUMBERS * discs)]
     picked += [SOFT] if soft else []
+    picked += [LATERAL, LATERAL + 1] if lateral else []
     return np.array(picked, dtype=np.int64)
 
 
@@ -276,6 +283,7 @@ def priors(shape: Shape, free: Indices, width: int) -> Floats:
     spread[FIRST_I] *= 20.0
     spread[FIRST_DISC:] = 3.0
     spread[SOFT] = (_SOFTNESS * width) ** 2
+    spread[LATERAL:] = _SOFTNESS * width
     return np.asarray(1.0 / spread[free] ** 2)
 
 
@@ -428,7 +436,7 @@ class _Search:
         if self.alike:
             count = sum(one.count for one in at.missed) - self.free.size
             # where a rim may lie nobody knows beforehand
-            known = (self.free < FIRST_DISC) | (self.free == SOFT)
+            known = (self.free < FIRST_DISC) | (self.free >= SOFT)
             prior[known] *= witness(sum(one.cost for one in at.missed), count)
         return self.weighed(at.shape, prior, at.missed)
 
@@ -458,6 +466,21 @@ def stepped(shape: Shape, free: Indices, step: Floats) -> Shape:
         numbers[at] = max(numbers[at], 0.05)
     # softer than half as wide as it is, a ghost would be a blot
     numbers[SOFT] = min(max(numbers[SOFT], 0.0), 0.25 * numbers[FIRST_G] ** 2)
+    # and what grows much by colour would add light
+    wide = np.abs(numbers[FIRST_G]) * _PART
+    numbers[LATERAL:] = np.clip(numbers[LATERAL:], -wide, wide)
+    return replace(shape, numbers=numbers)
+
+
+def parted(shape: Shape) -> Shape:
+    """Return a shape whose wavelengths part by half of what its borders are soft.
+
+    Wavelengths that part one way look as those that part the other way: from where they do not, no search would begin.
+    """
+    numbers = shape.numbers.copy()
+    if not numbers[LATERAL:].any():
+        numbers[SOFT] *= 0.5
+        numbers[LATERAL:] = np.sqrt(numbers[SOFT])
     return replace(shape, numbers=numbers)
 
 

@@ -9,10 +9,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..kernels.measure_pupil import DISC_NUMBERS, FIRST_DISC, FIRST_G, FIRST_I, MOST_DISCS
-from .fit import MODEL_ERROR, Fit, Patch, Shape, cost_of, free_numbers, improve, patches_of, refine
+from .fit import MODEL_ERROR, Fit, Patch, Shape, cost_of, free_numbers, improve, parted, patches_of, refine
 from .views import View
 
-# part of the cost by which a rim, or a higher order, must lower it to stay
+# part of the cost by which a rim, or a higher order, or lateral colour, must lower it to stay
 RIM_PAYS = 0.02
 ORDER_PAYS = 0.02
 # where the search for a rim begins: its centre over s, and how far it bites into the first rim at the largest field
@@ -31,7 +31,7 @@ class Growth:
     error : float
         Part of the light that the model may miss.
     soft : bool
-        Whether borders may be soft, once place and size are known.
+        Whether borders may be soft, once place and size are known, and by lateral colour softer on one side.
     alike : bool
         See `fit.refine`.
     """
@@ -71,11 +71,13 @@ def grow(
     """
     width = views[0].size_px[0]
 
-    def polish(start: Shape, order: int, light: int, steps: int) -> tuple[Fit, list[Patch]] | None:
+    def polish(
+        start: Shape, order: int, light: int, steps: int, lateral: bool = False
+    ) -> tuple[Fit, list[Patch]] | None:
         patches = patches_of(start, views, channel)
         if not patches:
             return None
-        free = free_numbers(order, start.discs, light, most.soft and order > 0)
+        free = free_numbers(order, start.discs, light, most.soft and order > 0, lateral)
         fit = refine(start, patches, free, width=width, steps=steps, error=most.error, alike=most.alike, pool=pool)
         return fit, patches
 
@@ -92,15 +94,20 @@ def grow(
                 continue
         if order >= most.order:
             break
-        order += 1
-        higher = polish(fit.shape, order, min(order, most.intensity_order), 10)
+        higher = polish(fit.shape, order + 1, min(order + 1, most.intensity_order), 10)
         if higher is None:
             break
         before = cost_of(fit.shape, higher[1], error=most.error)
-        if order == 2 and higher[0].cost > (1.0 - ORDER_PAYS) * before:
+        if order == 1 and higher[0].cost > (1.0 - ORDER_PAYS) * before:
             break
-        found = higher
-    return None if found is None else found[0]
+        found, order = higher, order + 1
+    if found is None or not most.soft:
+        return None if found is None else found[0]
+    fit = found[0]
+    apart = polish(parted(fit.shape), order, min(order, most.intensity_order), 10, lateral=True)
+    if apart is not None and apart[0].cost < (1.0 - ORDER_PAYS) * cost_of(fit.shape, apart[1], error=most.error):
+        return apart[0]
+    return fit
 
 
 def _with_rim(

@@ -8,22 +8,23 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernels.measure_pupil import BLADES, DISC_NUMBERS, FIRST_DISC, FIRST_G, FIRST_I, SOFT, TURN
+from ..kernels.measure_pupil import BLADES, DISC_NUMBERS, FIRST_DISC, FIRST_G, FIRST_I, LATERAL, SOFT, TURN
 from ..model.ghost_model import AberrationGhost, BezierGhost, Blades, Channel, Disc, Ten
 
 Floats = NDArray[np.float64]
 
-NUMBERS = SOFT + 1
+NUMBERS = LATERAL + 2
 
 
 def channel_numbers(channel: Channel, blades: Blades | None) -> Floats:
-    """Return the numbers of one colour of a ghost, shape (45,), discs and blades that are not there 0."""
+    """Return the numbers of one colour of a ghost, shape (47,), discs and blades that are not there 0."""
     numbers = np.zeros(NUMBERS)
     numbers[:FIRST_G], numbers[FIRST_G:FIRST_I], numbers[FIRST_I:FIRST_DISC] = channel.f, channel.g, channel.intensity
     for k, disc in enumerate(channel.discs):
         at = FIRST_DISC + DISC_NUMBERS * k
         numbers[at : at + DISC_NUMBERS] = *disc.centre, disc.radius
     numbers[SOFT] = channel.soft_px**2
+    numbers[LATERAL:] = channel.lateral_px
     return with_blades(numbers, blades)
 
 
@@ -36,7 +37,7 @@ def with_blades(numbers: Floats, blades: Blades | None) -> Floats:
 
 
 def blades_of(numbers: Floats) -> Blades | None:
-    """Return the blades that numbers, shape (45,), tell of."""
+    """Return the blades that numbers, shape (47,), tell of."""
     if not numbers[BLADES]:
         return None
     return Blades(count=int(numbers[BLADES]), first_deg=round(float(np.degrees(numbers[TURN])), 6))
@@ -47,10 +48,10 @@ def channel_of(numbers: Floats, discs: int, uncertainty: Floats | None = None) -
 
     Parameters
     ----------
-    numbers : ndarray, shape (45,)
+    numbers : ndarray, shape (47,)
     discs : int
         How many of its discs are there.
-    uncertainty : ndarray, shape (45,), or None
+    uncertainty : ndarray, shape (47,), or None
     """
     end = FIRST_DISC + DISC_NUMBERS * discs
     ten = [cast(Ten, tuple(map(float, numbers[at : at + FIRST_G]))) for at in (0, FIRST_G, FIRST_I)]
@@ -60,10 +61,11 @@ def channel_of(numbers: Floats, discs: int, uncertainty: Floats | None = None) -
     if uncertainty is not None and uncertainty[SOFT] > 0.0:
         # of a root; of one that is 0, as large as would be seen
         told += (float(uncertainty[SOFT] / (2.0 * max(soft, np.sqrt(uncertainty[SOFT])))),)
+        told += tuple(map(float, uncertainty[LATERAL:])) if uncertainty[LATERAL:].any() else ()
     return Channel(
         f=ten[0], g=ten[1], intensity=ten[2],
         discs=tuple(Disc(centre=(float(cut[0]), float(cut[1])), radius=float(cut[2])) for cut in cuts),
-        soft_px=soft, uncertainty=told,
+        soft_px=soft, lateral_px=(float(numbers[LATERAL]), float(numbers[LATERAL + 1])), uncertainty=told,
     )  # fmt: skip
 
 

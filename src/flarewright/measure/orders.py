@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..kernels.measure_pupil import DISC_NUMBERS, FIRST_DISC, FIRST_G, FIRST_I
+from ..kernels.measure_pupil import DISC_NUMBERS, FIRST_DISC, FIRST_G, FIRST_I, LATERAL, SOFT
 from .fit import Indices, Patch, Shape, equations, misfit, priors
 from .numbers import Floats
 from .smooth import alike
@@ -71,7 +71,8 @@ def can_go(free: Indices) -> list[int]:
     kept = {0, FIRST_G, FIRST_I}
     return [
         k for k, number in enumerate(free)
-        if number not in kept and (number < FIRST_DISC or (number - FIRST_DISC) % DISC_NUMBERS == 1)
+        if number not in kept
+        and (number < FIRST_DISC or number >= LATERAL or (number < SOFT and (number - FIRST_DISC) % DISC_NUMBERS == 1))
     ]  # fmt: skip
 
 

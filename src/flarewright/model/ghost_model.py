@@ -48,11 +48,13 @@ class Channel(Frozen):
         Radiance times pixels per area of the pupil; below 0 counts as 0.
     discs : tuple of Disc
     soft_px : float
-        Standard deviation of the Gaussian that spreads its light, pixels: borders are soft, for the light has a size
-        and every wavelength draws the ghost in its own.
+        Standard deviation of the Gaussian that spreads its light, pixels: borders are soft, for the light has a size.
+    lateral_px : tuple of float
+        By how much f and g grow with one standard deviation of the wavelengths that the colour is made of, pixels: each
+        draws the ghost at its own place and in its own size. The same with both signs turned.
     uncertainty : tuple of float
-        Standard deviation of f, g, intensity and each disc's three numbers, in this order, and of soft_px where that
-        was fitted; 0 for numbers that were not fitted. Empty: unknown.
+        Standard deviation of f, g, intensity and each disc's three numbers, in this order, of soft_px where that was
+        fitted, and then of lateral_px where that was; 0 for numbers that were not fitted. Empty: unknown.
     """
 
     f: Ten
@@ -60,13 +62,16 @@ class Channel(Frozen):
     intensity: Ten
     discs: tuple[Disc, ...] = Field((), max_length=4)
     soft_px: float = Field(0.0, ge=0.0, le=1000.0)
+    lateral_px: tuple[float, float] = (0.0, 0.0)
     uncertainty: tuple[float, ...] = ()
 
     @model_validator(mode="after")
     def _count(self) -> Channel:
         numbers = 30 + 3 * len(self.discs)
-        if len(self.uncertainty) not in (0, numbers, numbers + 1):
-            raise ValueError(f"uncertainty needs {numbers} numbers, one more with that of soft_px, or none")
+        if len(self.uncertainty) not in (0, numbers, numbers + 1, numbers + 3):
+            raise ValueError(
+                f"uncertainty needs {numbers} numbers, one more with that of soft_px, three with lateral_px's, or none"
+            )
         return self
 
 

@@ -1,0 +1,134 @@
+"""Lateral colour within a channel: a ghost's rim, as each of the channel's wavelengths draws it.
+
+A channel is a band of wavelengths, and each draws the ghost at its own place and in its own size. A pupil point p that
+lands at X for the band's middle lands at X + t D for a wavelength t standard deviations away, D = s f' + p g': by two
+numbers a rim is sharp on one side of the ghost and soft on the other. Within the ghost what moves in from one side
+moves out on the other, so the rim alone is drawn anew for each t, and what lies between the rim and where it moves to
+belongs to the cell beside it. In folds nothing is spread by colour.
+"""
+
+from math import ceil, exp, sqrt
+
+import numpy as np
+
+from ._jit import inner
+from .measure_edges import add_edge, add_edge_changes
+from .measure_pupil import FIRST_DISC, LATERAL, SOFT, pupil_change
+
+# the band is taken for a Gaussian: so many standard deviations to either side, in steps of so many pixels, few at most
+_ENDS, _STEP, _FEWEST, _MOST = 2.2, 0.8, 3, 15
+
+
+@inner
+def shifts_of(parameters, sigma, frame, pupil, shifts):
+    """Fill how far the rim moves with one standard deviation, pixels, (spokes, 2); return the farthest."""
+    f, g = parameters[LATERAL], parameters[LATERAL + 1]
+    shifts[:] = 0.0
+    if f == 0.0 and g == 0.0:
+        return 0.0
+    last, far = pupil.shape[0] - 1, 0.0
+    for j in range(shifts.shape[0]):
+        along, across = sigma * f + pupil[last, j, 0] * g, pupil[last, j, 1] * g
+        shifts[j, 0] = frame[4] * (frame[2] * along - frame[3] * across)
+        shifts[j, 1] = -frame[4] * (frame[3] * along + frame[2] * across)
+        far = max(far, along * along + across * across)
+    return frame[4] * sqrt(far)
+
+
+@inner
+def beyond(far):
+    """Return how many pixels farther a rim is drawn than where it lands for the band's middle."""
+    return int(ceil(1.2 * _ENDS * far)) if far > 0.0 else 0
+
+
+@inner
+def wavelengths_of(far):
+    """Return places in the band, standard deviations, and the light at each, shape (K, 2): together 1, variance 1."""
+    count = min(max(int(ceil(2.0 * _ENDS * far / _STEP)) + 1, _FEWEST), _MOST)
+    found = np.empty((count, 2))
+    total, square = 0.0, 0.0
+    for k in range(count):
+        t = _ENDS * (2.0 * k / (count - 1.0) - 1.0)
+        found[k, 0], found[k, 1] = t, exp(-0.5 * t * t)
+        total += found[k, 1]
+        square += found[k, 1] * t * t
+    found[:, 0] /= sqrt(square / total)
+    found[:, 1] /= total
+    return found
+
+
+@inner
+def draw_rims(spots, shifts, band, densities, left, top, width, height, plane):
+    """Draw a mesh's outline at every wavelength of a band."""
+    rings, spokes = densities.shape[0], densities.shape[1]
+    for n in range(band.shape[0]):
+        t, part = band[n, 0], band[n, 1]
+        for j in range(spokes):
+            k = j + 1 if j + 1 < spokes else 0
+            before = j - 1 if j > 0 else spokes - 1
+            x, y = spots[rings, j, 0] + t * shifts[j, 0], spots[rings, j, 1] + t * shifts[j, 1]
+            add_edge(
+                x, y, spots[rings, k, 0] + t * shifts[k, 0], spots[rings, k, 1] + t * shifts[k, 1],
+                part * densities[rings - 1, j, 0], left, top, width, height, plane,
+            )  # fmt: skip
+            # the border between two cells goes on to where the outline is now
+            step = part * (densities[rings - 1, j, 0] - densities[rings - 1, before, 0])
+            add_edge(spots[rings, j, 0], spots[rings, j, 1], x, y, step, left, top, width, height, plane)
+
+
+@inner
+def _shift_changes(parameters, sigma, free, frame, pupil, pupil_by, shifts_by):
+    """Fill the derivatives of `shifts_of`, (spokes, 2, Q), by the free parameters."""
+    last, g = pupil.shape[0] - 1, parameters[LATERAL + 1]
+    for j in range(shifts_by.shape[0]):
+        for q in range(free.size):
+            n = free[q]
+            along, across = 0.0, 0.0
+            if n == LATERAL:
+                along = sigma
+            elif n == LATERAL + 1:
+                along, across = pupil[last, j, 0], pupil[last, j, 1]
+            elif FIRST_DISC <= n < SOFT:
+                dxi, deta = pupil_change(n, sigma, pupil_by, last, j)
+                along, across = g * dxi, g * deta
+            shifts_by[j, 0, q] = frame[4] * (frame[2] * along - frame[3] * across)
+            shifts_by[j, 1, q] = -frame[4] * (frame[3] * along + frame[2] * across)
+
+
+@inner
+def draw_rim_changes(
+    parameters, sigma, free, frame, pupil, pupil_by, spots, spots_by, shifts, band, densities, changes, span, left, top,
+    width, height, out,
+):  # fmt: skip
+    """Draw the derivatives of `draw_rims` once."""
+    rings, spokes, count = densities.shape[0], densities.shape[1], free.size
+    shifts_by = np.empty((spokes, 2, count))
+    _shift_changes(parameters, sigma, free, frame, pupil, pupil_by, shifts_by)
+    moved, moved_by = np.empty((spokes, 2)), np.empty((spokes, 2, count))
+    step, sweep = np.empty(count), np.empty((2, count))
+    for n in range(band.shape[0]):
+        t, part = band[n, 0], band[n, 1]
+        for j in range(spokes):
+            for m in range(2):
+                moved[j, m] = spots[rings, j, m] + t * shifts[j, m]
+                for q in range(count):
+                    moved_by[j, m, q] = spots_by[rings, j, m, q] + t * shifts_by[j, m, q]
+        for j in range(spokes):
+            k = j + 1 if j + 1 < spokes else 0
+            before = j - 1 if j > 0 else spokes - 1
+            for q in range(count):
+                step[q] = part * changes[rings - 1, j, 0, q]
+            add_edge_changes(
+                moved[j, 0], moved[j, 1], moved[k, 0], moved[k, 1], part * densities[rings - 1, j, 0], step,
+                moved_by[j], moved_by[k], left, top, width, height, sweep, out,
+            )  # fmt: skip
+            # nothing changes inside a cell
+            if span > 0 and j % span != 0:
+                continue
+            for q in range(count):
+                step[q] = part * (changes[rings - 1, j, 0, q] - changes[rings - 1, before, 0, q])
+            light = part * (densities[rings - 1, j, 0] - densities[rings - 1, before, 0])
+            add_edge_changes(
+                spots[rings, j, 0], spots[rings, j, 1], moved[j, 0], moved[j, 1], light, step, spots_by[rings, j],
+                moved_by[j], left, top, width, height, sweep, out,
+            )  # fmt: skip
