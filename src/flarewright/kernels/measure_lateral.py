@@ -59,7 +59,7 @@ def wavelengths_of(far):
 
 @inner
 def draw_rims(spots, shifts, band, densities, left, top, width, height, plane):
-    """Draw a mesh's outline at every wavelength of a band."""
+    """Draw a mesh's outline at every wavelength of a band; or moved by other shifts, so often, with so much light."""
     rings, spokes = densities.shape[0], densities.shape[1]
     for n in range(band.shape[0]):
         t, part = band[n, 0], band[n, 1]

@@ -302,22 +302,10 @@ def _draw_soft_rim(spots, densities, variance, shifts, far, width, height, plane
     while last + 1 < taps.size and taps[last + 1] >= _FAINT:
         last += 1
         total += 2.0 * taps[last]
+    moves = np.empty((2 * last + 1, 2))
     for n in range(-last, last + 1):
-        weight = taps[abs(n)] / total
-        for j in range(spokes):
-            k = j + 1 if j + 1 < spokes else 0
-            before = j - 1 if j > 0 else spokes - 1
-            x, y = spots[rings, j, 0] + n * away[j, 0], spots[rings, j, 1] + n * away[j, 1]
-            add_edge(
-                x, y, spots[rings, k, 0] + n * away[k, 0], spots[rings, k, 1] + n * away[k, 1],
-                weight * densities[rings - 1, j, 0], 0, 0, width, height, plane,
-            )  # fmt: skip
-            # the border between two cells goes on to where the outline is now
-            step = densities[rings - 1, j, 0] - densities[rings - 1, before, 0]
-            if step != 0.0 and n != 0:
-                add_edge(
-                    spots[rings, j, 0], spots[rings, j, 1], x, y, weight * step, 0, 0, width, height, plane
-                )  # fmt: skip
+        moves[n + last, 0], moves[n + last, 1] = n, taps[abs(n)] / total
+    draw_rims(spots, away, moves, densities, 0, 0, width, height, plane)
 
 
 @inner

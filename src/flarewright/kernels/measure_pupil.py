@@ -15,9 +15,9 @@ from .measure_iris import ends, nearest_side, side_and_disc, side_corner
 
 # monomials of u = p.p, v = p.s, w = s.s up to second order: of f, of g and of the intensity
 TERMS = 10
-# parameters: f, g, intensity, then three a disc: centre by s, centre by s (s.s), radius; the blades of the iris, 0 for a
-# round one, the direction of a side's normal in the picture, radians counterclockwise from the right, the variance by
-# which the light is spread, pixels of the model squared, and f' and g' of lateral colour (`measure_lateral`)
+# parameters: f, g, intensity, then three a disc: centre by s, centre by s (s.s), radius; the blades of the iris, 0 for
+# a round one; the direction of a side's normal in the picture, radians counterclockwise from the right; the variance by
+# which the light is spread, pixels of the model squared; and f' and g' of lateral colour (`measure_lateral`)
 FIRST_G, FIRST_I, FIRST_DISC = TERMS, 2 * TERMS, 3 * TERMS
 DISC_NUMBERS = 3
 MOST_DISCS = 4

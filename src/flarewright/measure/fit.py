@@ -105,9 +105,7 @@ class Patch:
     weight: Floats
 
 
-def free_numbers(
-    order: int, discs: int, intensity_order: int, soft: bool = False, lateral: bool = False
-) -> Indices:
+def free_numbers(order: int, discs: int, intensity_order: int, soft: bool = False, lateral: bool = False) -> Indices:
     """Return which numbers to fit.
 
     Parameters
