@@ -58,9 +58,10 @@ def channel_of(numbers: Floats, discs: int, uncertainty: Floats | None = None) -
     cuts = numbers[FIRST_DISC:end].reshape(discs, DISC_NUMBERS)
     soft = float(np.sqrt(max(numbers[SOFT], 0.0)))
     told = () if uncertainty is None else tuple(map(float, uncertainty[:end]))
-    if uncertainty is not None and uncertainty[SOFT] > 0.0:
+    if uncertainty is not None and uncertainty[SOFT:].any():
         # of a root; of one that is 0, as large as would be seen
-        told += (float(uncertainty[SOFT] / (2.0 * max(soft, np.sqrt(uncertainty[SOFT])))),)
+        most = max(soft, float(np.sqrt(uncertainty[SOFT])), 1e-300)
+        told += (float(uncertainty[SOFT]) / (2.0 * most),)
         told += tuple(map(float, uncertainty[LATERAL:])) if uncertainty[LATERAL:].any() else ()
     return Channel(
         f=ten[0], g=ten[1], intensity=ten[2],
