@@ -157,7 +157,7 @@ def _alone(views: list[View], iris: Blades | None) -> tuple[dict[str, Any], Shap
 
 def _fitted(start: Shape, views: list[View]) -> Fit | None:
     """Fit a ghost as far as `NUMBERS` go, until noise hides every step."""
-    grown = grow(start, views, 1, most=Growth(order=2, discs=1))
+    grown = grow(start, views, 1, most=Growth(order=2, discs=1, lateral=True))
     if grown is None:
         return None
     shape, width = parted(grown.shape), views[0].size_px[0]

@@ -12,7 +12,7 @@ from flarewright.measure.compress import compress
 from flarewright.measure.find import Candidate, candidates, slopes_of
 from flarewright.measure.fit import Shape, free_numbers, parted, patches_of, presence, refine, render
 from flarewright.measure.found import Found
-from flarewright.measure.grow import Growth
+from flarewright.measure.grow import Growth, grow
 from flarewright.measure.numbers import channel_numbers, channel_of
 from flarewright.measure.pursuit import pursue
 from flarewright.measure.replay import replay
@@ -146,6 +146,24 @@ def test_lateral_colour_comes_back_within_its_uncertainty_and_through_a_model():
     # borders that are as soft all around cannot stand in for it
     even = refine(Shape(numbers * (np.arange(numbers.size) < LATERAL)), patches, soft, width=SIZE[0], error=0.0)
     assert even.cost > 1.5 * fits[0].cost
+
+
+def test_wavelengths_part_where_that_pays_and_where_one_asks():
+    numbers = GHOSTS[0].numbers.copy()
+    numbers[SOFT], numbers[LATERAL:] = 0.3, (4.0, -1.0)
+    shown = views((Shape(numbers),), angles=FEW)
+    rough = Shape(GHOSTS[0].numbers)
+    plain, apart = (grow(rough, shown, 1, most=Growth(discs=0, lateral=asked)) for asked in (False, True))
+    assert plain is not None
+    assert apart is not None
+    assert not plain.shape.numbers[LATERAL:].any()
+    assert apart.cost < 0.9 * plain.cost
+    assert np.abs(apart.shape.numbers[LATERAL:]) == pytest.approx([4.0, 1.0], abs=0.8)
+    # a ghost that is as soft all around keeps its numbers
+    numbers[LATERAL:] = 0.0
+    even = grow(rough, views((Shape(numbers),), angles=FEW), 1, most=Growth(discs=0, lateral=True))
+    assert even is not None
+    assert not even.shape.numbers[LATERAL:].any()
 
 
 def test_wavelengths_part_before_a_search_for_how_far():

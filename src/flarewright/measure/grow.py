@@ -31,7 +31,9 @@ class Growth:
     error : float
         Part of the light that the model may miss.
     soft : bool
-        Whether borders may be soft, once place and size are known, and by lateral colour softer on one side.
+        Whether borders may be soft, once place and size are known.
+    lateral : bool
+        Whether the channel's wavelengths may part at last, so that borders are softer on one side.
     alike : bool
         See `fit.refine`.
     """
@@ -41,6 +43,7 @@ class Growth:
     discs: int = 2
     error: float = MODEL_ERROR
     soft: bool = True
+    lateral: bool = False
     alike: bool = True
 
 
@@ -101,7 +104,7 @@ def grow(
         if order == 1 and higher[0].cost > (1.0 - ORDER_PAYS) * before:
             break
         found, order = higher, order + 1
-    if found is None or not most.soft:
+    if found is None or not most.lateral:
         return None if found is None else found[0]
     fit = found[0]
     apart = polish(parted(fit.shape), order, min(order, most.intensity_order), 10, lateral=True)
