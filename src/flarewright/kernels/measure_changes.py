@@ -22,7 +22,7 @@ from .measure_mesh import (
     soften_mesh,
     steadied,
 )
-from .measure_pupil import FIRST_DISC, FIRST_G, FIRST_I, SOFT, TERMS, monomials, place, pupil_change, slopes
+from .measure_pupil import FIRST_DISC, FIRST_G, FIRST_I, SOFT, TERMS, monomials, place, pupil_change, slopes, turned
 from .measure_soft import add_spreading
 
 
@@ -49,8 +49,7 @@ def _spot_changes(parameters, sigma, free, frame, pupil, pupil_by, spots_by):
                 else:
                     dxi, deta = pupil_change(n, sigma, pupil_by, i, j)
                     along, across = a_xi * dxi + a_eta * deta, c_xi * dxi + c_eta * deta
-                spots_by[i, j, 0, q] = frame[4] * (frame[2] * along - frame[3] * across)
-                spots_by[i, j, 1, q] = -frame[4] * (frame[3] * along + frame[2] * across)
+                spots_by[i, j, 0, q], spots_by[i, j, 1, q] = turned(frame, along, across)
 
 
 @inner

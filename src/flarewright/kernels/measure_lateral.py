@@ -13,7 +13,7 @@ import numpy as np
 
 from ._jit import inner
 from .measure_edges import add_edge, add_edge_changes
-from .measure_pupil import FIRST_DISC, LATERAL, SOFT, pupil_change
+from .measure_pupil import FIRST_DISC, LATERAL, SOFT, pupil_change, turned
 
 # the band is taken for a Gaussian: so many standard deviations to either side, in steps of so many pixels, few at most
 _ENDS, _STEP, _FEWEST, _MOST = 2.2, 0.8, 3, 15
@@ -29,8 +29,7 @@ def shifts_of(parameters, sigma, frame, pupil, shifts):
     last, far = pupil.shape[0] - 1, 0.0
     for j in range(shifts.shape[0]):
         along, across = sigma * f + pupil[last, j, 0] * g, pupil[last, j, 1] * g
-        shifts[j, 0] = frame[4] * (frame[2] * along - frame[3] * across)
-        shifts[j, 1] = -frame[4] * (frame[3] * along + frame[2] * across)
+        shifts[j, 0], shifts[j, 1] = turned(frame, along, across)
         far = max(far, along * along + across * across)
     return frame[4] * sqrt(far)
 
@@ -91,8 +90,7 @@ def _shift_changes(parameters, sigma, free, frame, pupil, pupil_by, shifts_by):
             elif FIRST_DISC <= n < SOFT:
                 dxi, deta = pupil_change(n, sigma, pupil_by, last, j)
                 along, across = g * dxi, g * deta
-            shifts_by[j, 0, q] = frame[4] * (frame[2] * along - frame[3] * across)
-            shifts_by[j, 1, q] = -frame[4] * (frame[3] * along + frame[2] * across)
+            shifts_by[j, 0, q], shifts_by[j, 1, q] = turned(frame, along, across)
 
 
 @inner

@@ -25,6 +25,7 @@ from .measure_pupil import (
     place,
     rims,
     slopes,
+    turned,
 )
 from .measure_soft import reach_of, soften, taps_of
 
@@ -104,9 +105,8 @@ def land(parameters, pupil, sigma, frame, spots):
             u, v = xi * xi + eta * eta, xi * sigma
             spread = level(g, u, v)
             along, across = sigma * level(f, u, v) + xi * spread, eta * spread
-            # rows count downwards
-            spots[i, j, 0] = frame[0] + frame[4] * (frame[2] * along - frame[3] * across)
-            spots[i, j, 1] = frame[1] - frame[4] * (frame[3] * along + frame[2] * across)
+            x, y = turned(frame, along, across)
+            spots[i, j, 0], spots[i, j, 1] = frame[0] + x, frame[1] + y
 
 
 @inner

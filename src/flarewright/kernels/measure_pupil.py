@@ -223,6 +223,15 @@ def _snap(discs, spokes, blades, turn, active, middle, points, by):
 
 
 @inner
+def turned(frame, along, across):
+    """Return a step along s and across it as columns and rows of the picture; rows count downwards."""
+    return (
+        frame[4] * (frame[2] * along - frame[3] * across),
+        -frame[4] * (frame[3] * along + frame[2] * across),
+    )
+
+
+@inner
 def pupil_change(n, sigma, pupil_by, i, j):
     """Return how a pupil point moves with parameter n of a disc."""
     disc, which = (n - FIRST_DISC) // DISC_NUMBERS + 1, (n - FIRST_DISC) % DISC_NUMBERS

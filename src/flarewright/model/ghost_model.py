@@ -34,6 +34,9 @@ class Disc(Frozen):
     radius: float = Field(gt=0.0)
 
 
+Lateral = Annotated[float, Field(ge=-1000.0, le=1000.0)]
+
+
 class Channel(Frozen):
     """One colour of a ghost: where each point p of its pupil lands, and how bright it is.
 
@@ -62,7 +65,7 @@ class Channel(Frozen):
     intensity: Ten
     discs: tuple[Disc, ...] = Field((), max_length=4)
     soft_px: float = Field(0.0, ge=0.0, le=1000.0)
-    lateral_px: tuple[float, float] = (0.0, 0.0)
+    lateral_px: tuple[Lateral, Lateral] = (0.0, 0.0)
     uncertainty: tuple[float, ...] = ()
 
     @model_validator(mode="after")
