@@ -193,6 +193,53 @@ def test_an_unclipped_light_is_found_too_and_a_hot_pixel_is_none():
     assert found.rival_px is None
 
 
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_ghosts_that_go_along_with_the_light_do_not_draw_it_to_their_side(side: float):
+    """As bright as the star is where they begin, on one side of it alone; without them the middle is clipped."""
+    place = 50.37, 30.81
+    scene = star(place)
+    x, y = np.arange(96) + 0.5 - place[0], np.arange(64)[:, None] + 0.5 - place[1]
+    beside = np.hypot(side * x - 9.0, y) < 7.0
+    scene[beside] += scene[np.hypot(side * x - 9.0, y) < 0.8].mean()
+    variance = np.full(scene.shape, 1e-8, np.float32)
+    variance[np.hypot(x, y) < 3.0] = np.inf
+    found = find_light(scene.astype(np.float32), variance)
+    assert found.position_px == pytest.approx(place, abs=0.12)
+    assert np.hypot(*np.subtract(found.position_px, place)) < 4.0 * found.error_px
+
+
+def test_the_law_of_the_lights_place_has_as_many_powers_as_it_shows():
+    rng = np.random.default_rng(4)
+    nominal = np.arange(0.0, 30.0, 0.6)
+    true = nominal + 0.02 * rng.normal(size=nominal.size)
+    t = np.tan(np.radians(true))
+    for law in ((500.0,), (500.0, -90.0), (500.0, -90.0, 120.0)):
+        far = sum(each * t ** (2 * k + 1) for k, each in enumerate(law))
+        frames = [Seen(float(a), 0.0, (363.0 + x, 238.0), 0.02) for a, x in zip(nominal, far, strict=True)]
+        found = solve_geometry(frames, (720, 480))
+        assert len(found.law_px) == len(law)
+        assert found.px_per_rad == pytest.approx(500.0, rel=0.01)
+        assert found.jitter_deg == pytest.approx(0.02, rel=0.4)
+        angles = np.array([one.constellation_deg for one in found.placed])
+        # the turntable's own error, in common, stays
+        assert np.std(angles - true) < 0.4 * np.std(nominal - true)
+        assert [one.light_px[0] for one in found.placed] == pytest.approx(363.0 + far)
+
+
+def test_where_the_lights_image_leaves_its_law_the_turntable_is_believed():
+    """Rims that cut the light's own image move it; that is no jitter."""
+    rng = np.random.default_rng(5)
+    nominal = np.arange(0.0, 30.0, 0.6)
+    true = nominal + 0.02 * rng.normal(size=nominal.size)
+    far = 500.0 * np.tan(np.radians(true))
+    far[-4:] -= (2.0, 4.0, 6.0, 9.0)
+    frames = [Seen(float(a), 0.0, (363.0 + x, 238.0), 0.02) for a, x in zip(nominal, far, strict=True)]
+    angles = np.array([one.constellation_deg for one in solve_geometry(frames, (720, 480)).placed])
+    # half a degree and more where the light is believed
+    assert np.abs(angles - true)[-4:].max() < 0.15
+    assert np.std((angles - true)[:-4]) < 0.5 * np.std((nominal - true)[:-4])
+
+
 def test_upright_frames_are_turned_about_the_axis(tmp_path):
     def leaning(angle):
         x = light_px(angle)[0]

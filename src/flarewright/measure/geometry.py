@@ -1,8 +1,9 @@
 """From where the light was seen in each frame to the optical axis, the horizon's tilt and the true angles.
 
-With the camera turned by theta, the light is at `foot + u (f t + k t^3)`, t = tan(theta), where `u` is the direction
-of the turntable in the picture: f is the focal length in pixels and k the distortion. The foot is the axis, moved
-across the path when the camera nods (`symmetry` finds by how much). The jitter of the turntable is what remains.
+With the camera turned by theta, the light is at `foot + u (f t + k t^3 + l t^5)`, t = tan(theta), where `u` is the
+direction of the turntable in the picture: f is the focal length in pixels, k and l the distortion, as far as the light
+shows it. The foot is the axis, moved across the path when the camera nods (`symmetry` finds by how much). The jitter of
+the turntable is what remains.
 """
 
 from __future__ import annotations
@@ -27,8 +28,13 @@ _LEAST_CONTRAST = 20.0
 _WORST_PATH = 0.02
 # fewer distinct angles do not fix the distortion
 _FOR_DISTORTION = 8
-# and a distortion is believed when it is so many standard errors
+# and a power of it is believed when it is so many standard errors
 _SURE = 4.0
+# powers of t that the law may have
+_MOST_POWERS = 3
+# a light that lies by so many times the jitter from where the law says is half believed: there the law fails, as where
+# rims cut the light's own image
+_STRAYS = 4.0
 # nearer the axis than this the direction to the light says nothing
 _NEAR_PX = 8.0
 # how far the foot may lie beside the axis by nodding, and the axis beside the picture's middle, when nothing else
@@ -65,8 +71,8 @@ class Geometry:
     ----------
     axis_px, axis_error_px : tuple of float
     px_per_rad : float
-    cubic_px : float
-        The distortion k.
+    law_px : tuple of float
+        What t, t^3 and t^5 count in the light's distance from the axis.
     jitter_deg : float
         Spread of the turntable's angles about the nominal ones.
     placed : tuple of Placed
@@ -77,7 +83,7 @@ class Geometry:
     axis_px: tuple[float, float]
     axis_error_px: tuple[float, float]
     px_per_rad: float
-    cubic_px: float
+    law_px: tuple[float, ...]
     jitter_deg: float
     placed: tuple[Placed, ...]
     remarks: tuple[str, ...]
@@ -166,7 +172,7 @@ def solve_geometry(
     axis, error = _axis(paths, centre, size_px, across, remarks)
     placed = tuple(_place(one, paths.get(one.nominal_roll_deg), axis, next(iter(paths.values()))) for one in frames)
     largest = max(paths.values(), key=lambda path: path.count)
-    return Geometry(axis, error, largest.focal_px, largest.cubic_px, largest.jitter_deg, placed, tuple(remarks))
+    return Geometry(axis, error, largest.focal_px, largest.law_px, largest.jitter_deg, placed, tuple(remarks))
 
 
 @dataclass(frozen=True)
@@ -175,12 +181,15 @@ class _Path:
 
     foot: tuple[float, float]
     direction: tuple[float, float]
-    focal_px: float
-    cubic_px: float
+    law_px: tuple[float, ...]
     jitter_deg: float
     residual_px: float
     count: int
     covariance: tuple[tuple[float, ...], ...]
+
+    @property
+    def focal_px(self) -> float:
+        return self.law_px[0]
 
     @property
     def foot_error(self) -> float:
@@ -189,7 +198,7 @@ class _Path:
 
     def error(self, t: float) -> float:
         """Return the standard error of the light's place along the path at t = tan(theta), jitter included."""
-        powers = np.array([1.0, t, t**3][: len(self.covariance)])
+        powers = np.array([1.0, *_powers(t, len(self.law_px))][: len(self.covariance)])
         jitter = radians(self.jitter_deg) * self.focal_px
         return sqrt(max(float(powers @ np.array(self.covariance) @ powers), 0.0) + jitter**2)
 
@@ -199,13 +208,14 @@ class _Path:
 
     def distance(self, t: float) -> float:
         """Return the distance along the path at t = tan(theta)."""
-        return self.focal_px * t + self.cubic_px * t**3
+        return float(np.dot(self.law_px, _powers(t, len(self.law_px))))
 
     def angle_deg(self, distance: float) -> float:
         """Return the angle at which the light stands so far from the axis, by Newton's method."""
         t = distance / self.focal_px
         for _ in range(20):
-            t -= (self.distance(t) - distance) / (self.focal_px + 3.0 * self.cubic_px * t * t)
+            slope = sum((2 * k + 1) * each * t ** (2 * k) for k, each in enumerate(self.law_px))
+            t -= (self.distance(t) - distance) / slope
         return degrees(atan(t))
 
 
@@ -220,15 +230,13 @@ def _fit_path(seen: Sequence[Seen]) -> _Path | None:
     roll = radians(seen[0].nominal_roll_deg)
     u = np.array([cos(roll), -sin(roll)])
     along, beside = lights @ u, lights @ np.array([-u[1], u[0]])
-    straight = np.stack([np.ones_like(t), t], axis=1)
-    fit, covariance, rest = _robust(straight, along)
-    cubic = 0.0
-    if distinct.size >= _FOR_DISTORTION:
-        bent = _robust(np.stack([np.ones_like(t), t, t**3], axis=1), along)
+    fit, covariance, rest = _robust(_by_powers(t, 1), along)
+    for count in range(2, _MOST_POWERS + 1 if distinct.size >= _FOR_DISTORTION else 2):
+        bent = _robust(_by_powers(t, count), along)
         # a distortion that the jitter explains would only spoil what is foretold beyond the picture
-        if abs(bent[0][2]) > _SURE * sqrt(bent[1][2, 2]):
-            (fit, covariance, rest), cubic = bent, float(bent[0][2])
-    side, _, rest_beside = _robust(straight, beside)
+        if abs(bent[0][count]) > _SURE * sqrt(bent[1][count, count]):
+            fit, covariance, rest = bent
+    side, _, rest_beside = _robust(_by_powers(t, 1), beside)
     # the turntable's direction in the picture, and the law along it: the tilt is small
     slope = hypot(fit[1], side[1])
     direction = (fit[1] * u + side[1] * np.array([-u[1], u[0]])) / slope
@@ -240,11 +248,24 @@ def _fit_path(seen: Sequence[Seen]) -> _Path | None:
             "the light moves against the angles: with positive angles it should go right in the upright picture; "
             "change the sign of constellation_deg, or set roll_deg to 180"
         )
-    jitter = sqrt(max(float(np.var(rest)) - float(np.mean([one.error_px**2 for one in seen])), 0.0))
+    # where the law fails there is no jitter
+    scatter = 1.4826 * float(np.median(np.abs(rest - np.median(rest))))
+    jitter = sqrt(max(scatter**2 - float(np.median([one.error_px**2 for one in seen])), 0.0))
+    law = (float(slope), *map(float, fit[2:]))
     return _Path(
-        (float(foot[0]), float(foot[1])), (float(direction[0]), float(direction[1])), float(slope), cubic,
+        (float(foot[0]), float(foot[1])), (float(direction[0]), float(direction[1])), law,
         degrees(jitter / slope), spread, len(seen), tuple(map(tuple, covariance.tolist())),
     )  # fmt: skip
+
+
+def _powers(t: float, count: int) -> list[float]:
+    """Return t, t^3, ..., so many."""
+    return [t ** (2 * k + 1) for k in range(count)]
+
+
+def _by_powers(t: Floats, count: int) -> Floats:
+    """Return the columns 1, t, t^3, ..., with so many powers."""
+    return np.stack([np.ones_like(t), *(t ** (2 * k + 1) for k in range(count))], axis=1)
 
 
 def _robust(A: Floats, y: Floats) -> tuple[Floats, Floats, Floats]:
@@ -316,7 +337,8 @@ def _place(one: Seen, path: _Path | None, axis: tuple[float, float], other: _Pat
     else:
         light = one.light_px
         seen = hypot(light[0] - axis[0], light[1] - axis[1])
-        distance = far + (seen - far) * table**2 / (table**2 + one.error_px**2)
+        believed = 1.0 / (1.0 + ((seen - far) / (_STRAYS * table)) ** 4)
+        distance = far + (seen - far) * believed * table**2 / (table**2 + one.error_px**2)
     direction = sign * (light[0] - axis[0]), sign * (light[1] - axis[1])
     if hypot(*direction) < _NEAR_PX:
         direction = u
@@ -343,7 +365,7 @@ def _without_path(
     placed = []
     for one in frames:
         roll = radians(one.nominal_roll_deg)
-        path = _Path(centre, (cos(roll), -sin(roll)), px_per_rad, 0.0, 0.0, 0.0, 0, ((error**2,),))
+        path = _Path(centre, (cos(roll), -sin(roll)), (px_per_rad,), 0.0, 0.0, 0, ((error**2,),))
         placed.append(_place(one, path, centre, path))
     told = "the light was seen at one angle only; the axis is taken to be the middle of the picture"
-    return Geometry(centre, (error, error), px_per_rad, 0.0, 0.0, tuple(placed), (told,))
+    return Geometry(centre, (error, error), px_per_rad, (px_per_rad,), 0.0, tuple(placed), (told,))

@@ -22,8 +22,12 @@ _RIVAL = 0.25
 _LEAST_AREA = 4
 # how far beyond the clipped area the star is compared with itself, pixels
 _RIM = 14
-# how much the star may differ from its turned self for other reasons than noise, as part
-_ASYMMETRY = 0.1
+# how much the star may differ from its turned self for other reasons than noise, as part of it
+_ASYMMETRY = 0.02
+# and how much ghosts beside it may add on one side, as a multiple of how uneven the outer half of what is compared is
+_STRAY = 2.0
+# pixels of a star do not differ from each other by chance: so many count as one. And no light is known better than this
+_COUNT_AS_ONE, _LEAST_ERROR = 16.0, 0.02
 
 
 @dataclass(frozen=True)
@@ -179,7 +183,11 @@ def _second(light: Floats) -> list[tuple[float, float]]:
 def _symmetric(
     light: Floats, variance: Floats, clipped: NDArray[np.bool_], start: tuple[float, float], reach: float
 ) -> tuple[tuple[float, float], float]:
-    """Find the point about which the neighbourhood is symmetric, by Gauss-Newton on logarithms; also its error."""
+    """Find the point about which the neighbourhood is symmetric, by Gauss-Newton on logarithms; also its error.
+
+    Ghosts that go along with the light lie on one side of it more than on the other, and fade into the star towards its
+    middle, for the star falls steeply. How uneven the light is farther out tells how far in it counts.
+    """
     height, width = light.shape
     pad = int(reach) + 6
     left, top = int(start[0]) - pad, int(start[1]) - pad
@@ -195,6 +203,7 @@ def _symmetric(
     dx, dy = (grid.ravel().astype(np.float64) for grid in np.meshgrid(span, span))
     half = (dx**2 + dy**2 <= reach**2) & ((dy > 0) | ((dy == 0) & (dx > 0)))
     dx, dy = dx[half], dy[half]
+    outer = dx**2 + dy**2 > 0.25 * reach**2
     unknown = (~known).astype(np.float64)
     centre = np.array([start[0] - left, start[1] - top])
     normal, scale = np.eye(2), 1.0
@@ -206,8 +215,11 @@ def _symmetric(
         if usable.sum() < 12:
             return start, reach
         e = (one[0] - other[0])[usable]
+        here, there = np.exp(one[0][usable]), np.exp(other[0][usable])
+        uneven = np.abs(here - there)[outer[usable]]
+        stray = _STRAY * float(np.median(uneven)) if uneven.size else 0.0
         J = np.stack([(one[1] - other[1])[usable], (one[2] - other[2])[usable]], axis=1)
-        sigma = np.sqrt((one[3] + other[3])[usable] + _ASYMMETRY**2)
+        sigma = np.sqrt((one[3] + other[3])[usable] + _ASYMMETRY**2 + stray**2 * (1.0 / here**2 + 1.0 / there**2))
         weight = 1.0 / sigma**2 / np.maximum(1.0, np.abs(e) / sigma / 2.0)
         normal = (J.T * weight) @ J
         step = -np.linalg.pinv(normal) @ (J.T * weight) @ e
@@ -219,9 +231,8 @@ def _symmetric(
     found = (float(centre[0]) + left, float(centre[1]) + top)
     if _apart(found, start) > reach:
         return start, reach
-    # neighbouring pixels of a star do not differ from each other by chance: a few count as one
-    error = 2.0 * scale * sqrt(0.5 * float(np.trace(np.linalg.pinv(normal))))
-    return found, max(error, 0.01)
+    error = scale * sqrt(_COUNT_AS_ONE * 0.5 * float(np.trace(np.linalg.pinv(normal))))
+    return found, max(error, _LEAST_ERROR)
 
 
 def _sampled(fields: tuple[Floats, ...], x: Floats, y: Floats) -> list[Floats]:

@@ -33,8 +33,8 @@ from .symmetry import axis_beside_path, reduced
 from .upright import make_upright
 
 FRAMES = "frames"
-# raise when the same photographs give other pixels
-_VERSION = 2
+# raise when the same photographs give other pixels, or another place of the light
+_VERSION = 3
 Progress = Callable[[float, str], None]
 
 # a light that a person points at is taken to be right within this, pixels
