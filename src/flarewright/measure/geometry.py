@@ -269,14 +269,16 @@ def _by_powers(t: Floats, count: int) -> Floats:
 
 
 def _robust(A: Floats, y: Floats) -> tuple[Floats, Floats, Floats]:
-    """Fit y = A x with Huber's weights; return x, its covariance, and the residuals."""
+    """Fit y = A x with Huber's weights, then Cauchy's, which let go of what lies far off; return x, its covariance, and
+    the residuals."""
     weight = np.ones(y.size)
     x = np.zeros(A.shape[1])
-    for _ in range(20):
+    for turn in range(40):
         x = np.linalg.pinv((A.T * weight) @ A) @ (A.T * weight) @ y
         rest = y - A @ x
         scale = max(1.4826 * float(np.median(np.abs(rest))), 1e-3)
-        weight = 1.0 / np.maximum(1.0, np.abs(rest) / (2.0 * scale))
+        far = np.abs(rest) / (2.0 * scale)
+        weight = 1.0 / (np.maximum(1.0, far) if turn < 20 else 1.0 + far**2)
     rest = y - A @ x
     freedom = max(y.size - A.shape[1], 1)
     covariance = np.linalg.pinv((A.T * weight) @ A) * float((weight * rest**2).sum()) / freedom
