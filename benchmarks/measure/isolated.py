@@ -22,7 +22,7 @@ from synthetic_camera import Pose, Setup, ghost_layers, poses, project_of, scale
 
 from flarewright.kernels.measure_pupil import FIRST_DISC, FIRST_I
 from flarewright.measure.fit import Fit, Shape, free_numbers, parted, patches_of, refine, render
-from flarewright.measure.grow import Growth, grow
+from flarewright.measure.grow import Growth, grow, spread_by_colour
 from flarewright.measure.numbers import field, frame
 from flarewright.measure.orders import can_go
 from flarewright.measure.pursuit import pursue
@@ -157,10 +157,10 @@ def _alone(views: list[View], iris: Blades | None) -> tuple[dict[str, Any], Shap
 
 def _fitted(start: Shape, views: list[View]) -> Fit | None:
     """Fit a ghost as far as `NUMBERS` go, until noise hides every step."""
-    grown = grow(start, views, 1, most=Growth(order=2, discs=1, lateral=True))
+    grown = grow(start, views, 1, most=Growth(order=2, discs=1))
     if grown is None:
         return None
-    shape, width = parted(grown.shape), views[0].size_px[0]
+    shape, width = parted(spread_by_colour(grown, views, 1).shape), views[0].size_px[0]
     patches = patches_of(shape, views, 1)
     if not patches:
         return None

@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 from planted_run import GHOSTS, LARGEST, NOISE, SIZE, shape, views
 
-from flarewright.kernels.measure_pupil import LATERAL, SOFT
+from flarewright.kernels.measure_mesh import parting_of
+from flarewright.kernels.measure_pupil import FIRST_I, LATERAL, SOFT
 from flarewright.measure import pursuit
 from flarewright.measure.compress import compress
 from flarewright.measure.find import Candidate, candidates, slopes_of
 from flarewright.measure.fit import Shape, free_numbers, parted, patches_of, presence, refine, render
 from flarewright.measure.found import Found
-from flarewright.measure.grow import Growth, grow
+from flarewright.measure.grow import Growth, grow, spread_by_colour
 from flarewright.measure.numbers import channel_numbers, channel_of
 from flarewright.measure.pursuit import pursue
 from flarewright.measure.replay import replay
@@ -153,17 +154,41 @@ def test_wavelengths_part_where_that_pays_and_where_one_asks():
     numbers[SOFT], numbers[LATERAL:] = 0.3, (4.0, -1.0)
     shown = views((Shape(numbers),), angles=FEW)
     rough = Shape(GHOSTS[0].numbers)
-    plain, apart = (grow(rough, shown, 1, most=Growth(discs=0, lateral=asked)) for asked in (False, True))
+    plain = grow(rough, shown, 1, most=Growth(discs=0))
     assert plain is not None
-    assert apart is not None
+    apart = spread_by_colour(plain, shown, 1)
     assert not plain.shape.numbers[LATERAL:].any()
     assert apart.cost < 0.9 * plain.cost
     assert np.abs(apart.shape.numbers[LATERAL:]) == pytest.approx([4.0, 1.0], abs=0.8)
     # a ghost that is as soft all around keeps its numbers
     numbers[LATERAL:] = 0.0
-    even = grow(rough, views((Shape(numbers),), angles=FEW), 1, most=Growth(discs=0, lateral=True))
+    shown = views((Shape(numbers),), angles=FEW)
+    even = grow(rough, shown, 1, most=Growth(discs=0))
     assert even is not None
-    assert not even.shape.numbers[LATERAL:].any()
+    assert spread_by_colour(even, shown, 1) is even
+
+
+def test_wavelengths_do_not_part_by_more_than_a_ghost_is_thick(monkeypatch):
+    """What is thinner than that is not drawn by its rim alone: images of the light, lines near a focus."""
+    numbers = GHOSTS[0].numbers.copy()
+    numbers[SOFT], numbers[LATERAL:] = 0.3, (4.0, -1.0)
+    frame = views((), angles=FEW)[-1].frame
+    far = parting_of(numbers, 0, 0.9, frame)
+    assert 0.05 < far < 0.4
+    twice = numbers.copy()
+    twice[LATERAL:] *= 2.0
+    assert parting_of(twice, 0, 0.9, frame) == pytest.approx(2.0 * far, rel=1e-6)
+    twice[LATERAL:] = 0.0
+    assert parting_of(twice, 0, 0.9, frame) == 0.0
+    thin = numbers.copy()
+    thin[:FIRST_I] *= 0.1
+    assert parting_of(thin, 0, 0.9, frame) > 5.0 * far
+    shown = views((Shape(numbers),), angles=FEW)
+    plain = grow(Shape(GHOSTS[0].numbers), shown, 1, most=Growth(discs=0))
+    assert plain is not None
+    assert spread_by_colour(plain, shown, 1) is not plain
+    monkeypatch.setattr("flarewright.measure.grow._FARTHEST", 0.5 * far)
+    assert spread_by_colour(plain, shown, 1) is plain
 
 
 def test_wavelengths_part_before_a_search_for_how_far():

@@ -450,6 +450,32 @@ def window_of(parameters, disc_count, sigma, frame, width, height):
     return _box(spots, reach_of(parameters[SOFT] * frame[4] * frame[4]) + beyond(far), width, height)
 
 
+@compiled
+def parting_of(parameters, disc_count, sigma, frame):
+    """Return how far a ghost's wavelengths part, as part of its least radius.
+
+    Parameters
+    ----------
+    parameters : ndarray, shape (N,)
+    disc_count : int
+    sigma : float
+    frame : ndarray, shape (5,)
+
+    Returns
+    -------
+    float
+        One standard deviation of the band; 0 for a ghost that is shut.
+    """
+    spokes, rings, _ = grain(parameters, disc_count, sigma, frame, True)
+    if spokes == 0:
+        return 0.0
+    pupil, spots = np.empty((rings + 1, spokes, 2)), np.empty((rings + 1, spokes, 2))
+    if not fill_mesh(parameters, disc_count, sigma, frame, spokes, rings, False, pupil, np.empty((0, 0, 0, 0))):
+        return 0.0
+    land(parameters, pupil, sigma, frame, spots)
+    return shifts_of(parameters, sigma, frame, pupil, np.empty((spokes, 2))) / max(_least_radius(spots), 1e-9)
+
+
 @inner
 def _bounds(spots):
     """Return the least and greatest x and y where a mesh lands."""

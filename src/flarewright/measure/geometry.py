@@ -269,8 +269,7 @@ def _by_powers(t: Floats, count: int) -> Floats:
 
 
 def _robust(A: Floats, y: Floats) -> tuple[Floats, Floats, Floats]:
-    """Fit y = A x with Huber's weights, then Cauchy's, which let go of what lies far off; return x, its covariance, and
-    the residuals."""
+    """Fit y = A x by Huber's weights, then by Cauchy's, which let go of what is far off; return x, covariance, rest."""
     weight = np.ones(y.size)
     x = np.zeros(A.shape[1])
     for turn in range(40):

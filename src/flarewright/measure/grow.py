@@ -1,4 +1,4 @@
-"""From a rough ghost to a full one: numbers are freed, and rims added, only as far as they pay."""
+"""From a rough ghost to a full one: numbers are freed, rims added and colours spread only as far as they pay."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..kernels.measure_pupil import DISC_NUMBERS, FIRST_DISC, FIRST_G, FIRST_I, MOST_DISCS
+from ..kernels.measure_mesh import parting_of
+from ..kernels.measure_pupil import DISC_NUMBERS, FIRST_DISC, FIRST_G, FIRST_I, LATERAL, MOST_DISCS, SOFT
 from .fit import MODEL_ERROR, Fit, Patch, Shape, cost_of, free_numbers, improve, parted, patches_of, refine
 from .views import View
 
@@ -18,6 +19,10 @@ ORDER_PAYS = 0.02
 # where the search for a rim begins: its centre over s, and how far it bites into the first rim at the largest field
 _CENTRES = (-2.4, -1.2, -0.6, 0.6, 1.2, 2.4)
 _BITES = (0.3, 0.9)
+# borders that are sharper, pixels, show no colours that part
+_SOFT = 0.5
+# how far wavelengths may part, one standard deviation over the least radius: of thinner ghosts more than the rim moves
+_FARTHEST = 0.4
 
 
 @dataclass(frozen=True)
@@ -32,8 +37,6 @@ class Growth:
         Part of the light that the model may miss.
     soft : bool
         Whether borders may be soft, once place and size are known.
-    lateral : bool
-        Whether the channel's wavelengths may part at last, so that borders are softer on one side.
     alike : bool
         See `fit.refine`.
     """
@@ -43,7 +46,6 @@ class Growth:
     discs: int = 2
     error: float = MODEL_ERROR
     soft: bool = True
-    lateral: bool = False
     alike: bool = True
 
 
@@ -74,13 +76,11 @@ def grow(
     """
     width = views[0].size_px[0]
 
-    def polish(
-        start: Shape, order: int, light: int, steps: int, lateral: bool = False
-    ) -> tuple[Fit, list[Patch]] | None:
+    def polish(start: Shape, order: int, light: int, steps: int) -> tuple[Fit, list[Patch]] | None:
         patches = patches_of(start, views, channel)
         if not patches:
             return None
-        free = free_numbers(order, start.discs, light, most.soft and order > 0, lateral)
+        free = free_numbers(order, start.discs, light, most.soft and order > 0)
         fit = refine(start, patches, free, width=width, steps=steps, error=most.error, alike=most.alike, pool=pool)
         return fit, patches
 
@@ -104,13 +104,47 @@ def grow(
         if order == 1 and higher[0].cost > (1.0 - ORDER_PAYS) * before:
             break
         found, order = higher, order + 1
-    if found is None or not most.lateral:
-        return None if found is None else found[0]
-    fit = found[0]
-    apart = polish(parted(fit.shape), order, min(order, most.intensity_order), 10, lateral=True)
-    if apart is not None and apart[0].cost < (1.0 - ORDER_PAYS) * cost_of(fit.shape, apart[1], error=most.error):
-        return apart[0]
-    return fit
+    return None if found is None else found[0]
+
+
+def spread_by_colour(
+    fit: Fit,
+    views: Sequence[View],
+    channel: int,
+    *,
+    most: Growth = Growth(),
+    pool: ThreadPoolExecutor | None = None,
+) -> Fit:
+    """Let the wavelengths of a ghost's channel part, if that pays and they stay within it: borders softer on one side.
+
+    Parameters
+    ----------
+    fit : Fit
+        From `grow`.
+    views : sequence of View
+        Their pixels hold this ghost alone, as far as it is known.
+    channel : int
+    most : Growth
+        `error` and `alike` count.
+    pool : executor, optional
+
+    Returns
+    -------
+    Fit
+        The one that was given, if it does not pay.
+    """
+    start = parted(fit.shape)
+    patches = patches_of(start, views, channel)
+    if fit.shape.numbers[SOFT] < _SOFT**2 or not patches:
+        return fit
+    free = np.union1d(fit.free, np.array([SOFT, LATERAL, LATERAL + 1]))
+    apart = refine(
+        start, patches, free, width=views[0].size_px[0], steps=10, error=most.error, alike=most.alike, pool=pool
+    )
+    shape = apart.shape
+    farthest = max(parting_of(shape.numbers, shape.discs, patch.sigma, patch.frame) for patch in patches)
+    pays = apart.cost < (1.0 - ORDER_PAYS) * cost_of(fit.shape, patches, error=most.error)
+    return apart if pays and farthest < _FARTHEST else fit
 
 
 def _with_rim(
