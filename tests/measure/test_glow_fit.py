@@ -40,6 +40,25 @@ def test_halo_is_what_stays_and_ghosts_are_not_in_it():
     assert np.abs(got / expected - 1.0).max() < 0.15
 
 
+def test_ghosts_that_go_along_with_the_light_are_in_neither_halo_nor_star():
+    """At both sides of it, along its line, at every constellation: neither a brighter halo nor a star of two spikes."""
+    some = []
+    for view in shown(star=False):
+        x, y = offsets(view.light_px, SIZE, 1.0)
+        beside = 1.5 * sum(np.hypot(x - side * far, y) < 14.0 for side in (-1.0, 1.0) for far in (22.0, 48.0, 80.0))
+        some.append(replace(view, pixels=(view.pixels + beside[..., None]).astype(np.float32)))
+    pixels = [view.pixels for view in some]
+    radius = np.array([12.0, 25.0, 60.0, 110.0])
+    expected, got = (halo_radiance(each, radius, 0.0 * radius) for each in (HALO, fit_halo(some, pixels)))
+    assert np.abs(got / expected - 1.0).max() < 0.15
+    assert fit_star(register(some, pixels)) is None
+    # nor does a view's strength take them in
+    masks = [np.ones(SIZE[::-1], bool) for _ in some]
+    halo, _ = followed(some, pixels, masks, HALO, None)
+    assert max(part for _, part in halo.strength) < 1.1
+    assert max(max(row[1:]) for row in [(0.0, *level) for _, level in halo.even]) < 0.05
+
+
 def test_star_has_its_spikes_direction_width_and_law():
     some = shown(star=True)
     found = fit_star(register(some, [view.pixels for view in some], 0.5))
@@ -102,7 +121,8 @@ def test_halo_star_and_veil_are_followed_over_the_constellations():
         noise = np.random.default_rng(k).normal(0.0, 0.02, light.shape)
         # an unknown ghost is not the halo's
         light[20:50, 60:90] += 3.0
-        some.append(view.showing((light + noise).astype(np.float32)))
+        noisy = np.full_like(view.variance, 0.02**2)
+        some.append(replace(view, pixels=(light + noise).astype(np.float32), variance=noisy))
     masks = [np.hypot(*offsets(view.light_px, SIZE, 1.0)) > 14.0 for view in some]
     halo, star = followed(some, [view.pixels for view in some], masks, HALO, STAR)
     for k, view in enumerate(some[1:-1], 1):

@@ -6,6 +6,7 @@ import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from statistics import NormalDist
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -21,10 +22,19 @@ LOW = 0.3
 # the halo's pictures are halved so often: noise would pull a low quantile down
 _HALVINGS = 2
 _RINGS = 20
+# there is no more halo than anything shows: the part of a ring that may be darker, the part of the views that may
+# be darker still, for rims shade the light in some, and how many places a ring must have
+_DARKER, _DARKER_VIEWS, _LEAST_PLACES = 0.02, 0.1, 12
+# by how many standard deviations noise makes that part darker
+_DARKER_NOISE = -NormalDist().inv_cdf(_DARKER)
+# so many places of a view must be brighter than noise for it to bound its glow
+_BRIGHT_PLACES = 50
 # directions in which the star is looked at, and by how much a ridge must outshine what lies between
 _DIRECTIONS = 1440
 _SPIKY = 1.25
 _MOST_SPIKES = 48
+# no iris makes fewer spikes: two are ghosts along the light's line. This part of them may be hidden
+_FEWEST_SPIKES, _HIDDEN = 4, 0.4
 # spikes are narrower than this, degrees; what is wider along a ring is ghosts
 _SPIKE_DEG = 7.0
 # an iris of more blades is round
@@ -106,7 +116,9 @@ def _register(views: Sequence[View], pixels: Sequence[Pixels], low: float, halvi
 
 
 def fit_halo(views: Sequence[View], pixels: Sequence[Pixels], low: float = LOW) -> Halo | None:
-    """Return the halo: the median of rings around the light in the registered quantile.
+    """Return the halo: the median of rings around the light in the registered quantile, as far as any place is as dark.
+
+    Ghosts that go along with the light are beside it at every constellation, but not all around it.
 
     Parameters
     ----------
@@ -121,6 +133,7 @@ def fit_halo(views: Sequence[View], pixels: Sequence[Pixels], low: float = LOW) 
     known = register(views, pixels, low, _HALVINGS)
     right, up = known.polar()
     radius = np.hypot(right, up)
+    rings = [_rings(view) for view in views]
     far, side = float(radius.max()), known.side
     middles, levels = [], []
     for inner, outer in pairwise(np.geomspace(side, far + side, _RINGS + 1)):
@@ -128,13 +141,46 @@ def fit_halo(views: Sequence[View], pixels: Sequence[Pixels], low: float = LOW) 
         ring = ring[np.isfinite(ring).all(axis=1)]
         if len(ring) >= 4:
             middles.append(float(np.sqrt(inner * outer)))
-            levels.append(np.median(ring, axis=0))
+            levels.append(np.minimum(np.median(ring, axis=0), _darkest(rings, inner, outer)))
     if len(middles) < 3 or not max(level.max() for level in levels) > 0.0:
         return None
     # the outermost ring's level holds to the corners
     middles.append(2.0 * far)
     levels.append(levels[-1])
     return Halo(radius_px=tuple(middles), radiance=tuple(_rgb(level) for level in levels))
+
+
+@dataclass(frozen=True)
+class _Ring:
+    """A view's pixels, halved, by how far they are from the light: radius (N,), light and its variance (N, 3)."""
+
+    radius: Floats
+    light: Pixels
+    variance: Pixels
+
+
+def _rings(view: View) -> _Ring:
+    """Return what was measured of a view, ghosts and all."""
+    light = halved(np.where(np.isfinite(view.variance), view.pixels, np.float32(np.nan)), _HALVINGS)
+    variance = halved(view.variance, _HALVINGS, variance=True)
+    side = 2**_HALVINGS
+    y, x = np.mgrid[: light.shape[0], : light.shape[1]]
+    radius = np.hypot(side * (x + 0.5) - view.light_px[0], side * (y + 0.5) - view.light_px[1])
+    known = np.isfinite(light).all(axis=2) & np.isfinite(variance).all(axis=2)
+    return _Ring(radius[known], light[known], variance[known])
+
+
+def _darkest(rings: Sequence[_Ring], inner: float, outer: float) -> Floats:
+    """Return the light of the darkest places so far from the light, of most views, shape (3,); noise is made good."""
+    found = []
+    for one in rings:
+        here = (one.radius >= inner) & (one.radius < outer)
+        if np.count_nonzero(here) >= _LEAST_PLACES:
+            noise = np.sqrt(np.median(one.variance[here], axis=0))
+            found.append(np.quantile(one.light[here], _DARKER, axis=0) + _DARKER_NOISE * noise)
+    if len(found) < 3:
+        return np.full(3, np.inf)
+    return np.maximum(np.quantile(np.array(found), _DARKER_VIEWS, axis=0), 0.0)
 
 
 def _rgb(level: NDArray[np.floating]) -> Rgb3:
@@ -181,6 +227,7 @@ def followed(
         spots = np.zeros(known.shape, bool)
         spots[::every, ::every] = known[::every, ::every]
         parts[k] = _strengths(shapes[spots], picture[spots].astype(float), view.variance[spots].astype(float))
+        parts[k] *= _bound(np.where(known, shapes @ parts[k], np.nan), view)
     padded = np.concatenate([parts[:1], parts, parts[-1:]])
     smooth = np.median(np.stack([padded[:-2], padded[1:-1], padded[2:]]), axis=0)
     told = [(view.constellation_deg, *map(float, row)) for view, row in zip(views, smooth, strict=True)]
@@ -190,6 +237,18 @@ def followed(
         }),
         None if star is None else star.model_copy(update={"strength": tuple((row[0], row[2]) for row in told)}),
     )  # fmt: skip
+
+
+def _bound(glow: Floats, view: View) -> float:
+    """Return by which factor glow, not a number where it is not asked, is dimmed to be no more than a view shows."""
+    light = halved(glow.astype(np.float32), _HALVINGS)
+    noise = np.sqrt(halved(view.variance, _HALVINGS, variance=True))
+    bright = light > 2.0 * noise
+    if np.count_nonzero(bright) < _BRIGHT_PLACES:
+        return 1.0
+    seen = halved(view.pixels, _HALVINGS)
+    parts = (seen[bright] + _DARKER_NOISE * noise[bright]) / light[bright]
+    return min(max(float(np.quantile(parts, _DARKER)), 0.0), 1.0)
 
 
 def _strengths(basis: Floats, seen: Floats, variance: Floats) -> Floats:
@@ -251,14 +310,15 @@ def _fit_star(known: Registered) -> Star | None:
     half = round(_SPIKE_DEG / 360.0 * _DIRECTIONS)
     wide = np.median(sliding_window_view(np.pad(shape, half, mode="wrap"), 2 * half + 1), axis=1)
     harmonics = np.fft.rfft(np.clip(shape - wide, 0.0, 1.0))
-    strength = np.abs(harmonics[2 : _MOST_SPIKES + 1])
+    strength = np.abs(harmonics[_FEWEST_SPIKES : _MOST_SPIKES + 1])
     # the comb's own number is the lowest of its harmonics
-    strong = np.flatnonzero(strength > 0.6 * strength.max()) + 2
+    strong = np.flatnonzero(strength > 0.6 * strength.max()) + _FEWEST_SPIKES
     spikes = int(strong[0])
     first = -float(np.angle(harmonics[spikes])) / spikes
     ridges = np.round((first + 2.0 * np.pi * np.arange(spikes) / spikes) / (2.0 * np.pi) * _DIRECTIONS).astype(int)
     near = (ridges[:, None] + np.arange(-2, 3)) % _DIRECTIONS
-    if np.median(shape[near].max(axis=1)) < _SPIKY:
+    standing = shape[near].max(axis=1) / np.maximum(wide[ridges % _DIRECTIONS], 1e-30)
+    if np.quantile(standing, _HIDDEN, method="lower") < _SPIKY:
         return None
     # a ridge's height over what lies between, and its width by the light across it
     height = np.nan_to_num(np.nanmedian(np.nanmax(ring[:, near], axis=2), axis=1) - np.nanmedian(ring, axis=1))

@@ -14,7 +14,7 @@ from ..model.ghost_model import AberrationGhost, Blades
 from .find import rims_of
 from .fit import Fit, Shape, free_numbers, improve, patches_of, presence, refine
 from .found import CHANNELS, Found, alone, by_light, exchange, rest_of
-from .grow import RIM_PAYS, Growth, grow, spread_by_colour
+from .grow import RIM_PAYS, Growth, grow
 from .joint import lit
 from .journal import Journal
 from .numbers import blades_of, channel_of, with_blades
@@ -34,14 +34,11 @@ class Settling:
         How often every ghost is fitted anew against the rest.
     most : Growth
         How far a ghost may grow.
-    lateral : bool
-        Whether at last the wavelengths of each colour may part.
     views : int
         Constellations that one fit looks at, at most.
     """
 
     rounds: int = 2
-    lateral: bool = False
     most: Growth = field(default_factory=lambda: Growth(order=2, discs=2))
     views: int = 32
 
@@ -94,14 +91,6 @@ def settle(
         before = len(ghosts)
         ghosts = lit(ghosts, views, pool=pool)
         tell(f"round {turn + 1}: {len(ghosts)} of {before} ghosts are needed")
-    if how.lateral:
-        rest = [rest_of(ghosts, views, m) for m in range(CHANNELS)]
-        for k in by_light(ghosts):
-            old = ghosts[k]
-            ghosts[k] = steps.step(partial(_spread, old, views, rest, how, pool))
-            for m in range(CHANNELS):
-                exchange(old.shapes[m], ghosts[k].shapes[m], old, views, rest[m])
-        ghosts = lit(ghosts, views, pool=pool)
     return [ghosts[k] for k in by_light(ghosts)]
 
 
@@ -127,19 +116,6 @@ def _again(
         fit = fits[m]
         if fit is not None:
             shapes[m] = fit.shape
-    return replace(ghost, shapes=(shapes[0], shapes[1], shapes[2]), fits=(fits[0], fits[1], fits[2]))
-
-
-def _spread(
-    ghost: Found, views: Sequence[View], rest: list[list[Pixels]], how: Settling, pool: ThreadPoolExecutor | None
-) -> Found:
-    """Let the wavelengths of a ghost's colours part where that pays."""
-    fits = [
-        None if fit is None else
-        spread_by_colour(replace(fit, shape=shape), alone(ghost, m, views, rest[m], how.views), m, pool=pool)
-        for m, (fit, shape) in enumerate(zip(ghost.fits, ghost.shapes, strict=True))
-    ]  # fmt: skip
-    shapes = [shape if fit is None else fit.shape for shape, fit in zip(ghost.shapes, fits, strict=True)]
     return replace(ghost, shapes=(shapes[0], shapes[1], shapes[2]), fits=(fits[0], fits[1], fits[2]))
 
 

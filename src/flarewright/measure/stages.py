@@ -241,25 +241,24 @@ def fit_ghosts(
         When frames cannot be read, or a ghost is none that is fitted here.
     """
     views = read_views(folder, run, every)
-    dim = dimmed(views)
     found = [_found(ghost, views) for ghost in rough.ghosts if isinstance(ghost, AberrationGhost)]
     if len(found) < len(rough.ghosts):
         raise FlarewrightError("a Bezier ghost cannot be fitted over all constellations; take it out of the model")
-    settling = how or Settling(rounds=1, lateral=True)
+    settling = how or Settling(rounds=1)
+    dim = _dimmed_anew(dimmed(views), views, found)
     iris = iris_of(dim.star)
     with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
         parts = iter(_parts(2 * again + 1, progress))
-        first = replace(settling, lateral=settling.lateral and not again)
         settled = settle(
-            found, dim.views, how=first, iris=iris, pool=pool, tell=tell, progress=next(parts), journal=journal
+            found, dim.views, how=settling, iris=iris, pool=pool, tell=tell, progress=next(parts), journal=journal
         )
-        for turn in range(again):
+        for _ in range(again):
             # the quantile held ghosts too; with them known, the glow is better known and leaves more to be found
             dim = _dimmed_anew(dim, views, settled)
             settled += _more(settled, dim.views, most - len(settled), iris, pool, tell, next(parts), journal)
             settled = settle(
-                settled, dim.views, how=settling if turn + 1 == again else first, iris=iris, pool=pool, tell=tell,
-                progress=next(parts), journal=journal,
+                settled, dim.views, how=settling, iris=iris, pool=pool, tell=tell, progress=next(parts),
+                journal=journal,
             )  # fmt: skip
     return with_rest(_model(run, to_model(settled, views), _dimmed_anew(dim, views, settled), views), views)
 
