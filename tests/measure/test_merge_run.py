@@ -226,6 +226,20 @@ def test_the_law_of_the_lights_place_has_as_many_powers_as_it_shows():
         assert [one.light_px[0] for one in found.placed] == pytest.approx(363.0 + far)
 
 
+def test_beyond_the_picture_the_lights_path_goes_on_as_it_ended():
+    """A law that bends ever more would turn back: 500 t - 90 t^3 - 300 t^5 does, before 40 degrees."""
+    seen = np.arange(0.0, 30.0, 0.6)
+    t = np.tan(np.radians(seen))
+    far = 500.0 * t - 90.0 * t**3 - 300.0 * t**5
+    frames = [Seen(float(a), 0.0, (363.0 + x, 238.0), 0.02) for a, x in zip(seen, far, strict=True)]
+    gone = [Seen(angle, 0.0, None, 0.0) for angle in (35.0, 45.0, 60.0)]
+    placed = solve_geometry([*frames, *gone], (720, 480)).placed[-3:]
+    assert [one.constellation_deg for one in placed] == pytest.approx([35.0, 45.0, 60.0], abs=0.05)
+    end = 500.0 - 3 * 90.0 * t[-1] ** 2 - 5 * 300.0 * t[-1] ** 4
+    beyond = [363.0 + far[-1] + end * (np.tan(np.radians(angle)) - t[-1]) for angle in (35.0, 45.0, 60.0)]
+    assert [one.light_px[0] for one in placed] == pytest.approx(beyond, abs=2.0)
+
+
 def test_where_the_lights_image_leaves_its_law_the_turntable_is_believed():
     """Rims that cut the light's own image move it; that is no jitter."""
     rng = np.random.default_rng(5)

@@ -182,6 +182,8 @@ class _Path:
     foot: tuple[float, float]
     direction: tuple[float, float]
     law_px: tuple[float, ...]
+    # the largest t that showed the light
+    reach: float
     jitter_deg: float
     residual_px: float
     count: int
@@ -207,15 +209,20 @@ class _Path:
         return -self.direction[1], self.direction[0]
 
     def distance(self, t: float) -> float:
-        """Return the distance along the path at t = tan(theta)."""
-        return float(np.dot(self.law_px, _powers(t, len(self.law_px))))
+        """Return the distance along the path at t = tan(theta); beyond what showed the light it goes on straight."""
+        near = min(max(t, -self.reach), self.reach)
+        return float(np.dot(self.law_px, _powers(near, len(self.law_px)))) + self.slope(near) * (t - near)
+
+    def slope(self, t: float) -> float:
+        """Return by how much the distance grows with t."""
+        near = min(abs(t), self.reach)
+        return sum((2 * k + 1) * each * near ** (2 * k) for k, each in enumerate(self.law_px))
 
     def angle_deg(self, distance: float) -> float:
         """Return the angle at which the light stands so far from the axis, by Newton's method."""
         t = distance / self.focal_px
         for _ in range(20):
-            slope = sum((2 * k + 1) * each * t ** (2 * k) for k, each in enumerate(self.law_px))
-            t -= (self.distance(t) - distance) / slope
+            t -= (self.distance(t) - distance) / self.slope(t)
         return degrees(atan(t))
 
 
@@ -254,7 +261,7 @@ def _fit_path(seen: Sequence[Seen]) -> _Path | None:
     law = (float(slope), *map(float, fit[2:]))
     return _Path(
         (float(foot[0]), float(foot[1])), (float(direction[0]), float(direction[1])), law,
-        degrees(jitter / slope), spread, len(seen), tuple(map(tuple, covariance.tolist())),
+        float(np.abs(t).max()), degrees(jitter / slope), spread, len(seen), tuple(map(tuple, covariance.tolist())),
     )  # fmt: skip
 
 
@@ -366,7 +373,7 @@ def _without_path(
     placed = []
     for one in frames:
         roll = radians(one.nominal_roll_deg)
-        path = _Path(centre, (cos(roll), -sin(roll)), (px_per_rad,), 0.0, 0.0, 0, ((error**2,),))
+        path = _Path(centre, (cos(roll), -sin(roll)), (px_per_rad,), 0.0, 0.0, 0.0, 0, ((error**2,),))
         placed.append(_place(one, path, centre, path))
     told = "the light was seen at one angle only; the axis is taken to be the middle of the picture"
     return Geometry(centre, (error, error), px_per_rad, (px_per_rad,), 0.0, tuple(placed), (told,))

@@ -133,7 +133,7 @@ def fit_halo(views: Sequence[View], pixels: Sequence[Pixels], low: float = LOW) 
     known = register(views, pixels, low, _HALVINGS)
     right, up = known.polar()
     radius = np.hypot(right, up)
-    rings = [_rings(view) for view in views]
+    seen = [_around(view) for view in views]
     far, side = float(radius.max()), known.side
     middles, levels = [], []
     for inner, outer in pairwise(np.geomspace(side, far + side, _RINGS + 1)):
@@ -141,7 +141,7 @@ def fit_halo(views: Sequence[View], pixels: Sequence[Pixels], low: float = LOW) 
         ring = ring[np.isfinite(ring).all(axis=1)]
         if len(ring) >= 4:
             middles.append(float(np.sqrt(inner * outer)))
-            levels.append(np.minimum(np.median(ring, axis=0), _darkest(rings, inner, outer)))
+            levels.append(np.minimum(np.median(ring, axis=0), _darkest(seen, inner, outer)))
     if len(middles) < 3 or not max(level.max() for level in levels) > 0.0:
         return None
     # the outermost ring's level holds to the corners
@@ -151,7 +151,7 @@ def fit_halo(views: Sequence[View], pixels: Sequence[Pixels], low: float = LOW) 
 
 
 @dataclass(frozen=True)
-class _Ring:
+class _Around:
     """A view's pixels, halved, by how far they are from the light: radius (N,), light and its variance (N, 3)."""
 
     radius: Floats
@@ -159,7 +159,7 @@ class _Ring:
     variance: Pixels
 
 
-def _rings(view: View) -> _Ring:
+def _around(view: View) -> _Around:
     """Return what was measured of a view, ghosts and all."""
     light = halved(np.where(np.isfinite(view.variance), view.pixels, np.float32(np.nan)), _HALVINGS)
     variance = halved(view.variance, _HALVINGS, variance=True)
@@ -167,13 +167,13 @@ def _rings(view: View) -> _Ring:
     y, x = np.mgrid[: light.shape[0], : light.shape[1]]
     radius = np.hypot(side * (x + 0.5) - view.light_px[0], side * (y + 0.5) - view.light_px[1])
     known = np.isfinite(light).all(axis=2) & np.isfinite(variance).all(axis=2)
-    return _Ring(radius[known], light[known], variance[known])
+    return _Around(radius[known], light[known], variance[known])
 
 
-def _darkest(rings: Sequence[_Ring], inner: float, outer: float) -> Floats:
+def _darkest(seen: Sequence[_Around], inner: float, outer: float) -> Floats:
     """Return the light of the darkest places so far from the light, of most views, shape (3,); noise is made good."""
     found = []
-    for one in rings:
+    for one in seen:
         here = (one.radius >= inner) & (one.radius < outer)
         if np.count_nonzero(here) >= _LEAST_PLACES:
             noise = np.sqrt(np.median(one.variance[here], axis=0))
