@@ -421,6 +421,19 @@ def draw_ghosts(parameters, disc_counts, visible, sigma, frame, plane):
                 plane[top + y, left + c] += own[y, c]
 
 
+@inner
+def _landed(parameters, disc_count, sigma, frame):
+    """Return a fine mesh's pupil points and where they land, (rings + 1, spokes, 2) each; of a shut ghost none."""
+    spokes, rings, _ = grain(parameters, disc_count, sigma, frame, True)
+    pupil, spots = np.empty((rings + 1, spokes, 2)), np.empty((rings + 1, spokes, 2))
+    if spokes == 0 or not fill_mesh(
+        parameters, disc_count, sigma, frame, spokes, rings, False, pupil, np.empty((0, 0, 0, 0))
+    ):
+        return pupil[:0], spots[:0]
+    land(parameters, pupil, sigma, frame, spots)
+    return pupil, spots
+
+
 @compiled
 def window_of(parameters, disc_count, sigma, frame, width, height):
     """Return the pixels that a ghost may touch.
@@ -439,14 +452,10 @@ def window_of(parameters, disc_count, sigma, frame, width, height):
     left, top, width, height : int
         Of the window; width 0 when it touches none.
     """
-    spokes, rings, _ = grain(parameters, disc_count, sigma, frame, True)
-    if spokes == 0:
+    pupil, spots = _landed(parameters, disc_count, sigma, frame)
+    if spots.shape[0] == 0:
         return 0, 0, 0, 0
-    pupil, spots = np.empty((rings + 1, spokes, 2)), np.empty((rings + 1, spokes, 2))
-    if not fill_mesh(parameters, disc_count, sigma, frame, spokes, rings, False, pupil, np.empty((0, 0, 0, 0))):
-        return 0, 0, 0, 0
-    land(parameters, pupil, sigma, frame, spots)
-    far = shifts_of(parameters, sigma, frame, pupil, np.empty((spokes, 2)))
+    far = shifts_of(parameters, sigma, frame, pupil, np.empty(spots.shape[1:]))
     return _box(spots, reach_of(parameters[SOFT] * frame[4] * frame[4]) + beyond(far), width, height)
 
 
@@ -466,14 +475,10 @@ def parting_of(parameters, disc_count, sigma, frame):
     float
         One standard deviation of the band; 0 for a ghost that is shut.
     """
-    spokes, rings, _ = grain(parameters, disc_count, sigma, frame, True)
-    if spokes == 0:
+    pupil, spots = _landed(parameters, disc_count, sigma, frame)
+    if spots.shape[0] == 0:
         return 0.0
-    pupil, spots = np.empty((rings + 1, spokes, 2)), np.empty((rings + 1, spokes, 2))
-    if not fill_mesh(parameters, disc_count, sigma, frame, spokes, rings, False, pupil, np.empty((0, 0, 0, 0))):
-        return 0.0
-    land(parameters, pupil, sigma, frame, spots)
-    return shifts_of(parameters, sigma, frame, pupil, np.empty((spokes, 2))) / max(_least_radius(spots), 1e-9)
+    return shifts_of(parameters, sigma, frame, pupil, np.empty(spots.shape[1:])) / max(_least_radius(spots), 1e-9)
 
 
 @inner

@@ -200,7 +200,7 @@ class _Path:
 
     def error(self, t: float) -> float:
         """Return the standard error of the light's place along the path at t = tan(theta), jitter included."""
-        powers = np.array([1.0, *_powers(t, len(self.law_px))][: len(self.covariance)])
+        powers = _by_powers(t, len(self.law_px))[: len(self.covariance)]
         jitter = radians(self.jitter_deg) * self.focal_px
         return sqrt(max(float(powers @ np.array(self.covariance) @ powers), 0.0) + jitter**2)
 
@@ -211,7 +211,7 @@ class _Path:
     def distance(self, t: float) -> float:
         """Return the distance along the path at t = tan(theta); beyond what showed the light it goes on straight."""
         near = min(max(t, -self.reach), self.reach)
-        return float(np.dot(self.law_px, _powers(near, len(self.law_px)))) + self.slope(near) * (t - near)
+        return float(_by_powers(near, len(self.law_px))[1:] @ self.law_px) + self.slope(near) * (t - near)
 
     def slope(self, t: float) -> float:
         """Return by how much the distance grows with t."""
@@ -265,14 +265,9 @@ def _fit_path(seen: Sequence[Seen]) -> _Path | None:
     )  # fmt: skip
 
 
-def _powers(t: float, count: int) -> list[float]:
-    """Return t, t^3, ..., so many."""
-    return [t ** (2 * k + 1) for k in range(count)]
-
-
-def _by_powers(t: Floats, count: int) -> Floats:
+def _by_powers(t: Floats | float, count: int) -> Floats:
     """Return the columns 1, t, t^3, ..., with so many powers."""
-    return np.stack([np.ones_like(t), *(t ** (2 * k + 1) for k in range(count))], axis=1)
+    return np.stack([np.ones_like(t), *(t ** (2 * k + 1) for k in range(count))], axis=-1)
 
 
 def _robust(A: Floats, y: Floats) -> tuple[Floats, Floats, Floats]:

@@ -163,9 +163,9 @@ def _around(view: View) -> _Around:
     """Return what was measured of a view, ghosts and all."""
     light = halved(np.where(np.isfinite(view.variance), view.pixels, np.float32(np.nan)), _HALVINGS)
     variance = halved(view.variance, _HALVINGS, variance=True)
-    side = 2**_HALVINGS
-    y, x = np.mgrid[: light.shape[0], : light.shape[1]]
-    radius = np.hypot(side * (x + 0.5) - view.light_px[0], side * (y + 0.5) - view.light_px[1])
+    side = 2.0**-_HALVINGS
+    at = view.light_px[0] * side, view.light_px[1] * side
+    radius = np.hypot(*offsets(at, (light.shape[1], light.shape[0]), side))
     known = np.isfinite(light).all(axis=2) & np.isfinite(variance).all(axis=2)
     return _Around(radius[known], light[known], variance[known])
 

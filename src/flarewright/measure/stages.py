@@ -127,7 +127,7 @@ class Dimmed:
 
 def dimmed(views: Sequence[View]) -> Dimmed:
     """Take the light around the light off: what the views show beside it at every constellation."""
-    shown = [np.where(np.isfinite(view.variance), view.pixels, np.nan).astype(np.float32) for view in views]
+    shown = _measured(views)
     halo, known = fit_halo(views, shown), register(views, shown)
     out = []
     for view, mask in zip(views, masks_of(views), strict=True):
@@ -135,6 +135,11 @@ def dimmed(views: Sequence[View]) -> Dimmed:
         variance = np.where(mask[..., None], view.variance + (LEFT_BEHIND * light) ** 2, np.inf).astype(np.float32)
         out.append(replace(view, pixels=view.pixels - light, variance=variance))
     return Dimmed(out, halo, fit_star(known))
+
+
+def _measured(views: Sequence[View]) -> list[Pixels]:
+    """Return what views show; not a number where nothing was measured."""
+    return [np.where(np.isfinite(view.variance), view.pixels, np.nan).astype(np.float32) for view in views]
 
 
 def find_ghosts(
@@ -245,7 +250,7 @@ def fit_ghosts(
     if len(found) < len(rough.ghosts):
         raise FlarewrightError("a Bezier ghost cannot be fitted over all constellations; take it out of the model")
     settling = how or Settling(rounds=1)
-    dim = _dimmed_anew(dimmed(views), views, found)
+    dim = _dimmed_beside(found, views, fit_star(register(views, _measured(views))))
     iris = iris_of(dim.star)
     with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
         parts = iter(_parts(2 * again + 1, progress))
@@ -254,13 +259,13 @@ def fit_ghosts(
         )
         for _ in range(again):
             # the quantile held ghosts too; with them known, the glow is better known and leaves more to be found
-            dim = _dimmed_anew(dim, views, settled)
+            dim = _dimmed_beside(settled, views, dim.star)
             settled += _more(settled, dim.views, most - len(settled), iris, pool, tell, next(parts), journal)
             settled = settle(
                 settled, dim.views, how=settling, iris=iris, pool=pool, tell=tell, progress=next(parts),
                 journal=journal,
             )  # fmt: skip
-    return with_rest(_model(run, to_model(settled, views), _dimmed_anew(dim, views, settled), views), views)
+    return with_rest(_model(run, to_model(settled, views), _dimmed_beside(settled, views, dim.star), views), views)
 
 
 def with_rest(model: GhostModel, views: Sequence[View]) -> GhostModel:
@@ -351,10 +356,10 @@ def _light_of(model: GhostModel, view: View, roll_deg: float) -> tuple[float, fl
     return view.light_px if inside and off < _NEAR_LAW * view.size_px[0] else told
 
 
-def _dimmed_anew(dim: Dimmed, views: Sequence[View], ghosts: Sequence[Found]) -> Dimmed:
-    """Learn halo and star anew from what is left beside the ghosts, and take these off the views."""
+def _dimmed_beside(ghosts: Sequence[Found], views: Sequence[View], star: Star | None) -> Dimmed:
+    """Learn the halo, and how strong a star is, from what is left beside known ghosts, and take both off the views."""
     left = [without(ghosts, view, k) for k, view in enumerate(views)]
-    halo, star = followed(views, left, masks_of(views), fit_halo(views, left), dim.star)
+    halo, star = followed(views, left, masks_of(views), fit_halo(views, left), star)
     return Dimmed(beside(views, halo, star), halo, star)
 
 
