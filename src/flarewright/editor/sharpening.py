@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 SOON_S = 0.35
 # one whose final picture takes more is first traced as well as a screen can show, which takes a third of the time
 LATE_S = 0.4
-# of one that takes more than this a third is too long: without rings it takes half of that
-RINGS_S = 2.0
+# of one that takes more than this a third is too long: coarser it takes a fifth
+HASTE_S = 1.2
 # the first final picture of all also loads what draws it: it takes so many times as long as the next
 LOADING = 2.0
 # and one that takes so long is not waited for by whoever clicks on a ghost
@@ -114,8 +114,8 @@ def _exposure(screen: Screen, picture: Picture) -> float:
 
 def _show_soon(screen: Screen, project: Project, view: View, check: Check) -> None:
     """Trace a project as well as a screen can show it, unless something newer waits by then."""
-    progress, rings = _progress(screen, "traced picture", check), screen.final_s <= RINGS_S
-    soon = studio.take(project, "soon", view, room=screen.room, rings=rings, progress=progress)
+    progress, hasty = _progress(screen, "traced picture", check), screen.final_s > HASTE_S
+    soon = studio.take(project, "soon", view, room=screen.room, hasty=hasty, progress=progress)
     check()
     screen.show(soon)
     screen.let_through()

@@ -423,8 +423,7 @@ def _drawn(found: Found, project: Project, seeing: Seeing, grade: Grade, check: 
     """Draw what was found, as it will be shown once it is taken; as it was where it cannot be drawn so."""
     taken = found.taken(project)
     try:
-        # at its size rings are finer than a pixel
-        picture = take(taken, grade, View(), scale=THUMB_SCALE, rings=False, progress=lambda *_: check())
+        picture = take(taken, grade, View(), scale=THUMB_SCALE, hasty=True, progress=lambda *_: check())
     except FlarewrightError:
         if found.picture:
             return found

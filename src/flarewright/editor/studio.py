@@ -37,6 +37,8 @@ DRAFT_WAVELENGTHS = 3
 # and the most of a picture that is final for the screen; coatings tell the colours between them
 SOON_WAVELENGTHS = 7
 SOON_TOLERANCE_PX = 0.5
+# and of one that is wanted sooner still
+HASTY_TOLERANCE_PX = 2.0
 NO_RINGS = (
     "the screen leaves out rings inside ghosts, which are slow through an image, dirt or cylinders and for spectral "
     "lines; files have them"
@@ -106,7 +108,7 @@ def rest_size(project: Project, room: tuple[int, int]) -> tuple[int, int]:
 
 
 def staged(
-    project: Project, grade: Grade, scale: float = 1.0, room: tuple[int, int] | None = None, rings: bool = True
+    project: Project, grade: Grade, scale: float = 1.0, room: tuple[int, int] | None = None, hasty: bool = False
 ) -> Project:
     """Return the project as the viewport draws it: its frame at another size, its quality as far as is needed.
 
@@ -118,8 +120,8 @@ def staged(
         Of the picture's sides.
     room : tuple of int, optional
         As of `rest_size`, of a picture that rests.
-    rings : bool
-        False: a picture that is traced soon has none, however well they would be seen.
+    hasty : bool
+        A picture that is traced soon may be coarser in steps, rims and rings, so that it takes less time.
 
     Returns
     -------
@@ -137,9 +139,8 @@ def staged(
             quality = quality.replace(ringing="off")
         if grade == "soon":
             few = min(quality.wavelengths, SOON_WAVELENGTHS)
-            coarse = max(quality.tolerance_px, SOON_TOLERANCE_PX)
+            coarse = max(quality.tolerance_px, HASTY_TOLERANCE_PX if hasty else SOON_TOLERANCE_PX)
             quality = quality.replace(wavelengths=few, bridge=True, tolerance_px=coarse, screen=True)
-            quality = quality if rings else quality.replace(ringing="off")
     else:
         quality = Quality(mode="draft", wavelengths=DRAFT_WAVELENGTHS, paths=own.paths)
     output = Output(layers="passes", starburst=project.output.starburst)
@@ -169,7 +170,7 @@ def take(
     *,
     scale: float = 1.0,
     room: tuple[int, int] | None = None,
-    rings: bool = True,
+    hasty: bool = False,
     levels: Levels = (),
     progress: Callable[[float, str], None] | None = None,
 ) -> Picture:
@@ -181,7 +182,7 @@ def take(
     grade : {"moving", "draft", "soon", "final", "working"}
         "working" draws what `look` asks for by `working_ghosts`.
     look : View
-    scale, room, rings
+    scale, room, hasty
         As of `staged`.
     levels : Levels
         `Match.levels` of a draft.
@@ -198,7 +199,7 @@ def take(
         When the project cannot be rendered.
     """
     begun = time.perf_counter()
-    stage = staged(project, grade, scale, room, rings)
+    stage = staged(project, grade, scale, room, hasty)
     size = stage.camera.size_px
     if look.grey or look.unclipped:
         layer = working_ghosts(stage, grey=look.grey, unclipped=look.unclipped)

@@ -80,8 +80,8 @@ class Quality(Frozen):
     source_step_deg : float
         An area light wider than this is traced in parts: what a part's ghosts differ by over it is taken as straight.
     screen : bool
-        For a picture that is only looked at (final): what eight bits hardly show is drawn in less detail, and ghosts
-        are looked for in the middle colour alone.
+        For a picture that is only looked at (final): what eight bits hardly show is drawn in less detail, and less
+        still as `tolerance_px` grows beyond 0.5; ghosts are looked for in the middle colour alone.
     seed : int
         Begins the random numbers.
     reference_error : float

@@ -31,7 +31,16 @@ from .ghosts_draft import (
     seen_small,
     spread_light,
 )
-from .ghosts_final import SCREEN, STEP_CONTRAST, FinalPass, contrast, detail_of, draw_alone, draw_final
+from .ghosts_final import (
+    SCREEN,
+    STEP_CONTRAST,
+    FinalPass,
+    coarser,
+    contrast,
+    detail_of,
+    draw_alone,
+    draw_final,
+)
 from .looking import kindred, looking
 from .room import need, spare_bytes
 from .shot import Shot
@@ -198,7 +207,8 @@ def _final(
     own = _level(found)
     level = own + others
     # against which it is judged how much of a ghost can be seen
-    seen_level = level * (SCREEN if quality.screen else 1.0)
+    rough = coarser(quality)
+    seen_level = level * (SCREEN * rough if quality.screen else 1.0)
     keep = _worth_drawing(flux, quality.cull)
     if faintest > 0.0:
         keep &= np.array([_level([items], plain=True) > faintest for items in found], dtype=np.bool_)
@@ -208,7 +218,7 @@ def _final(
     named = [found[k][0].path for k in order]
     called = {k: path.name for k, path in zip(order, named, strict=True)}
     found, faint, faint_share = _without_faint(found, alone)
-    around = _around([item for k in order for item in found[k]], level, pool)
+    around = _around([item for k in order for item in found[k]], level * rough, pool)
 
     def draw(group: list[int]) -> list[Plane | None]:
         canvas = blank(shots[0].size_px)

@@ -51,6 +51,8 @@ SHIFT_QUANTILE = 0.9
 STEP_CONTRAST = 2e-3
 # and on a screen, whose steps are this many times coarser, the rim's error may be doubled so often
 SCREEN, SCREEN_ROUGH = 10.0, 5
+# up to this tolerance; what may be misplaced farther may be as many times coarser in its steps and its ripples too
+SCREEN_PX = 0.5
 # and a ghost this many times fainter still needs one colour only
 ONE_COLOR = 1.0 / 6.0
 # and where nothing but fringes ends a ghost, steps of this part of their scale sqrt(lambda L / 2)
@@ -201,6 +203,11 @@ def _frame(shot: Shot, path: LightPath, region: Region) -> Frame:
     return Frame((x, y), sqrt(max(2.0 * (sums[3] / sums[0] - x * x - y * y), 0.0)))
 
 
+def coarser(quality: Quality) -> float:
+    """Tell how many times coarser than a screen at its best a picture for one may be; 1 for a file."""
+    return max(quality.tolerance_px / SCREEN_PX, 1.0) if quality.screen else 1.0
+
+
 def contrast(item: FinalPass, level: float) -> float:
     """Compare a path's irradiance with the mean of all ghosts in the picture.
 
@@ -269,7 +276,7 @@ def draw_final(
         # only here: what has no rings need not know how they are seen
         from .ripples import LEAST_RIPPLE, SCREEN_RIPPLE, ripples_seen
 
-        least = SCREEN_RIPPLE if quality.screen else LEAST_RIPPLE
+        least = SCREEN_RIPPLE * coarser(quality) if quality.screen else LEAST_RIPPLE
         rings = rings if rings is not None and ripples_seen(item, rings, bundle, around, 2.0**detail, least) else None
     if rings is not None:
         if _is_soft(bundle, opening.radius):

@@ -21,7 +21,7 @@ export function mover(app, shown) {
   function pump() {
     if (!next || under >= 2) return;
     // the second one leaves shortly before the first is done, so that it asks for the newest place
-    const early = under === 1 ? asked + 0.6 * usual - performance.now() : 0;
+    const early = under === 1 ? asked + 0.9 * usual - performance.now() : 0;
     if (early > 1) {
       waiting ||= setTimeout(() => { waiting = 0; pump(); }, early);
       return;
