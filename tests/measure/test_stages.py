@@ -4,14 +4,18 @@ import json
 
 import numpy as np
 import pytest
-from planted_run import GHOSTS, LARGEST, SIZE, views
+from planted_run import GHOSTS, LARGEST, SIZE, shape, views
 
 from flarewright.cli.app import run as command
 from flarewright.io.ghost_model_file import read_ghost_model
-from flarewright.io.merged import write_frame, write_run
+from flarewright.io.merged import read_run, write_frame, write_run
 from flarewright.measure.fit import render
+from flarewright.measure.found import Found
 from flarewright.measure.replay import replay
+from flarewright.measure.settle import to_model
+from flarewright.measure.stages import fit_ghosts
 from flarewright.model.capture import FrameInfo, MergedFrame, MergedRun
+from flarewright.model.ghost_model import GhostModel
 
 ANGLES = np.linspace(2.0, LARGEST, 12)
 FOCAL = 900.0
@@ -49,6 +53,23 @@ def test_found_and_fitted_from_even_angles_replays_the_odd_ones(folder, capsys):
         truth = render(GHOSTS[1], view)
         error = replay(model, float(angle))[0].pixels[..., 1] - truth
         assert np.sqrt((error**2).mean()) < 0.03 * np.sqrt((truth**2).mean())
+
+
+def test_a_fit_joins_what_was_found_in_pieces(tmp_path):
+    """Light that lands in the middle from half of the pupil, found as a body and a core."""
+    whole = shape(-50.0, 30.0, 0.4)
+    whole.numbers[10], whole.numbers[11] = 9.0, 21.0
+    write(tmp_path, (whole,))
+    pieces = [Found((one, one, one), 0, len(ANGLES) - 1) for one in (shape(-50.0, 29.0, 0.4), shape(-49.0, 8.0, 0.4))]
+    run = read_run(tmp_path)
+    rough = GhostModel(
+        size_px=SIZE, axis_px=run.axis_px, focal_px=FOCAL, largest_deg=LARGEST, constellation_deg=(2.0, LARGEST),
+        ghosts=to_model(pieces, views((), angles=ANGLES)),
+    )  # fmt: skip
+    told = []
+    model = fit_ghosts(tmp_path, run, rough, tell=told.append)
+    assert len(model.ghosts) == 1
+    assert any("is a part of one of size" in line for line in told)
 
 
 def test_a_person_can_take_a_ghost_away_and_point_at_one(folder, tmp_path, capsys):

@@ -186,8 +186,7 @@ def find_ghosts(
     """
     views = read_views(folder, run, every)
     dim = dimmed(views)
-    times = max(0, int(np.ceil(np.log2(run.size_px[0] / SEARCH_WIDTH))))
-    small = [coarse(view, times) for view in dim.views]
+    times, small = _for_search(dim.views)
     iris = iris_of(dim.star)
     known = corrections or Corrections()
     pointed = [candidate(each, small, 2.0**times, run) for each in known.add]
@@ -261,6 +260,7 @@ def fit_ghosts(
             # the quantile held ghosts too; with them known, the glow is better known and leaves more to be found
             dim = _dimmed_beside(settled, views, dim.star)
             settled += _more(settled, dim.views, most - len(settled), iris, pool, tell, next(parts), journal)
+            settled = _whole(settled, dim.views, pool, tell)
             settled = settle(
                 settled, dim.views, how=settling, iris=iris, pool=pool, tell=tell, progress=next(parts),
                 journal=journal,
@@ -400,14 +400,26 @@ def _more(
     journal: Journal | None,
 ) -> list[Found]:
     """Look for more ghosts beside the known ones, at the search's resolution."""
-    times = max(0, int(np.ceil(np.log2(views[0].size_px[0] / SEARCH_WIDTH))))
-    small = [coarse(view, times) for view in views]
+    times, small = _for_search(views)
     measured = [np.asarray(np.isfinite(view.variance).all(axis=2)) for view in small]
     found = pursue(
         small, measured, most=max(most, 0), known=[_sized(ghost, 0.5**times) for ghost in known], iris=iris, pool=pool,
         tell=tell, progress=progress, journal=journal,
     )  # fmt: skip
     return [_sized(ghost, 2.0**times) for ghost in found]
+
+
+def _whole(ghosts: Sequence[Found], views: Sequence[View], pool: ThreadPoolExecutor, tell: Tell) -> list[Found]:
+    """Join ghosts that are one, at the search's resolution; a fit shows better than a search what belongs together."""
+    times, small = _for_search(views)
+    found = joined([_sized(ghost, 0.5**times) for ghost in ghosts], small, pool=pool, tell=tell)
+    return [_sized(ghost, 2.0**times) for ghost in found]
+
+
+def _for_search(views: Sequence[View]) -> tuple[int, list[View]]:
+    """Return how often pictures are halved in which ghosts are looked for, and these."""
+    times = max(0, int(np.ceil(np.log2(views[0].size_px[0] / SEARCH_WIDTH))))
+    return times, [coarse(view, times) for view in views]
 
 
 def _sized(ghost: Found, factor: float) -> Found:
