@@ -8,7 +8,8 @@ from planted_run import GHOSTS, SIZE, views
 
 from flarewright.measure.fit import render
 from flarewright.measure.glow import halo_at, halo_radiance, offsets, star_at, star_radiance
-from flarewright.measure.glow_fit import Registered, fit_halo, fit_star, followed, glow, iris_of, register
+from flarewright.measure.glow_fit import Registered, fit_halo, fit_star, followed, iris_of, register
+from flarewright.measure.stages import beside, masks_of
 from flarewright.model.ghost_model import Blades, Halo, Star
 
 HALO = Halo(
@@ -99,12 +100,13 @@ def test_no_star_where_there_is_none():
 
 def test_glow_taken_off_leaves_the_ghosts():
     some = shown(star=True)
-    known = register(some, [view.pixels for view in some])
+    pixels = [view.pixels for view in some]
+    found = followed(some, pixels, masks_of(some), fit_halo(some, pixels), fit_star(register(some, pixels)))
     view = some[6]
     ghosts = sum(render(ghost, view) for ghost in GHOSTS[:2])
     x, y = offsets(view.light_px, SIZE, 1.0)
     far = np.hypot(x, y) > 30.0
-    left = (view.pixels - glow(view, known))[..., 1]
+    left = beside(some, *found)[6].pixels[..., 1]
     raw = view.pixels[..., 1]
     assert np.abs(left - ghosts)[far].mean() < 0.3 * np.abs(raw - ghosts)[far].mean()
 

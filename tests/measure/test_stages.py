@@ -13,7 +13,7 @@ from flarewright.measure.fit import render
 from flarewright.measure.found import Found
 from flarewright.measure.replay import replay
 from flarewright.measure.settle import to_model
-from flarewright.measure.stages import fit_ghosts
+from flarewright.measure.stages import find_ghosts, fit_ghosts
 from flarewright.model.capture import FrameInfo, MergedFrame, MergedRun
 from flarewright.model.ghost_model import GhostModel
 
@@ -21,7 +21,7 @@ ANGLES = np.linspace(2.0, LARGEST, 12)
 FOCAL = 900.0
 
 
-def write(folder, ghosts) -> None:
+def write(folder, ghosts, focal=FOCAL) -> None:
     """Write a merged run of planted ghosts."""
     infos = []
     (folder / "frames").mkdir()
@@ -29,11 +29,11 @@ def write(folder, ghosts) -> None:
         x, y = float(view.frame[0]), float(view.frame[1])
         info = FrameInfo(
             file=f"frames/{k:03d}.exr", constellation_deg=float(ANGLES[k]), nominal_deg=float(ANGLES[k]),
-            light_px=(x + FOCAL * float(np.tan(np.radians(ANGLES[k]))), y), axis_px=(x, y),
+            light_px=(x + focal * float(np.tan(np.radians(ANGLES[k]))), y), axis_px=(x, y),
         )  # fmt: skip
         write_frame(folder, MergedFrame(info, view.pixels, view.variance))
         infos.append(info)
-    write_run(folder, MergedRun(size_px=SIZE, frames=tuple(infos), axis_px=(x, y), px_per_rad=FOCAL))
+    write_run(folder, MergedRun(size_px=SIZE, frames=tuple(infos), axis_px=(x, y), px_per_rad=focal))
 
 
 @pytest.fixture(scope="module")
@@ -53,6 +53,15 @@ def test_found_and_fitted_from_even_angles_replays_the_odd_ones(folder, capsys):
         truth = render(GHOSTS[1], view)
         error = replay(model, float(angle))[0].pixels[..., 1] - truth
         assert np.sqrt((error**2).mean()) < 0.03 * np.sqrt((truth**2).mean())
+
+
+def test_a_ghost_that_goes_along_with_the_light_is_found(tmp_path):
+    """It covers what is next to the light in most constellations: taken for glow, it would be found in pieces."""
+    planted = shape(80.0, 24.0, 0.5)
+    write(tmp_path, (planted,), focal=100.0)
+    found = find_ghosts(tmp_path, read_run(tmp_path)).ghosts
+    assert [round(ghost.green.f[0]) for ghost in found] == [80]
+    assert found[0].green.g[0] == pytest.approx(24.0, rel=0.05)
 
 
 def test_a_fit_joins_what_was_found_in_pieces(tmp_path):

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..kernels.measure_pupil import FIRST_G, FIRST_I
-from .fit import Patch, Shape, brightens, cost_of, free_numbers, improve, patches_of, render
+from .fit import MODEL_ERROR, Patch, Shape, brightens, cost_of, free_numbers, improve, patches_of, render
 from .found import Found, by_light, rest_of
 from .numbers import Floats
 from .views import Pixels, View
@@ -22,6 +22,8 @@ _APART, _SHARED = 0.4, 0.5
 _CORES = (1.0, 0.4, -0.2)
 # views that a trial looks at
 _FEW = 10
+# part of the light that a trial's model may miss beyond what its views say: nothing, but a search as rough as others
+_KNOWN = 1e-9
 
 
 def joined(
@@ -90,11 +92,13 @@ def _as_one(
     shape, core = host.shapes[1], part.shapes[1]
     as_two, as_one = [], []
     for k in few:
-        own = rest[k] + render(shape, views[k])
-        as_two.append(_green(views[k], own))
-        if not host.first <= k <= host.last:
-            own = own - render(shape, views[k])
-        as_one.append(_green(views[k], own + render(core, views[k]) if part.first <= k <= part.last else own))
+        alone = render(shape, views[k])
+        light = render(core, views[k]) if part.first <= k <= part.last else np.zeros_like(alone)
+        there = rest[k] + (alone if host.first <= k <= host.last else 0.0) + light
+        # both are judged by the same weights, or what is brighter would be missed for less
+        level = np.maximum(np.abs(there), np.abs(alone + light))
+        as_two.append(_green(views[k], rest[k] + alone, level))
+        as_one.append(_green(views[k], there, level))
     # what the smaller one has beside the larger is lost as well
     patches = patches_of(shape, as_one, 1, beside=core)
     if not patches:
@@ -121,15 +125,21 @@ def _improved(
     start: Shape, look: Sequence[Patch], order: int, steps: int, width: int, pool: ThreadPoolExecutor | None
 ) -> Shape:
     free = free_numbers(order, start.discs, 1)
-    return improve(start, look, free, width=width, steps=steps, tails=False, pool=pool)[0]
+    return improve(start, look, free, width=width, steps=steps, error=_KNOWN, tails=False, pool=pool)[0]
 
 
 def _cost(shape: Shape, look: Sequence[Patch]) -> float:
-    return cost_of(shape, look, tails=False)
+    return cost_of(shape, look, error=_KNOWN, tails=False)
 
 
-def _green(view: View, pixels: Floats) -> View:
-    return view.showing(np.broadcast_to(pixels.astype(np.float32)[..., None], view.pixels.shape))
+def _green(view: View, pixels: Floats, level: Floats) -> View:
+    """Return a view that shows some light in all colours, less certain by what a model may miss of a level."""
+    variance = (view.variance[..., 1] + (MODEL_ERROR * level) ** 2).astype(np.float32)
+    shape = view.pixels.shape
+    return replace(
+        view, pixels=np.broadcast_to(pixels.astype(np.float32)[..., None], shape),
+        variance=np.broadcast_to(variance[..., None], shape),
+    )  # fmt: skip
 
 
 def _starts(shape: Shape, light: Floats) -> list[Shape]:

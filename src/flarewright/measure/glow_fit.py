@@ -352,23 +352,3 @@ def iris_of(star: Star | None) -> Blades | None:
     half = star.spikes // 2
     count = half if half % 2 and half >= 5 else star.spikes
     return Blades(count=count, first_deg=star.first_deg) if count <= _MOST_BLADES else None
-
-
-def glow(view: View, known: Registered) -> Pixels:
-    """Return the registered light as a view sees it, shape (H, W, 3); 0 where it is not known.
-
-    Parameters
-    ----------
-    view : View
-    known : Registered
-        At the view's resolution.
-    """
-    width, height = view.size_px
-    x, y = round(view.light_px[0]), round(view.light_px[1])
-    left, top = known.origin[0] - x, known.origin[1] - y
-    out = np.zeros((height, width, 3), np.float32)
-    x0, y0 = max(left, 0), max(top, 0)
-    x1, y1 = min(left + width, known.picture.shape[1]), min(top + height, known.picture.shape[0])
-    if x0 < x1 and y0 < y1:
-        out[y0 - top : y1 - top, x0 - left : x1 - left] = np.nan_to_num(known.picture[y0:y1, x0:x1])
-    return out

@@ -23,7 +23,7 @@ from .fit import Shape, light_of
 from .found import Found
 from .fragments import joined
 from .glow import halo_at, offsets, star_at
-from .glow_fit import fit_halo, fit_star, followed, glow, iris_of, register
+from .glow_fit import fit_halo, fit_star, followed, iris_of, register
 from .joint import lit
 from .journal import Journal
 from .moves_fit import with_moves
@@ -125,16 +125,9 @@ class Dimmed:
     star: Star | None
 
 
-def dimmed(views: Sequence[View]) -> Dimmed:
-    """Take the light around the light off: what the views show beside it at every constellation."""
-    shown = _measured(views)
-    halo, known = fit_halo(views, shown), register(views, shown)
-    out = []
-    for view, mask in zip(views, masks_of(views), strict=True):
-        light = glow(view, known)
-        variance = np.where(mask[..., None], view.variance + (LEFT_BEHIND * light) ** 2, np.inf).astype(np.float32)
-        out.append(replace(view, pixels=view.pixels - light, variance=variance))
-    return Dimmed(out, halo, fit_star(known))
+def _star_of(views: Sequence[View]) -> Star | None:
+    """Find the star that stays beside the light at every constellation, if there is one."""
+    return fit_star(register(views, _measured(views)))
 
 
 def _measured(views: Sequence[View]) -> list[Pixels]:
@@ -185,7 +178,7 @@ def find_ghosts(
         When frames cannot be read or are too few, or a correction points at nothing.
     """
     views = read_views(folder, run, every)
-    dim = dimmed(views)
+    dim = _dimmed_beside([], views, _star_of(views))
     times, small = _for_search(dim.views)
     iris = iris_of(dim.star)
     known = corrections or Corrections()
@@ -249,7 +242,7 @@ def fit_ghosts(
     if len(found) < len(rough.ghosts):
         raise FlarewrightError("a Bezier ghost cannot be fitted over all constellations; take it out of the model")
     settling = how or Settling(rounds=1)
-    dim = _dimmed_beside(found, views, fit_star(register(views, _measured(views))))
+    dim = _dimmed_beside(found, views, _star_of(views))
     iris = iris_of(dim.star)
     with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
         parts = iter(_parts(2 * again + 1, progress))
@@ -257,7 +250,7 @@ def fit_ghosts(
             found, dim.views, how=settling, iris=iris, pool=pool, tell=tell, progress=next(parts), journal=journal
         )
         for _ in range(again):
-            # the quantile held ghosts too; with them known, the glow is better known and leaves more to be found
+            # with more ghosts known, the glow is better known and leaves more to be found
             dim = _dimmed_beside(settled, views, dim.star)
             settled += _more(settled, dim.views, most - len(settled), iris, pool, tell, next(parts), journal)
             settled = _whole(settled, dim.views, pool, tell)
