@@ -141,14 +141,18 @@ def test_who_points_means_what_is_there(project):
     session, _ = begin(None)
     session.put(project, "Open")
     screen = Screen(session)
-    screen.seen = see(project, "draft")
+    screen.start()
+    assert screen.wait(60.0)
     place = screen.seen.ghosts[0].centre
     names = picked(screen, *place)
     assert len(names) > 2
+    # what lies where is measured anew after each change
     session.do("set_solo", {"names": [names[-1]]})
+    assert screen.wait(60.0)
     assert picked(screen, *place) == (names[-1], *names[:-1])
     session.do("set_solo", {"names": []})
     session.do("set_ghost", {"name": names[0], "values": {"muted": True}})
+    assert screen.wait(60.0)
     assert picked(screen, *place) == (*names[1:], names[0])
     # those of another lens are no ghosts of this one, and neither are those of rows with other numbers
     listed = {row["name"] for row in ghosts_of(screen)["ghosts"]}
