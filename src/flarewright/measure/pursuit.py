@@ -20,7 +20,7 @@ from .grow import Growth, grow
 from .journal import Journal
 from .numbers import NUMBERS, with_blades
 from .settle import touch_up
-from .specks import highest_near, specks
+from .specks import RADII, highest_near, specks
 from .views import Pixels, View
 
 # votes below which a candidate is chance
@@ -35,6 +35,8 @@ THERE = 0.35
 LEFT_BEHIND = 0.08
 # and as specks, so many pixels around the light
 LEFT_AS_SPECKS, _BESIDE = 0.2, 3
+# a candidate no larger than this is looked at with what is this far around it, pixels
+SPECK, BESIDE_SPECK = 3.5, 3.0
 # who was refused is tried again when twice as many ghosts are known, and so many more
 _SOON = 2
 # views that a first fit looks at
@@ -217,11 +219,16 @@ def _try(
     run = np.arange(trial.first, trial.last + 1)
     few = run[np.unique(np.linspace(0, run.size - 1, min(run.size, _FEW)).round().astype(int))]
     shown = _alone(views, rest, list(few))
-    start = beginning(trial, shown, [rest[k] for k in few])
-    fit = grow(start, shown, 1, most=_FIRST, pool=pool)
-    if fit is None or not brightens(fit.shape, shown):
+    starts = [trial]
+    if trial.radius <= SPECK:
+        shown = [_near(trial, view) for view in shown]
+        # a rim of a few pixels is seen too large
+        starts = [trial, replace(trial, radius=RADII[0])] if trial.radius > RADII[0] else [trial]
+    fits = [grow(beginning(one, shown, [rest[k] for k in few]), shown, 1, most=_FIRST, pool=pool) for one in starts]
+    kept = [fit for fit in fits if fit is not None and brightens(fit.shape, shown) and _stays(trial, fit.shape, shown)]
+    if not kept:
         return None
-    shape = fit.shape
+    shape = min(kept, key=lambda fit: fit.cost).shape
     patches = patches_of(shape, shown, 1)
     if not patches:
         return None
@@ -232,6 +239,22 @@ def _try(
     if last - first < 1:
         return None
     return Found((shape, shape, shape), first, last)
+
+
+def _stays(trial: Candidate, shape: Shape, views: Sequence[View]) -> bool:
+    """Tell whether a fit of a speck is no larger than what it looked at; larger ghosts may grow."""
+    sizes = [abs(shape.numbers[FIRST_G] + shape.numbers[FIRST_G + 3] * view.sigma**2) for view in views]
+    return trial.radius > SPECK or max(sizes) <= trial.radius + BESIDE_SPECK
+
+
+def _near(speck: Candidate, view: View) -> View:
+    """Return a view of what is next to a speck: all that lies farther off is more than it, and fits run off to that."""
+    height, width = view.pixels.shape[:2]
+    x, y, cosine, sine, _ = view.frame
+    place = view.sigma * (speck.speed + speck.bend * view.sigma**2)
+    columns, rows = np.arange(width) + 0.5 - (x + cosine * place), np.arange(height) + 0.5 - (y - sine * place)
+    far = np.hypot(columns[None, :], rows[:, None]) > speck.radius + BESIDE_SPECK
+    return replace(view, variance=np.where(far[..., None], np.inf, view.variance).astype(np.float32))
 
 
 def _span(shape: Shape, views: Sequence[View], rest: Sequence[Pixels], middle: int) -> tuple[int, int]:
