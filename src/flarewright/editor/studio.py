@@ -17,6 +17,7 @@ from ..io.library import lens_path
 from ..model import Art, Layer, Lens, Light, Output, Project, Quality, Rule
 from ..render.display import auto_exposure
 from ..render.edge_rings import untabled
+from ..render.ghosts_final import SCREEN_PX
 from ..render.prepare import load_lens
 from ..render.render import render
 from ..render.working import working_ghosts
@@ -36,7 +37,7 @@ MOST_PX = 1920 * 1080
 DRAFT_WAVELENGTHS = 3
 # and the most of a picture that is final for the screen; coatings tell the colours between them
 SOON_WAVELENGTHS = 7
-SOON_TOLERANCE_PX = 0.5
+SOON_TOLERANCE_PX = SCREEN_PX
 # and of one that is wanted sooner still
 HASTY_TOLERANCE_PX = 2.0
 NO_RINGS = (

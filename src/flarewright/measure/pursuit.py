@@ -21,7 +21,7 @@ from .journal import Journal
 from .numbers import NUMBERS, with_blades
 from .settle import touch_up
 from .specks import RADII, highest_near, specks
-from .views import Pixels, View
+from .views import Pixels, View, distances
 
 # votes below which a candidate is chance
 SCORE = 0.9
@@ -222,8 +222,9 @@ def _try(
     starts = [trial]
     if trial.radius <= SPECK:
         shown = [_near(trial, view) for view in shown]
-        # a rim of a few pixels is seen too large
-        starts = [trial, replace(trial, radius=RADII[0])] if trial.radius > RADII[0] else [trial]
+        if trial.radius > RADII[0]:
+            # a rim of a few pixels is seen too large
+            starts.append(replace(trial, radius=RADII[0]))
     fits = [grow(beginning(one, shown, [rest[k] for k in few]), shown, 1, most=_FIRST, pool=pool) for one in starts]
     kept = [fit for fit in fits if fit is not None and brightens(fit.shape, shown) and _stays(trial, fit.shape, shown)]
     if not kept:
@@ -249,11 +250,8 @@ def _stays(trial: Candidate, shape: Shape, views: Sequence[View]) -> bool:
 
 def _near(speck: Candidate, view: View) -> View:
     """Return a view of what is next to a speck: all that lies farther off is more than it, and fits run off to that."""
-    height, width = view.pixels.shape[:2]
-    x, y, cosine, sine, _ = view.frame
     place = view.sigma * (speck.speed + speck.bend * view.sigma**2)
-    columns, rows = np.arange(width) + 0.5 - (x + cosine * place), np.arange(height) + 0.5 - (y - sine * place)
-    far = np.hypot(columns[None, :], rows[:, None]) > speck.radius + BESIDE_SPECK
+    far = distances(view, place) > speck.radius + BESIDE_SPECK
     return replace(view, variance=np.where(far[..., None], np.inf, view.variance).astype(np.float32))
 
 

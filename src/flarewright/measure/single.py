@@ -18,7 +18,7 @@ from ..model.ghost_model import AberrationGhost, GhostModel
 from .curves import pose_at
 from .find import LEVEL, Slopes, candidates, rim_outline, slopes_of
 from .numbers import Floats, bezier_numbers, field, frame, visible
-from .views import Pixels, View
+from .views import Pixels, View, distances
 
 # of the best possible vote, what a circle needs to be proposed, and how far above chance
 ENOUGH, ABOVE_CHANCE = 0.25, 1.25
@@ -150,22 +150,14 @@ def _sharper(steep: Slopes, place: float, radius: float, step: float) -> tuple[f
     return place, radius
 
 
-def _distances(view: View, place: float, scale: float = 1.0) -> Floats:
-    """Return how far every pixel is from a place on the line, in pixels of the full picture."""
-    height, width = (round(side * scale) for side in view.pixels.shape[:2])
-    ax, ay, cosine, sine, _ = view.frame
-    x, y = (np.arange(width) + 0.5) / scale - ax, (np.arange(height) + 0.5) / scale - ay
-    return np.asarray(np.hypot(x[None, :] - cosine * place, y[:, None] + sine * place), dtype=np.float64)
-
-
 def _without(slopes: Slopes, view: View, place: float, radius: float) -> Slopes:
     """Return the slopes with a ghost's border taken out."""
-    away = np.abs(_distances(view, place, 0.5) - radius)[: slopes.x.shape[1], : slopes.x.shape[2]]
+    away = np.abs(distances(view, place, 0.5) - radius)[: slopes.x.shape[1], : slopes.x.shape[2]]
     return _cleared(slopes, away < BORDER * radius + SMOOTHED)
 
 
 def _spot(name: str, view: View, place: float, radius: float, score: float) -> Spot:
-    away = _distances(view, place)
+    away = distances(view, place)
     inside = (away < 0.93 * radius) & (away > 0.7 * radius)
     outside = (away > 1.07 * radius + 2.0) & (away < 1.3 * radius + 3.0)
     if not (inside.any() and outside.any()):

@@ -101,6 +101,27 @@ def views_of(frames: Sequence[MergedFrame], largest_deg: float | None = None) ->
     return tuple(sorted(views, key=lambda view: view.constellation_deg))
 
 
+def distances(view: View, place: float, scale: float = 1.0) -> Floats:
+    """Return how far every pixel is from a place on the line through axis and light, pixels of the full picture.
+
+    Parameters
+    ----------
+    view : View
+    place : float
+        From the axis towards the light, pixels.
+    scale : float
+        Of the resolution that is asked for.
+
+    Returns
+    -------
+    ndarray, shape (H scale, W scale)
+    """
+    height, width = (round(side * scale) for side in view.pixels.shape[:2])
+    ax, ay, cosine, sine, _ = view.frame
+    x, y = (np.arange(width) + 0.5) / scale - ax, (np.arange(height) + 0.5) / scale - ay
+    return np.asarray(np.hypot(x[None, :] - cosine * place, y[:, None] + sine * place), dtype=np.float64)
+
+
 def halved(pixels: Pixels, times: int, variance: bool = False) -> Pixels:
     """Average a picture of shape (H, W, ...) over squares of 2**times pixels; a rest at the border is left out.
 
