@@ -113,12 +113,18 @@ def _as_one(
     best = fitted(core.numbers, patches)
     # the larger one alone is as free as one for both, or what it gains by itself would be taken for a fragment's light
     apart = patches_of(shape, as_two, 1, beside=core)
-    larger = fitted(np.zeros_like(core.numbers), apart)
-    two = _cost(larger, apart)
-    explained = _cost(larger, patches) - two
-    if _cost(best, patches) - two > _LOST * explained or not brightens(best, as_one):
+    if _lost(best, fitted(np.zeros_like(core.numbers), apart), patches, apart) > _LOST or not brightens(best, as_one):
+        return None
+    # and may begin where the one for both ended: what this found is not for want of light to be found without it
+    if _lost(best, _improved(best, apart, 2, 8, width, pool), patches, apart) > _LOST:
         return None
     return replace(both, shapes=(best, best, best))
+
+
+def _lost(one: Shape, larger: Shape, whole: Sequence[Patch], apart: Sequence[Patch]) -> float:
+    """Return what one ghost for two loses, as a part of what the smaller one explains beside the larger."""
+    two = _cost(larger, apart)
+    return (_cost(one, whole) - two) / max(_cost(larger, whole) - two, 1e-300)
 
 
 def _improved(
