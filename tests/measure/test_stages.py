@@ -13,8 +13,9 @@ from flarewright.measure.fit import render
 from flarewright.measure.found import Found
 from flarewright.measure.replay import replay
 from flarewright.measure.settle import to_model
-from flarewright.measure.stages import find_ghosts, fit_ghosts
+from flarewright.measure.stages import find_ghosts, fit_ghosts, read_views
 from flarewright.model.capture import FrameInfo, MergedFrame, MergedRun
+from flarewright.model.corrections import Corrections
 from flarewright.model.ghost_model import GhostModel
 
 ANGLES = np.linspace(2.0, LARGEST, 12)
@@ -88,6 +89,43 @@ def test_a_person_can_take_a_ghost_away_and_point_at_one(folder, tmp_path, capsy
     path.write_text(json.dumps({"add": [pointed], "remove": ["1"]}))
     assert command(["measure", "find", str(folder), "--corrections", str(path), "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["find"]["ghosts"] == 0
+
+
+def test_a_fit_does_not_find_again_what_a_person_took_away(tmp_path):
+    write(tmp_path, GHOSTS[:2])
+    run = read_run(tmp_path)
+    found = find_ghosts(tmp_path, run)
+    unwanted = min(found.ghosts, key=lambda ghost: abs(ghost.green.f[0] - 55.0))
+    rough = find_ghosts(tmp_path, run, corrections=Corrections(remove=(unwanted.name,)))
+    assert len(rough.ghosts) == len(found.ghosts) - 1
+    assert [ghost.name for ghost in rough.removed] == [unwanted.name]
+    model = fit_ghosts(tmp_path, run, rough)
+    assert [round(ghost.green.f[0], -1) for ghost in model.ghosts] == [-110.0]
+    # the frames still show its light, so a replay does
+    angle = float(ANGLES[6])
+    shown = replay(model, angle)[0].pixels[..., 1] - render(GHOSTS[0], views((), angles=[angle])[0])
+    truth = render(GHOSTS[1], views((), angles=[angle])[0])
+    assert shown.sum() == pytest.approx(truth.sum(), rel=0.2)
+
+
+@pytest.mark.parametrize(("every", "kept"), [(1, 8), (2, 4), (3, 4)])
+def test_only_every_nth_constellation_of_each_roll_is_read(tmp_path, every, kept):
+    (tmp_path / "frames").mkdir()
+    infos = []
+    for k, (angle, roll) in enumerate((angle, roll) for angle in (2.0, 4.0, 6.0, 8.0) for roll in (0.0, 90.0)):
+        view = views((), angles=[angle], roll_deg=roll)[0]
+        info = FrameInfo(
+            file=f"frames/{k:03d}.exr", constellation_deg=angle + 0.001 * (roll > 0.0), nominal_deg=angle,
+            roll_deg=roll, nominal_roll_deg=roll, light_px=(9.0, 9.0), axis_px=(120.0, 80.0),
+        )  # fmt: skip
+        write_frame(tmp_path, MergedFrame(info, view.pixels, view.variance))
+        infos.append(info)
+    run = MergedRun(size_px=SIZE, frames=tuple(infos), axis_px=(120.0, 80.0), px_per_rad=FOCAL)
+    read = read_views(tmp_path, run, every)
+    assert len(read) == kept
+    for roll in (0.0, 90.0):
+        turned = [view.constellation_deg for view in read if round(view.roll_deg) == roll]
+        assert turned == pytest.approx([2.0, 4.0, 6.0, 8.0][::every], abs=0.01)
 
 
 def test_what_came_of_corrections_is_told(folder, tmp_path, capsys):

@@ -52,9 +52,9 @@ def fit(folder: Folder, every: Every = 1, threads: Threads = None, as_json: Json
     _one("fit", folder, every, None, threads, as_json)
 
 
-def track(folder: Folder, every: Every = 1, as_json: Json = False) -> None:
+def track(folder: Folder, every: Every = 1, threads: Threads = None, as_json: Json = False) -> None:
     """Follow the ghosts of DIR/model.json from frame to frame: births, deaths and crossings, in DIR/tracks.json."""
-    _one("track", folder, every, None, None, as_json)
+    _one("track", folder, every, None, threads, as_json)
 
 
 def compress(folder: Folder, every: Every = 1, threads: Threads = None, as_json: Json = False) -> None:
@@ -207,9 +207,10 @@ def _track(job: _Job, made: Path, _steps: Journal) -> None:
     from ..io.ghost_model_file import write_tracks
     from ..measure.track_stage import track_ghosts
 
-    write_tracks(
-        made, track_ghosts(job.folder, job.run, _model(job.folder / MODEL), every=job.every, tell=job.progress)
+    tracks = track_ghosts(
+        job.folder, job.run, _model(job.folder / MODEL), every=job.every, threads=job.threads, tell=job.progress
     )
+    write_tracks(made, tracks)
 
 
 def _compress_given(job: _Job) -> dict[str, object]:

@@ -36,7 +36,9 @@ _DIGIT = 3.0
 _ABOUT = 1
 
 
-def with_detail(model: GhostModel, views: Sequence[View], left: Sequence[Pixels]) -> GhostModel:
+def with_detail(
+    model: GhostModel, views: Sequence[View], left: Sequence[Pixels], threads: int | None = None
+) -> GhostModel:
     """Return a model whose sprites that follow ghosts have detail.
 
     Parameters
@@ -53,10 +55,14 @@ def with_detail(model: GhostModel, views: Sequence[View], left: Sequence[Pixels]
     GhostModel
         The same where no sprite has three pictures.
     """
-    return where_foretold(model, lambda one: one if one.moves is None else _learned(one, one.moves, views, left))
+    return where_foretold(
+        model, lambda one: one if one.moves is None else _learned(one, one.moves, views, left, threads)
+    )
 
 
-def _learned(sprite: Sprite, moves: Moves, views: Sequence[View], left: Sequence[Pixels]) -> Sprite:
+def _learned(
+    sprite: Sprite, moves: Moves, views: Sequence[View], left: Sequence[Pixels], threads: int | None
+) -> Sprite:
     angles = np.array(sprite.constellation_deg)
     unit = _DIGIT * darkest_noise(views) * _PARTS / sprite.grain_px
 
@@ -66,7 +72,7 @@ def _learned(sprite: Sprite, moves: Moves, views: Sequence[View], left: Sequence
         text, picture = told_detail(np.nan_to_num(sure(light[None], variance[None])[0]).astype(np.float32), unit)
         return text, picture, known
 
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
+    with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
         cells, pictures, known = zip(*pool.map(keep, nearest_views(sprite, views)), strict=True)
         inner = range(1, len(angles) - 1)
         foretold = list(pool.map(lambda k: _foretold(sprite, moves, pictures, known[k], angles, k), inner))

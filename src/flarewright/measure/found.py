@@ -26,12 +26,15 @@ class Found:
         Views in which it is there.
     fits : tuple of Fit or None
         Of each colour, when fitted.
+    unwanted : bool
+        A person says that it is none: it accounts for its light beside the others, but no model has it.
     """
 
     shapes: tuple[Shape, Shape, Shape]
     first: int
     last: int
     fits: tuple[Fit | None, Fit | None, Fit | None] = (None, None, None)
+    unwanted: bool = False
 
 
 def by_light(ghosts: Sequence[Found]) -> list[int]:

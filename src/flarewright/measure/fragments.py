@@ -78,7 +78,9 @@ def _hosts(ghost: Found, ghosts: Sequence[Found]) -> list[Found]:
         larger = abs(float(theirs[FIRST_G]))
         shared = min(ghost.last, other.last) - max(ghost.first, other.first) + 1
         apart = abs(float(own[0] - theirs[0])) / max(larger, 1e-9)
-        if other is not ghost and larger >= size and apart < _APART and shared > _SHARED * (ghost.last - ghost.first):
+        if ghost.unwanted or other.unwanted or other is ghost:
+            continue
+        if larger >= size and apart < _APART and shared > _SHARED * (ghost.last - ghost.first):
             hosts.append((apart, other))
     return [other for _, other in sorted(hosts, key=lambda pair: pair[0])[:2]]
 

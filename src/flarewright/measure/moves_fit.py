@@ -40,12 +40,13 @@ _MATCH, _FORETELL = 3.0, 2.0
 _LOUD, _LOUDEST = 4.0, 127.0
 
 
-def with_moves(model: GhostModel) -> GhostModel:
+def with_moves(model: GhostModel, threads: int | None = None) -> GhostModel:
     """Return a model whose sprites that follow ghosts have moves.
 
     Parameters
     ----------
     model : GhostModel
+    threads : int, optional
 
     Returns
     -------
@@ -53,12 +54,12 @@ def with_moves(model: GhostModel) -> GhostModel:
         The same where no sprite has three pictures.
     """
     packed = pack(model)
-    return where_foretold(model, lambda one: _learned(one, packed, model))
+    return where_foretold(model, lambda one: _learned(one, packed, model, threads))
 
 
-def _learned(sprite: Sprite, packed: Packed, model: GhostModel) -> Sprite:
+def _learned(sprite: Sprite, packed: Packed, model: GhostModel, threads: int | None) -> Sprite:
     left, angles = sprite.pictures, sprite.constellation_deg
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
+    with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
         whole = left + np.stack(list(pool.map(lambda angle: ghosts_light(sprite, packed, model, angle), angles)))
         missed = [np.stack(list(pool.map(lambda k: _missed_boxed(sprite, packed, model, k), _inner(left))))]
         steps = []

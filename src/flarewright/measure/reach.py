@@ -37,7 +37,7 @@ _WINDOW, _AS_BRIGHT = 4, 0.3
 _BLOCK = 2
 
 
-def with_reaches(model: GhostModel, views: Sequence[View]) -> GhostModel:
+def with_reaches(model: GhostModel, views: Sequence[View], threads: int | None = None) -> GhostModel:
     """Return a model whose sprites that follow ghosts know how far light goes between their pictures.
 
     Parameters
@@ -45,17 +45,18 @@ def with_reaches(model: GhostModel, views: Sequence[View]) -> GhostModel:
     model : GhostModel
     views : sequence of View
         As photographed. Of several that made one picture, the nearest to its constellation tells.
+    threads : int, optional
 
     Returns
     -------
     GhostModel
         The same where no sprite has three pictures.
     """
-    return where_foretold(model, lambda one: _learned(one, views))
+    return where_foretold(model, lambda one: _learned(one, views, threads))
 
 
-def _learned(sprite: Sprite, views: Sequence[View]) -> Sprite:
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
+def _learned(sprite: Sprite, views: Sequence[View], threads: int | None) -> Sprite:
+    with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
         seen = list(pool.map(lambda k: told(sprite, views[k]), nearest_views(sprite, views)))
         # what is not seen may be as bright as you like
         brights = [np.where(np.isnan(light), np.inf, light).max(axis=2) for light, _ in seen]

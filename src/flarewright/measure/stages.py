@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ..errors import FlarewrightError
 from ..io.merged import read_frame
 from ..kernels.measure_pupil import FIRST_DISC, FIRST_I, LATERAL, SOFT
-from ..model.capture import MergedRun
+from ..model.capture import FrameInfo, MergedRun
 from ..model.corrections import Corrections
 from ..model.ghost_model import AberrationGhost, Blades, GhostModel, Halo, Reference, Star
 from ..model.sprite import Sprite
@@ -60,16 +60,20 @@ SEARCH_WIDTH = 400
 
 
 def read_views(folder: Path, run: MergedRun, every: int = 1) -> tuple[View, ...]:
-    """Read every n-th frame of a run, by rising constellation; the others are never opened.
+    """Read every n-th frame of each roll of a run, by rising constellation; the others are never opened.
 
     Raises
     ------
     FlarewrightError
         When frames cannot be read or are too few.
     """
-    frames = sorted(run.frames, key=lambda each: (each.constellation_deg, each.roll_deg))
-    largest = max((abs(each.constellation_deg) for each in frames), default=0.0)
-    return views_of([read_frame(folder, info) for info in frames[::every]], largest)
+    largest = max((abs(each.constellation_deg) for each in run.frames), default=0.0)
+    rolls: dict[float, list[FrameInfo]] = {}
+    for each in sorted(run.frames, key=lambda one: (one.nominal_deg, one.constellation_deg)):
+        rolls.setdefault(each.nominal_roll_deg, []).append(each)
+    frames = [each for turned in rolls.values() for each in turned[::every]]
+    frames.sort(key=lambda each: (each.constellation_deg, each.roll_deg))
+    return views_of([read_frame(folder, info) for info in frames], largest)
 
 
 def masks_of(views: Sequence[View]) -> list[NDArray[np.bool_]]:
@@ -191,8 +195,12 @@ def find_ghosts(
         )  # fmt: skip
         found = lit(joined(lit(found, small, pool=pool), small, pool=pool, tell=tell), small, pool=pool)
     tell_pointed(known, pointed, found, tell)
-    ghosts = kept(known, to_model([_sized(ghost, 2.0**times) for ghost in found], views), tell)
-    return _model(run, ghosts, dim, views)
+    ghosts = to_model([_sized(ghost, 2.0**times) for ghost in found], views)
+    wanted = kept(known, ghosts, tell)
+    rough: GhostModel = _model(run, wanted, dim, views).replace(
+        removed=tuple(ghost for ghost in ghosts if ghost not in wanted)
+    )
+    return rough
 
 
 def fit_ghosts(
@@ -238,9 +246,13 @@ def fit_ghosts(
         When frames cannot be read, or a ghost is none that is fitted here.
     """
     views = read_views(folder, run, every)
-    found = [_found(ghost, views) for ghost in rough.ghosts if isinstance(ghost, AberrationGhost)]
-    if len(found) < len(rough.ghosts):
+    if not all(isinstance(ghost, AberrationGhost) for ghost in (*rough.ghosts, *rough.removed)):
         raise FlarewrightError("a Bezier ghost cannot be fitted over all constellations; take it out of the model")
+    found = [_found(ghost, views) for ghost in rough.ghosts if isinstance(ghost, AberrationGhost)]
+    # else the search for more would find them again, and the others would share their light
+    found += [
+        replace(_found(ghost, views), unwanted=True) for ghost in rough.removed if isinstance(ghost, AberrationGhost)
+    ]
     settling = how or Settling(rounds=1)
     dim = _dimmed_beside(found, views, _star_of(views))
     iris = iris_of(dim.star)
@@ -258,10 +270,12 @@ def fit_ghosts(
                 settled, dim.views, how=settling, iris=iris, pool=pool, tell=tell, progress=next(parts),
                 journal=journal,
             )  # fmt: skip
-    return with_rest(_model(run, to_model(settled, views), _dimmed_beside(settled, views, dim.star), views), views)
+    dim = _dimmed_beside(settled, views, dim.star)
+    wanted = [ghost for ghost in settled if not ghost.unwanted]
+    return with_rest(_model(run, to_model(wanted, views), dim, views), views, threads)
 
 
-def with_rest(model: GhostModel, views: Sequence[View]) -> GhostModel:
+def with_rest(model: GhostModel, views: Sequence[View], threads: int | None = None) -> GhostModel:
     """Return a model with what views show beside its ghosts, star and halo as sprites, in the place of old ones.
 
     Parameters
@@ -269,6 +283,7 @@ def with_rest(model: GhostModel, views: Sequence[View]) -> GhostModel:
     model : GhostModel
     views : sequence of View
         As photographed.
+    threads : int, optional
     """
     left, placed = [], []
     for view in views:
@@ -290,13 +305,13 @@ def with_rest(model: GhostModel, views: Sequence[View]) -> GhostModel:
     axis = axis_sprite(placed, _all_hidden(_all_hidden(left, masks), next_to_light))
     left = _beside_sprites(left, (axis,), placed)
     small = speck_sprites(specks, placed, left, masks_of(placed))
-    moving = with_moves(model.replace(sprites=(*spikes, *going, axis, *small)))
+    moving = with_moves(model.replace(sprites=(*spikes, *going, axis, *small)), threads)
     packed = pack(moving)
     left = [
         each - draw_specks(small, packed, moving, view.constellation_deg, view.frame, view.size_px)
         for each, view in zip(left, placed, strict=True)
     ]
-    return with_reaches(with_detail(moving, placed, _all_hidden(left, next_to_light)), placed)
+    return with_reaches(with_detail(moving, placed, _all_hidden(left, next_to_light), threads), placed, threads)
 
 
 def _all_hidden(pictures: Sequence[Pixels], masks: Sequence[NDArray[np.bool_]]) -> list[Pixels]:

@@ -8,6 +8,8 @@ ghost's birth and death are seen, and what one set of numbers misses becomes a c
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from threading import Event, Lock
 from typing import Literal
 
 import numpy as np
@@ -38,6 +40,7 @@ def follow(
     ghosts: Sequence[Shapes],
     views: Sequence[View],
     *,
+    threads: int | None = None,
     tell: Callable[[float, str], None] = lambda _part, _words: None,
 ) -> Tracks:
     """Follow all ghosts over all views.
@@ -49,6 +52,8 @@ def follow(
         Red, green, blue.
     views : sequence of View
         By rising constellation, halo and star taken off.
+    threads : int, optional
+        Both ways at once when None; the tracks do not depend on it.
     tell : callable
         Gets the finished part and words.
 
@@ -66,23 +71,36 @@ def follow(
     if not ghosts:
         return Tracks(ghosts=())
     radii = np.array([abs(float(shapes[1].numbers[10])) for shapes in ghosts])
-    found: list[Measured | None] = [None] * len(views)
+    told, stopped = Lock(), Event()
     done = 0
-    for way in (order, order[::-1]):
+
+    def along(way: list[int]) -> dict[int, Measured]:
+        nonlocal done
+        found = {}
         history: list[list[tuple[float, Pose]]] = [[] for _ in ghosts]
         for k in way:
+            if stopped.is_set():
+                break
             view = views[k]
             expected = [_foretold(past, view.constellation_deg) for past in history]
             here = measure_together(ghosts, expected, view)
             for g, pose in enumerate(here.poses):
                 if _state(here, g, radii[g]) == "seen" and np.isfinite(here.error[g]).all():
                     history[g] = [*history[g], (view.constellation_deg, pose)][-_HISTORY:]
-            before = found[k]
-            if before is None or here.cost < before.cost:
-                found[k] = here
-            done += 1
-            tell(done / (2 * len(views)), f"{view.constellation_deg:.1f} degrees")
-    measured = [one for one in found if one is not None]
+            found[k] = here
+            with told:
+                done += 1
+                tell(done / (2 * len(views)), f"{view.constellation_deg:.1f} degrees")
+        return found
+
+    with ThreadPoolExecutor(min(threads or 2, 2)) as pool:
+        try:
+            up, down = pool.map(along, (order, order[::-1]))
+        except BaseException:
+            # an interrupt: what has not begun need not
+            stopped.set()
+            raise
+    measured = [down[k] if down[k].cost < up[k].cost else up[k] for k in order]
     angles = np.array([view.constellation_deg for view in views])
     tracks = []
     for g, name in enumerate(names):

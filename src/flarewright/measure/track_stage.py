@@ -21,7 +21,13 @@ Tell = Callable[[float, str], None]
 
 
 def track_ghosts(
-    folder: Path, run: MergedRun, model: GhostModel, *, every: int = 1, tell: Tell = lambda _part, _words: None
+    folder: Path,
+    run: MergedRun,
+    model: GhostModel,
+    *,
+    every: int = 1,
+    threads: int | None = None,
+    tell: Tell = lambda _part, _words: None,
 ) -> Tracks:
     """Follow a model's ghosts through the frames of a run.
 
@@ -33,6 +39,8 @@ def track_ghosts(
         From `fit_ghosts`.
     every : int
         Only every n-th constellation is looked at.
+    threads : int, optional
+        The tracks do not depend on it.
     tell : callable
         Gets the finished part and words.
 
@@ -50,7 +58,7 @@ def track_ghosts(
     times = halvings(run.size_px[0])
     small = [coarse(view, times) for view in views]
     ghosts = [_shapes(ghost, 0.5**times) for ghost in _checked(model)]
-    tracks = follow([ghost.name for ghost in model.ghosts], ghosts, small, tell=tell)
+    tracks = follow([ghost.name for ghost in model.ghosts], ghosts, small, threads=threads, tell=tell)
     return tracks if times == 0 else _enlarged(tracks, 2.0**times)
 
 
@@ -76,7 +84,7 @@ def compress_ghosts(
     if names != {track.name for track in tracks.ghosts}:
         raise FlarewrightError("the tracks are of other ghosts than the model's; run flarewright measure track again")
     small = compact(model, tracks, _views(folder, run, model, every), threads=threads, tell=tell)
-    return with_rest(small, read_views(folder, run, every)) if model.sprites else small
+    return with_rest(small, read_views(folder, run, every), threads) if model.sprites else small
 
 
 def _views(folder: Path, run: MergedRun, model: GhostModel, every: int) -> list[View]:

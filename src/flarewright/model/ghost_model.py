@@ -284,6 +284,8 @@ class GhostModel(Frozen):
     constellation_deg : tuple of float
         Range that was measured.
     ghosts : tuple of AberrationGhost or BezierGhost
+    removed : tuple of AberrationGhost or BezierGhost
+        What a person says is no ghost of the lens: a fit accounts for its light, and nothing draws it.
     halo : Halo or None
     star : Star or None
     sprites : tuple of Sprite
@@ -304,6 +306,7 @@ class GhostModel(Frozen):
     largest_deg: float = Field(gt=0.0, lt=90.0)
     constellation_deg: tuple[float, float]
     ghosts: tuple[Ghost, ...] = ()
+    removed: tuple[Ghost, ...] = ()
     halo: Halo | None = None
     star: Star | None = None
     sprites: tuple[Sprite, ...] = ()
