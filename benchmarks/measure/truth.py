@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from flarewright.kernels.trace import ALIVE, REL, STOP_X, X, Y
+from flarewright.kernels.trace import ALIVE, REL, STOP_X, WEIGHT, X, Y
 from flarewright.optics.bundle import trace_points
 from flarewright.optics.paths import LightPath, ghost_paths
 from flarewright.optics.region import find_region
@@ -25,6 +25,7 @@ Mask = NDArray[np.bool_]
 
 # rays across half the accepted pupil and along it, which tell its shape and its folds
 _RAYS = (48, 96)
+_LEAST_RAYS = 30
 # part of the pupil that must land turned over for a fold
 FOLD = 0.02
 # a rim is one of several that cut a ghost when it stops this part of the rays just outside the open pupil
@@ -121,28 +122,56 @@ def forms_of(setup: Setup, pose: Pose) -> dict[str, tuple[bool, bool]]:
     return {path.name: form for path in paths if (form := _form(shot, path)) is not None}
 
 
-def _form(shot: Shot, path: LightPath) -> tuple[bool, bool] | None:
+@dataclass(frozen=True)
+class PathRays:
+    """Rays of one path over the half of the accepted pupil right of the plane of the light, shape (N,) each.
+
+    Attributes
+    ----------
+    passes : ndarray of bool
+        Which reach the sensor through the iris.
+    stops : ndarray, shape (N, passes of the iris, 2)
+    x, y, weight : ndarray
+        Where they land, mm, and how much of their light does.
+    """
+
+    passes: Mask
+    stops: Floats
+    x: Floats
+    y: Floats
+    weight: Floats
+
+
+def rays_of(shot: Shot, path: LightPath, count: tuple[int, int]) -> PathRays | None:
+    """Trace rays on a grid, row by row along the light's plane; None where too few reach the sensor to tell a form."""
     tilt, radius = shot.incidence.tilt, shot.opening.radius
     region = find_region(shot.packed, path, tilt, radius, shot.view_radius)
     if region is None:
         return None
     x0, x1, y0, y1 = region.box
-    across, along = np.linspace(x0, x1, _RAYS[0]), np.linspace(y0, y1, _RAYS[1])
+    across, along = np.linspace(x0, x1, count[0]), np.linspace(y0, y1, count[1])
     px, py = (each.ravel() for each in np.meshgrid(across, along))
     rays = trace_points(shot.packed, len(shot.packed.wavelengths_nm) // 2, path, tilt, np.stack([px, py], axis=1))
     stops = rays[:, STOP_X:].reshape(len(rays), -1, 2)
     at_stop = np.hypot(stops[..., 0], stops[..., 1]).max(axis=1)
     passes = (rays[:, ALIVE] > 0.5) & (rays[:, REL] <= 1.0) & (at_stop <= radius)
-    if passes.sum() < 30:
+    if passes.sum() < _LEAST_RAYS:
+        return None
+    return PathRays(passes, stops, rays[:, X], rays[:, Y], rays[:, WEIGHT])
+
+
+def _form(shot: Shot, path: LightPath) -> tuple[bool, bool] | None:
+    rays = rays_of(shot, path, _RAYS)
+    if rays is None:
         return None
     grid = _RAYS[::-1]
-    x, y, open_ = rays[:, X].reshape(grid), rays[:, Y].reshape(grid), passes.reshape(grid)
+    x, y, open_ = rays.x.reshape(grid), rays.y.reshape(grid), rays.passes.reshape(grid)
     whole = open_[1:, 1:] & open_[1:, :-1] & open_[:-1, 1:] & open_[:-1, :-1]
     turned = np.diff(x, axis=1)[:-1] * np.diff(y, axis=0)[:, :-1] - np.diff(y, axis=1)[:-1] * np.diff(x, axis=0)[:, :-1]
     over = float(np.mean(turned[whole] > 0.0)) if whole.any() else 0.0
     # each time that the iris is passed it bounds by itself; glass is what stops the others
-    reach = np.hypot(stops[..., 0], stops[..., 1])
-    stopped_by = np.where(at_stop > radius, np.argmax(reach, axis=1), stops.shape[1])
+    reach = np.hypot(rays.stops[..., 0], rays.stops[..., 1])
+    stopped_by = np.where(reach.max(axis=1) > shot.opening.radius, np.argmax(reach, axis=1), rays.stops.shape[1])
     return min(over, 1.0 - over) > FOLD, _bounded_by(open_, stopped_by.reshape(grid)) > 1
 
 
