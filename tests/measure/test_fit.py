@@ -158,7 +158,8 @@ def test_wavelengths_part_where_that_pays_and_where_one_asks():
     assert plain is not None
     apart = spread_by_colour(plain, shown, 1)
     assert not plain.shape.numbers[LATERAL:].any()
-    assert apart.cost < 0.9 * plain.cost
+    # windows differ, for one is wider
+    assert apart.cost / apart.count < 0.9 * plain.cost / plain.count
     assert np.abs(apart.shape.numbers[LATERAL:]) == pytest.approx([4.0, 1.0], abs=0.8)
     # a ghost that is as soft all around keeps its numbers
     numbers[LATERAL:] = 0.0

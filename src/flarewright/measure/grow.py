@@ -139,7 +139,7 @@ def spread_by_colour(
         return fit
     free = np.union1d(fit.free, np.array([SOFT, LATERAL, LATERAL + 1]))
     apart = refine(
-        start, patches, free, width=views[0].size_px[0], steps=10, error=most.error, alike=most.alike, pool=pool
+        start, patches, free, width=views[0].size_px[0], steps=20, error=most.error, alike=most.alike, pool=pool
     )
     shape = apart.shape
     farthest = max(parting_of(shape.numbers, shape.discs, patch.sigma, patch.frame) for patch in patches)

@@ -18,7 +18,7 @@ from ..kernels.measure_changes import draw_with_changes
 from ..kernels.measure_edges import sum_along_rows, sum_changes_along_rows
 from ..kernels.measure_mesh import window_of
 from ..kernels.measure_pupil import FIRST_I
-from .fit import MODEL_ERROR, Indices, Shape, priors, scaled
+from .fit import ALIKE, MODEL_ERROR, Indices, Shape, priors, scaled, witness
 from .found import CHANNELS, Found
 from .numbers import Floats
 from .views import View, halved
@@ -79,19 +79,28 @@ def lit(
         prior = np.concatenate([priors(ghost.shapes[m], _TERMS, views[0].size_px[0]) for ghost in ghosts])
         matrix: Floats = np.zeros((prior.size, prior.size))
         side: Floats = np.zeros(prior.size)
-        np.fill_diagonal(matrix, prior)
         for one in pictures:
             # a matrix times itself: half of the work, and symmetric to the last bit
             root = np.sqrt(one.weight)
             scaled = one.basis * root[:, None]
             matrix[np.ix_(one.columns, one.columns)] += scaled.T @ scaled
             side[one.columns] += scaled.T @ (root * one.pixels)
+        # a picture of fewer pixels has fewer that miss the model alike
+        alike = max(ALIKE * (_WIDTH / views[0].size_px[0]) ** 2, 1.0)
+        first: Floats = np.asarray(np.linalg.solve(matrix + np.diag(prior), side))
+        matrix += np.diag(prior * witness(*_missed(pictures, first), alike))
         if m == 1:
             kept = _needed(matrix, side, pictures, needed)
         at = _columns(kept)
         solved = np.linalg.solve(matrix[np.ix_(at, at)], side[at])
         values[m] = np.asarray(solved, dtype=np.float64).reshape(-1, _TERMS.size)
     return [_with_light(ghosts[int(k)], [values[m][n] for m in range(CHANNELS)]) for n, k in enumerate(kept)]
+
+
+def _missed(pictures: Sequence[_Picture], values: Floats) -> tuple[float, int]:
+    """Return the weighted squares that ghosts of these numbers leave, and how many pixels they are of."""
+    cost = sum(float(one.weight @ (one.pixels - one.basis @ values[one.columns]) ** 2) for one in pictures)
+    return cost, sum(int(np.count_nonzero(one.weight)) for one in pictures)
 
 
 def _columns(kept: Indices) -> Indices:

@@ -41,6 +41,8 @@ SPECK, BESIDE_SPECK = 3.5, 3.0
 _SOON = 2
 # views that a first fit looks at
 _FEW = 16
+# two views tell place and size, and nothing of whether it goes along with the light
+_LEAST_VIEWS = 3
 # how far a candidate grows: most of what lies beside it is not known yet, so its misfit tells nothing of it
 _FIRST = Growth(order=1, discs=1, error=0.05, soft=False, alike=False)
 
@@ -237,7 +239,7 @@ def _try(
     if not (after < (1.0 - EXPLAINS) * before and before - after > SURE**2):
         return None
     first, last = _span(shape, views, rest, (trial.first + trial.last) // 2)
-    if last - first < 1:
+    if last - first + 1 < _LEAST_VIEWS:
         return None
     return Found((shape, shape, shape), first, last)
 
