@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import struct
 import warnings
+import zlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -226,7 +227,7 @@ def _exr_picture(path: Path) -> _Picture:
 
 def _tiff_picture(path: Path) -> _Picture:
     tifffile = _extra("tifffile", path)
-    broken = (OSError, ValueError, KeyError, IndexError, TypeError, RuntimeError, tifffile.TiffFileError)
+    broken = (OSError, ValueError, KeyError, IndexError, TypeError, RuntimeError, zlib.error, tifffile.TiffFileError)
 
     def told(error: BaseException) -> FlarewrightError:
         return FlarewrightError(f"{path} cannot be read as a TIFF file ({_short(error)}): convert it again")
