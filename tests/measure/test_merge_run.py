@@ -95,6 +95,17 @@ def test_a_stopped_run_goes_on_and_gives_the_same(tmp_path):
     assert not stamps(tmp_path / "run").items() & third.items()
 
 
+def test_a_frame_that_was_cut_short_is_merged_anew(tmp_path):
+    captures = read_captures(shoot(tmp_path, {angle: star(light_px(angle)) for angle in ANGLES}))
+    whole = merge_captures(captures, tmp_path, tmp_path / "run")
+    path = tmp_path / "run" / "frames" / "frame-003.exr"
+    data = path.read_bytes()
+    for damaged in (data[: len(data) // 2], b""):
+        path.write_bytes(damaged)
+        assert merge_captures(captures, tmp_path, tmp_path / "run") == whole
+        assert path.read_bytes() == data
+
+
 def test_a_person_may_point_at_the_light(tmp_path):
     captures = read_captures(shoot(tmp_path, {angle: star(light_px(angle), (80.0, 10.0)) for angle in ANGLES}))
     with pytest.raises(FlarewrightError, match="two lights were found"):

@@ -195,7 +195,7 @@ def _frame(
     note = output / f"{FRAMES}/frame-{number:03d}.json"
     stamps = [(folder / one.file).stat() for one in group]
     digest = _digest([common, [one.model_dump() for one in group], [(s.st_size, s.st_mtime_ns) for s in stamps]])
-    kept = _kept(note, digest) if (output / file).is_file() else None
+    kept = _kept(note, digest, output / file)
     if kept is not None:
         return _Merged(file, group, kept, kept.clipped_share)
     shots = [known.exposure(open_photo(folder / one.file, _white_of(known), known.block), one) for one in group]
@@ -214,7 +214,10 @@ def _frame(
     info = FrameInfo(file=file, constellation_deg=group[0].constellation_deg or 0.0, nominal_deg=0.0,
                      light_px=sighting.position_px, axis_px=(0.0, 0.0))  # fmt: skip
     write_frame(output, MergedFrame(info, mean, variance))
-    facts = {"digest": digest, "sighting": asdict(sighting), "ratios": [asdict(one) for one in ratios]}
+    facts = {
+        "digest": digest, "bytes": (output / file).stat().st_size, "sighting": asdict(sighting),
+        "ratios": [asdict(one) for one in ratios],
+    }  # fmt: skip
     write_atomically(note, lambda temporary: _write(temporary, json.dumps(facts) + "\n"))
     return _Merged(file, group, sighting, sighting.clipped_share)
 
@@ -235,11 +238,12 @@ def _array_digest(array: np.ndarray[Any, Any] | None) -> str:
     return "" if array is None else hashlib.sha256(np.ascontiguousarray(array).tobytes()).hexdigest()
 
 
-def _kept(note: Path, digest: str) -> Sighting | None:
-    """Return what an earlier run noted of a frame made from the same photographs in the same way."""
+def _kept(note: Path, digest: str, frame: Path) -> Sighting | None:
+    """Return what an earlier run noted of a frame made from the same photographs in the same way, if it is whole."""
     try:
         data = json.loads(note.read_text("utf-8"))
-        if data["digest"] != digest:
+        size = frame.stat().st_size
+        if data["digest"] != digest or data.get("bytes", size) != size:
             return None
         facts = data["sighting"]
         pair = facts["rival_px"]
