@@ -7,6 +7,7 @@ import pytest
 from camera_raw import camera_to_rec709
 from measured_run import SETUP, Measured
 from star_run import ANGLES, CAMERA, light_px, shoot, shoot_raw, star
+from synthetic_camera import expose
 
 from flarewright.errors import FlarewrightError
 from flarewright.io.captures import read_captures
@@ -104,6 +105,42 @@ def test_a_frame_that_was_cut_short_is_merged_anew(tmp_path):
         path.write_bytes(damaged)
         assert merge_captures(captures, tmp_path, tmp_path / "run") == whole
         assert path.read_bytes() == data
+
+
+KNOWN = CameraNoise(black_level=CAMERA.black, white_level=CAMERA.white, electrons_per_unit=3.0, read_noise=4.0)
+
+
+@pytest.mark.parametrize("camera", [KNOWN, KNOWN.replace(electrons_per_unit=None, read_noise=None)])
+@pytest.mark.parametrize(
+    ("mistake", "words"),
+    [
+        ("swapped", r"2-1\.npy and 2-0\.npy .* more than 100 times"),
+        ("cap on", r"2-0\.npy and 2-1\.npy .* more than 100 times"),
+        ("cap on the short one", r"2-0\.npy and 2-1\.npy .* less than a hundredth"),
+        ("ten times as long", r"0-0\.npy and 0-1\.npy .* should have 0\.0031 .* and has 10 times"),
+        ("half as long", r"0-0\.npy and 0-1\.npy .* and has 0\.5. times"),
+    ],
+)
+def test_exposures_that_are_not_what_the_list_says_are_told(tmp_path, camera, mistake, words):
+    listed = shoot(tmp_path, {angle: star(light_px(angle)) for angle in ANGLES})
+    text = listed.read_text()
+    match mistake:
+        case "swapped":
+            listed.write_text(text.replace("2-0.npy", "@").replace("2-1.npy", "2-0.npy").replace("@", "2-1.npy"))
+        case "cap on" | "cap on the short one":
+            dark = expose(CAMERA, np.zeros((64, 96, 3), np.float32), 1.0, 1.0, (7,))
+            np.save(tmp_path / ("2-1.npy" if mistake == "cap on" else "2-0.npy"), dark)
+        case _:
+            listed.write_text(text.replace(",0.125,", ",1.25," if mistake.startswith("ten") else ",0.0625,"))
+    with pytest.raises(FlarewrightError, match=words):
+        merge_captures(read_captures(listed), tmp_path, tmp_path / "run", camera=camera)
+
+
+def test_a_light_that_flickers_and_a_shutter_that_lies_are_put_right(tmp_path):
+    listed = shoot(tmp_path, {angle: star(light_px(angle)) for angle in ANGLES})
+    listed.write_text(listed.read_text().replace(",0.125,", ",0.15,"))
+    run = merge_captures(read_captures(listed), tmp_path, tmp_path / "run", camera=KNOWN)
+    assert run.px_per_rad == pytest.approx(400.0, rel=0.01)
 
 
 def test_a_person_may_point_at_the_light(tmp_path):

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ..errors import FlarewrightError
 from ..io.photo import Photo, open_photo
 from ..model.capture import CameraNoise, Capture, Matrix3
-from .merge import Exposure
+from .merge import Exposure, refuse_contradiction
 from .noise import LEVEL_SIDE, Band, Noise, Transfer, common_black, fit_transfer, noise_of, smooth, transfers
 
 # so many constellations and bands of rows are looked at
@@ -116,6 +116,11 @@ def calibrate(captures: Sequence[Capture], folder: Path, camera: CameraNoise, bl
     darks = [photos[one.file] for one in captures if one.kind == "dark"]
     black = _black(first, camera, darks, pairs, white, remarks)
     black_noise = 1.0 / len(darks) if black.ndim == 3 else 0.0
+    if np.isfinite(white):
+        # noise is found by exposures of the same light, so they have to be what the list says
+        silent = (Noise(0.0, 0.0),) * 3
+        for group in groups:
+            refuse_contradiction([Exposure(photos[a.file], a.exposure_s, silent, black, white) for a in group])
     points = _points(pairs, black, white, first.samples, black_noise) + _dark_points(darks, first.samples)
     known = camera
     if camera.electrons_per_unit is None or camera.read_noise is None:

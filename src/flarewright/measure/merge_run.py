@@ -28,7 +28,7 @@ from .calibrate import Calibration, calibrate
 from .drift import without_drift
 from .geometry import Geometry, Seen, believable, solve_geometry
 from .light import Sighting, find_light
-from .merge import exposure_ratios, merge, without_idle_digits
+from .merge import exposure_ratios, merge, refuse_contradiction, without_idle_digits
 from .symmetry import axis_beside_path, reduced
 from .upright import make_upright
 
@@ -109,7 +109,8 @@ def merge_captures(
     Raises
     ------
     FlarewrightError
-        When photographs cannot be read, are of several sizes or saturated everywhere, or show no light or two.
+        When photographs cannot be read, are of several sizes, saturated everywhere, or not what the list says, or show
+        no light or two.
     OutputError
         When the folder cannot be written or is too small.
     """
@@ -199,6 +200,7 @@ def _frame(
     if kept is not None:
         return _Merged(file, group, kept, kept.clipped_share)
     shots = [known.exposure(open_photo(folder / one.file, _white_of(known), known.block), one) for one in group]
+    refuse_contradiction(shots)
     ratios = exposure_ratios(shots)
     shots = [replace(one, seconds=one.seconds * ratio.value) for one, ratio in zip(shots, ratios, strict=True)]
     mean, variance = merge(shots)
