@@ -156,6 +156,44 @@ def test_a_person_may_point_at_the_light(tmp_path):
     assert run.px_per_rad == pytest.approx(400.0, rel=0.01)
 
 
+def pointing(listed, scale=1.0):
+    """Let a list say where the light is."""
+    head, *rows = listed.read_text().splitlines()
+    k = head.split(",").index("constellation_deg")
+    places = [np.multiply(light_px(float(row.split(",")[k])), scale) for row in rows]
+    rows = [f"{row},{x:.2f},{y:.2f}\n" for row, (x, y) in zip(rows, places, strict=True)]
+    listed.write_text(f"{head},light_x_px,light_y_px\n" + "".join(rows))
+    return read_captures(listed)
+
+
+@pytest.mark.parametrize("raw", [False, True])
+@pytest.mark.parametrize("block", [1, 2])
+def test_what_a_person_says_in_pixels_means_those_of_the_file(tmp_path, raw, block):
+    if raw:
+        lines = ["file,constellation_deg\n"]
+        for k, angle in enumerate(ANGLES):
+            for j, time in enumerate(CAMERA.exposures_s):
+                shoot_raw(tmp_path, star(light_px(angle)), f"{k}-{j}.dng", time, 10 * k + j)
+                lines.append(f"{k}-{j}.dng,{angle:g}\n")
+        (tmp_path / "captures.csv").write_text("".join(lines))
+    else:
+        shoot(tmp_path, {angle: star(light_px(angle)) for angle in ANGLES})
+    side = 2 if raw else 1
+    captures = pointing(tmp_path / "captures.csv", scale=side)
+    camera, settings = KNOWN.replace(pitch_um=125.0 / side), MergeSettings(block=block)
+    run = merge_captures(captures, tmp_path, tmp_path / "run", camera=camera, settings=settings)
+    assert run.px_per_rad == pytest.approx(400.0 / block, rel=0.01)
+    assert run.frames[3].light_px == pytest.approx(np.divide(light_px(3.0), block), abs=0.01)
+    # a pixel of a merged frame is as large as the pixels of the file that are in it
+    alone = [one.replace(constellation_deg=0.0, focal_mm=50.0) for one in captures[:2]]
+    run = merge_captures(alone, tmp_path, tmp_path / "alone", camera=camera, settings=settings)
+    assert run.px_per_rad == pytest.approx(400.0 / block)
+    beyond = [one.replace(light_x_px=96.5 * side) for one in captures]
+    size = f"{96 * side}x{64 * side}"
+    with pytest.raises(FlarewrightError, match=rf"0-\d\.\w+ is \(.*outside of its {size} pixels"):
+        merge_captures(beyond[:2], tmp_path, tmp_path / "beyond", camera=camera, settings=settings)
+
+
 def test_raw_files_with_dark_frames_and_flats_merge_to_the_scene(tmp_path):
     scene = {angle: star(light_px(angle)) for angle in ANGLES}
     lines = ["file,constellation_deg,kind\n"]

@@ -58,6 +58,8 @@ class Photo:
         The camera's own multipliers, green 1.
     to_rec709 : tuple of 3 tuples of 3 float, or None
         From its numbers above black, before any white balance, to linear Rec.709; None: the file does not tell.
+    side : int
+        So many by so many of the file's own pixels, or photosites, are one of these.
     """
 
     path: Path
@@ -69,6 +71,7 @@ class Photo:
     step: float = 1.0
     white_balance: tuple[float, float, float] = (1.0, 1.0, 1.0)
     to_rec709: Matrix3 | None = None
+    side: int = 1
 
 
 def open_photo(path: Path, white_level: float | None = None, block: int = 1) -> Photo:
@@ -282,7 +285,7 @@ def _open_raw(path: Path, white_level: float | None) -> Photo:
     return Photo(
         path, size, _mosaic_rows(lru_cache(maxsize=1)(load), colors, size[0], white), (levels[0], levels[1], levels[2]),
         white, (1, 2, 1), white_balance=(balance[0], balance[1], balance[2]),
-        to_rec709=to_rec709,
+        to_rec709=to_rec709, side=2,
     )  # fmt: skip
 
 
@@ -347,7 +350,7 @@ def _blocks(photo: Photo, block: int) -> Photo:
 
     red, green, blue = photo.samples
     samples = (red * block**2, green * block**2, blue * block**2)
-    return replace(photo, size_px=(width, height), rows=rows, samples=samples)
+    return replace(photo, size_px=(width, height), rows=rows, samples=samples, side=photo.side * block)
 
 
 def _extra(name: str, path: Path) -> Any:

@@ -52,6 +52,8 @@ class Calibration:
         As of `Photo`.
     block : int
         Pixels averaged a side.
+    side : int
+        As of `Photo`.
     remarks : tuple of str
     """
 
@@ -66,6 +68,7 @@ class Calibration:
     white_balance: tuple[float, float, float]
     to_rec709: Matrix3 | None
     block: int
+    side: int
     remarks: tuple[str, ...]
 
     def exposure(self, photo: Photo, capture: Capture, ratio: float = 1.0) -> Exposure:
@@ -131,7 +134,7 @@ def calibrate(captures: Sequence[Capture], folder: Path, camera: CameraNoise, bl
     response = _response([photos[one.file] for one in captures if one.kind == "flat"], black)
     return Calibration(
         known, black, black_noise, white, response, first.size_px, first.samples, first.step, first.white_balance,
-        first.to_rec709, block, tuple(remarks),
+        first.to_rec709, block, first.side, tuple(remarks),
     )  # fmt: skip
 
 

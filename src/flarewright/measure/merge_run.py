@@ -10,7 +10,7 @@ import hashlib
 import json
 import os
 import shutil
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import asdict, dataclass, replace
 from math import hypot
@@ -208,11 +208,7 @@ def _frame(
     full = float(np.mean(shots[0].full)) if np.isfinite(known.white) else 1.0
     scale = np.asarray(balance, np.float32) / np.float32(full)
     mean, variance = without_idle_digits(mean * scale, variance * scale**2)
-    sighting = find_light(mean, variance)
-    pointed = next((one for one in group if one.light_x_px is not None), None)
-    if pointed is not None and pointed.light_x_px is not None and pointed.light_y_px is not None:
-        place = (pointed.light_x_px, pointed.light_y_px)
-        sighting = replace(sighting, position_px=place, error_px=_POINTED, at_border=False, rival_px=None)
+    sighting = _pointed(find_light(mean, variance), group, known)
     info = FrameInfo(file=file, constellation_deg=group[0].constellation_deg or 0.0, nominal_deg=0.0,
                      light_px=sighting.position_px, axis_px=(0.0, 0.0))  # fmt: skip
     write_frame(output, MergedFrame(info, mean, variance))
@@ -222,6 +218,22 @@ def _frame(
     }  # fmt: skip
     write_atomically(note, lambda temporary: _write(temporary, json.dumps(facts) + "\n"))
     return _Merged(file, group, sighting, sighting.clipped_share)
+
+
+def _pointed(sighting: Sighting, group: Sequence[Capture], known: Calibration) -> Sighting:
+    """Return the light where a person says that it is, if one does."""
+    for one in group:
+        if one.light_x_px is None or one.light_y_px is None:
+            continue
+        x, y = one.light_x_px / known.side, one.light_y_px / known.side
+        width, height = known.size_px
+        if not (0.0 <= x <= width and 0.0 <= y <= height):
+            raise FlarewrightError(
+                f"light_x_px, light_y_px of {one.file} is ({one.light_x_px:g}, {one.light_y_px:g}), outside of its "
+                f"{width * known.side}x{height * known.side} pixels; leave them empty where the light is not in it"
+            )
+        return replace(sighting, position_px=(x, y), error_px=_POINTED, at_border=False, rival_px=None)
+    return sighting
 
 
 def _white_of(known: Calibration) -> float | None:
@@ -283,9 +295,8 @@ def _geometry(merged: Sequence[_Merged], found: Sequence[bool], output: Path, kn
             frames.append(reduced(frame.radiance, frame.variance, one.sighting.position_px))
         return axis_beside_path(frames, foot, normal)
 
-    first = merged[0].group[0]
-    pitch = known.camera.pitch_um
-    focal_px = first.focal_mm * 1000.0 / pitch if first.focal_mm is not None and pitch is not None else None
+    focal, pitch = _first(capture.focal_mm for one in merged for capture in one.group), known.camera.pitch_um
+    focal_px = focal * 1000.0 / (pitch * known.side) if focal is not None and pitch is not None else None
     return solve_geometry(seen, known.size_px, across, focal_px)
 
 
@@ -300,17 +311,22 @@ def _run(
                 file=one.file, constellation_deg=placed.constellation_deg,
                 nominal_deg=first.constellation_deg or 0.0, roll_deg=placed.roll_deg, nominal_roll_deg=first.roll_deg,
                 light_px=placed.light_px, light_error_px=placed.light_error_px, light_found=placed.light_found,
-                axis_px=geometry.axis_px, iso=first.iso, f_number=first.f_number,
-                exposures_s=tuple(capture.exposure_s for capture in one.group), focal_mm=first.focal_mm,
-                clipped_share=one.clipped_share,
+                axis_px=geometry.axis_px, iso=first.iso, f_number=_first(capture.f_number for capture in one.group),
+                exposures_s=tuple(capture.exposure_s for capture in one.group),
+                focal_mm=_first(capture.focal_mm for capture in one.group), clipped_share=one.clipped_share,
             )
         )  # fmt: skip
     return MergedRun(
         size_px=known.size_px, frames=tuple(frames), axis_px=geometry.axis_px, axis_error_px=geometry.axis_error_px,
         px_per_rad=geometry.px_per_rad, camera=known.camera, reference_iso=known.camera.iso,
-        reference_f_number=merged[0].group[0].f_number, white_balance=balance,
+        reference_f_number=_first(capture.f_number for one in merged for capture in one.group), white_balance=balance,
         to_rec709=_to_rec709(known, balance), remarks=(*known.remarks, *geometry.remarks),
     )  # fmt: skip
+
+
+def _first(values: Iterable[float | None]) -> float | None:
+    """Return the first that is known."""
+    return next((value for value in values if value is not None), None)
 
 
 def _to_rec709(known: Calibration, balance: tuple[float, float, float]) -> Matrix3 | None:
