@@ -26,6 +26,8 @@ _FAINTEST = 0.05
 _LEAST_CONTRAST = 20.0
 # residuals of the path beyond this part of the width are no path of one light
 _WORST_PATH = 0.02
+# a light that moves by less than this part of the width per tangent stays where it is: even a fisheye has more
+_LEAST_FOCAL = 0.1
 # fewer distinct angles do not fix the distortion
 _FOR_DISTORTION = 8
 # and a power of it is believed when it is so many standard errors
@@ -159,15 +161,11 @@ def solve_geometry(
     seen = [one for one in frames if one.light_px is not None]
     rolls = list(dict.fromkeys(one.nominal_roll_deg for one in frames))
     paths = {roll: path for roll in rolls if (path := _fit_path([one for one in seen if one.nominal_roll_deg == roll]))}
+    for roll, path in paths.items():
+        _check_direction(path, roll, size_px[0])
     centre = 0.5 * size_px[0], 0.5 * size_px[1]
     if not paths:
         return _without_path(frames, centre, size_px, px_per_rad)
-    worst = max(path.residual_px for path in paths.values())
-    if worst > _WORST_PATH * size_px[0]:
-        raise FlarewrightError(
-            f"the light does not move as the angles say (it is {worst:.0f} pixels off): check constellation_deg and "
-            "roll_deg in captures.csv, and that no other light is in the picture"
-        )
     remarks: list[str] = []
     axis, error = _axis(paths, centre, size_px, across, remarks)
     placed = tuple(_place(one, paths.get(one.nominal_roll_deg), axis, next(iter(paths.values()))) for one in frames)
@@ -249,12 +247,6 @@ def _fit_path(seen: Sequence[Seen]) -> _Path | None:
     direction = (fit[1] * u + side[1] * np.array([-u[1], u[0]])) / slope
     foot = fit[0] * u + side[0] * np.array([-u[1], u[0]])
     spread = float(np.sqrt(np.mean(np.square([rest, rest_beside]).sum(axis=0))))
-    sign = 1.0 if fit[1] >= 0.0 else -1.0
-    if sign < 0.0:
-        raise FlarewrightError(
-            "the light moves against the angles: with positive angles it should go right in the upright picture; "
-            "change the sign of constellation_deg, or set roll_deg to 180"
-        )
     # where the law fails there is no jitter
     scatter = 1.4826 * float(np.median(np.abs(rest - np.median(rest))))
     jitter = sqrt(max(scatter**2 - float(np.median([one.error_px**2 for one in seen])), 0.0))
@@ -263,6 +255,32 @@ def _fit_path(seen: Sequence[Seen]) -> _Path | None:
         (float(foot[0]), float(foot[1])), (float(direction[0]), float(direction[1])), law,
         float(np.abs(t).max()), degrees(jitter / slope), spread, len(seen), tuple(map(tuple, covariance.tolist())),
     )  # fmt: skip
+
+
+def _check_direction(path: _Path, roll_deg: float, width: int) -> None:
+    """Refuse a path that is not the one the captures tell of."""
+    if path.residual_px > _WORST_PATH * width:
+        raise FlarewrightError(
+            f"the light does not move as the angles say (it is {path.residual_px:.0f} pixels off): check "
+            "constellation_deg and roll_deg in captures.csv, and that no other light is in the picture"
+        )
+    if path.focal_px < _LEAST_FOCAL * width:
+        raise FlarewrightError(
+            "the light stays where it is in the picture, though the angles change: check constellation_deg in "
+            "captures.csv, and that the photographs are of one light seen by a turning camera"
+        )
+    found_deg = degrees(np.arctan2(-path.direction[1], path.direction[0]))
+    off_deg = (found_deg - roll_deg + 180.0) % 360.0 - 180.0
+    if abs(off_deg) > 135.0:
+        raise FlarewrightError(
+            "the light moves against the angles: with positive angles it should go right in the upright picture; "
+            "change the sign of constellation_deg, or set roll_deg to 180"
+        )
+    if abs(off_deg) > 45.0:
+        raise FlarewrightError(
+            f"the light moves towards {round(found_deg)} deg in the picture (0 right, 90 up) as the angles grow, where "
+            f"roll_deg says {roll_deg:g}: correct roll_deg in captures.csv"
+        )
 
 
 def _by_powers(t: Floats | float, count: int) -> Floats:
