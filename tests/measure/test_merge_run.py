@@ -156,6 +156,44 @@ def test_a_person_may_point_at_the_light(tmp_path):
     assert run.px_per_rad == pytest.approx(400.0, rel=0.01)
 
 
+UNTOLD = KNOWN.replace(black_level=None)
+
+
+def add_dark(folder, level, kind="dark", count=1):
+    """Add photographs of an even level to a list."""
+    for k in range(count):
+        np.save(folder / f"{kind}-{k}.npy", np.full((64, 96, 3), level, np.uint16))
+        with (folder / "captures.csv").open("a") as listed:
+            listed.write(f"{kind}-{k}.npy,,0.125,100,8,{kind}\n")
+
+
+@pytest.mark.parametrize(
+    ("camera", "extra", "words"),
+    [
+        (KNOWN.replace(black_level=9e3), None, r"black level is 9000, which is more than most of .*-0\.npy"),
+        (KNOWN.replace(black_level=600.0), None, "black level is 600, which is more than most"),
+        (KNOWN.replace(white_level=600.0), None, "white_level is 600, but the photographs have numbers up to 16383"),
+        (KNOWN, (3000, "dark"), r"dark-0\.npy, a dark frame, has 3000 where black_level is 512"),
+        (UNTOLD, (3000, "dark"), r"dark-0\.npy, a dark frame, has 3000, which is more than most"),
+        (UNTOLD, (16383, "dark"), r"dark-0\.npy, a dark frame, has 16383, .*where the sensor clips"),
+        (UNTOLD, (16383, "dark", 4), "a dark frame, has 16383, .*where the sensor clips"),
+        (KNOWN, (16383, "flat"), r"flat-0\.npy is saturated, so it is no flat"),
+    ],
+)
+def test_levels_that_the_photographs_cannot_have_are_told(tmp_path, camera, extra, words):
+    shoot(tmp_path, {angle: star(light_px(angle)) for angle in ANGLES})
+    if extra is not None:
+        add_dark(tmp_path, *extra)
+    with pytest.raises(FlarewrightError, match=words):
+        merge_captures(read_captures(tmp_path / "captures.csv"), tmp_path, tmp_path / "run", camera=camera)
+
+
+def test_a_camera_whose_files_tell_no_white_balance_is_told(tmp_path):
+    captures = read_captures(shoot(tmp_path, {angle: star(light_px(angle)) for angle in ANGLES}))
+    with pytest.raises(FlarewrightError, match=r"0-0\.npy does not tell its camera's white balance"):
+        merge_captures(captures, tmp_path, tmp_path / "run", settings=MergeSettings(white_balance="camera"))
+
+
 def pointing(listed, scale=1.0):
     """Let a list say where the light is."""
     head, *rows = listed.read_text().splitlines()
@@ -255,6 +293,15 @@ def test_a_path_that_does_not_fit_the_angles_is_refused():
     backwards = [changed(one, nominal_deg=-one.nominal_deg) for one in straight]
     with pytest.raises(FlarewrightError, match="against the angles"):
         solve_geometry(backwards, (96, 64))
+    for roll in (90.0, -90.0, 60.0, 270.0):
+        with pytest.raises(FlarewrightError, match=rf"towards 0 deg .* where roll_deg says {roll:g}: correct"):
+            solve_geometry([changed(one, nominal_roll_deg=roll) for one in straight], (96, 64))
+    leaning = solve_geometry([changed(one, nominal_roll_deg=30.0) for one in straight], (96, 64))
+    assert leaning.px_per_rad == pytest.approx(7.0 * 180 / np.pi, rel=0.01)
+    for roll in (0.0, 90.0):
+        still = [changed(one, nominal_roll_deg=roll, light_px=(50.0, 30.0)) for one in straight]
+        with pytest.raises(FlarewrightError, match="stays where it is in the picture"):
+            solve_geometry(still, (96, 64))
 
 
 def test_two_rolls_fix_the_axis_without_a_mirror():

@@ -118,8 +118,7 @@ def merge_captures(
     tell = progress or (lambda _part, _words: None)
     tell(0.0, "looking at the photographs")
     known = calibrate(captures, folder, camera or CameraNoise(), chosen.block)
-    balance = known.white_balance if chosen.white_balance == "camera" else (1.0, 1.0, 1.0)
-    balance = chosen.white_balance if isinstance(chosen.white_balance, tuple) else balance
+    balance = _balance(chosen, known, folder / captures[0].file)
     groups = _groups(captures)
     output = _folder(output, len(groups), known.size_px)
     merged = _merge_all(groups, folder, output, known, balance, threads, tell)
@@ -132,6 +131,18 @@ def merge_captures(
     write_run(output, run)
     tell(1.0, "merged")
     return run
+
+
+def _balance(settings: MergeSettings, known: Calibration, photograph: Path) -> tuple[float, float, float]:
+    if isinstance(settings.white_balance, tuple):
+        return settings.white_balance
+    if settings.white_balance == "none":
+        return 1.0, 1.0, 1.0
+    if known.white_balance is None:
+        raise FlarewrightError(
+            f"{photograph} does not tell its camera's white balance: give three factors, --white-balance 2,1,1.5"
+        )
+    return known.white_balance
 
 
 def _groups(captures: Sequence[Capture]) -> list[tuple[Capture, ...]]:
