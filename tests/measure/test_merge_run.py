@@ -96,6 +96,47 @@ def test_a_stopped_run_goes_on_and_gives_the_same(tmp_path):
     assert not stamps(tmp_path / "run").items() & third.items()
 
 
+def test_a_folder_is_for_the_run_of_one_camera(tmp_path):
+    for name in ("mine", "other"):
+        (tmp_path / name).mkdir()
+    mine = shoot(tmp_path / "mine", {angle: star(light_px(angle)) for angle in ANGLES})
+    other = shoot(tmp_path / "other", {angle: star(light_px(angle), level=0.06) for angle in ANGLES})
+    run = tmp_path / "run"
+    merge_captures(read_captures(mine), mine.parent, run)
+    (run / "found.json").write_text("by hand")
+    before = {path: path.read_bytes() for path in run.rglob("*") if path.is_file()}
+
+    def refused():
+        with pytest.raises(FlarewrightError, match=r"run holds the run of other photographs \("):
+            merge_captures(read_captures(other), other.parent, run)
+        assert {path: path.read_bytes() for path in run.rglob("*") if path.is_file()} == before
+
+    # the same names in another folder, or other names in the same one
+    refused()
+    for path in sorted(other.parent.glob("*.npy")):
+        path.rename(mine.parent / f"b{path.name}")
+    other = mine.parent / "other.csv"
+    other.write_text(mine.read_text().replace("\n", "\nb").removesuffix("b"))
+    refused()
+    # photographs that have moved are the same
+    mine.parent.rename(tmp_path / "moved")
+    mine = tmp_path / "moved" / "captures.csv"
+    stamp = stamps(run)
+    merge_captures(read_captures(mine), mine.parent, run)
+    assert stamps(run) == stamp
+
+
+def test_frames_of_lines_that_are_gone_go_too(tmp_path):
+    captures = read_captures(shoot(tmp_path, {angle: star(light_px(angle)) for angle in ANGLES}))
+    run = tmp_path / "run"
+    merge_captures(captures, tmp_path, run, settings=MergeSettings(upright=True))
+    (run / "frames" / "frame-mine.txt").write_text("kept")
+    merge_captures(captures[:-4], tmp_path, run)
+    left = [f"frame-{k:03d}.{kind}" for k in range(len(ANGLES) - 2) for kind in ("exr", "json")]
+    assert sorted(path.name for path in (run / "frames").iterdir()) == [*left, "frame-mine.txt"]
+    assert len(list((run / "upright").iterdir())) == len(ANGLES) - 2
+
+
 def test_a_frame_that_was_cut_short_is_merged_anew(tmp_path):
     captures = read_captures(shoot(tmp_path, {angle: star(light_px(angle)) for angle in ANGLES}))
     whole = merge_captures(captures, tmp_path, tmp_path / "run")

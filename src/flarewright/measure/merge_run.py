@@ -21,7 +21,7 @@ import numpy as np
 
 from ..errors import FlarewrightError, OutputError
 from ..io.atomic import write_atomically
-from ..io.merged import read_frame, write_frame, write_run
+from ..io.merged import read_frame, read_run, write_frame, write_run
 from ..io.photo import open_photo
 from ..model.capture import CameraNoise, Capture, FrameInfo, Matrix3, MergedFrame, MergedRun
 from .calibrate import Calibration, calibrate
@@ -30,7 +30,7 @@ from .geometry import Geometry, Seen, believable, solve_geometry
 from .light import Sighting, find_light
 from .merge import exposure_ratios, merge, refuse_contradiction, without_idle_digits
 from .symmetry import axis_beside_path, reduced
-from .upright import make_upright
+from .upright import UPRIGHT, make_upright
 
 FRAMES = "frames"
 # raise when the same photographs give other pixels, or another place of the light
@@ -110,7 +110,7 @@ def merge_captures(
     ------
     FlarewrightError
         When photographs cannot be read, are of several sizes, saturated everywhere, or not what the list says, or show
-        no light or two.
+        no light or two; when `output` holds the run of others.
     OutputError
         When the folder cannot be written or is too small.
     """
@@ -120,6 +120,7 @@ def merge_captures(
     known = calibrate(captures, folder, camera or CameraNoise(), chosen.block)
     balance = _balance(chosen, known, folder / captures[0].file)
     groups = _groups(captures)
+    _refuse_other_run(output, folder, captures, known.size_px)
     output = _folder(output, len(groups), known.size_px)
     merged = _merge_all(groups, folder, output, known, balance, threads, tell)
     found = believable([one.sighting for one in merged])
@@ -129,6 +130,7 @@ def merge_captures(
     if chosen.upright:
         run = make_upright(output, run, lambda part, words: tell(0.96 + 0.04 * part, words))
     write_run(output, run)
+    _drop_stale(output, len(groups))
     tell(1.0, "merged")
     return run
 
@@ -171,6 +173,49 @@ def _folder(output: Path, frames: int, size_px: tuple[int, int]) -> Path:
             "space, choose another folder, or average pixels with --block 2"
         )
     return output
+
+
+def _origin(folder: Path, captures: Iterable[Capture]) -> dict[str, Any]:
+    """Return what photographs are known by: their folder, names, sizes and times."""
+    stamps = [(one.file, (folder / one.file).stat()) for one in captures]
+    return {"folder": _digest(str(folder.resolve())), "files": [[n, s.st_size, s.st_mtime_ns] for n, s in stamps]}
+
+
+def _refuse_other_run(output: Path, folder: Path, captures: Sequence[Capture], size_px: tuple[int, int]) -> None:
+    """Refuse a folder with the run of other photographs: ghosts that were found in those would pass for these ones'.
+
+    A list may grow and shrink, photographs may move, and be converted anew where they are.
+    """
+    origins = [note["from"] for path in (output / FRAMES).glob("frame-*.json") if "from" in (note := _noted(path))]
+    here = _origin(folder, captures)
+    files = {tuple(one) for one in here["files"]}
+    names = {name for name, *_ in files}
+    for one in origins:
+        known = {tuple(stamp) for stamp in one["files"]}
+        if known & files or (one["folder"] == here["folder"] and names & {name for name, *_ in known}):
+            return
+    told = origins[0]["files"][0][0] if origins else _other_size(output, size_px)
+    if told is not None:
+        raise FlarewrightError(
+            f"{output} holds the run of other photographs ({told}): choose another folder, or remove that one first"
+        )
+
+
+def _other_size(output: Path, size_px: tuple[int, int]) -> str | None:
+    """Return the size of a run that notes no photographs, when it is another."""
+    try:
+        width, height = read_run(output).size_px
+    except FlarewrightError:
+        return None
+    return None if (width, height) == size_px else f"{width}x{height} pixels"
+
+
+def _drop_stale(output: Path, frames: int) -> None:
+    """Remove frames of constellations that the list no longer has."""
+    for path in (*(output / FRAMES).glob("frame-*"), *(output / UPRIGHT).glob("frame-*")):
+        number = path.stem.removeprefix("frame-")
+        if path.suffix in (".exr", ".json") and number.isdecimal() and int(number) >= frames:
+            path.unlink()
 
 
 def _merge_all(
@@ -225,7 +270,7 @@ def _frame(
     write_frame(output, MergedFrame(info, mean, variance))
     facts = {
         "digest": digest, "bytes": (output / file).stat().st_size, "sighting": asdict(sighting),
-        "ratios": [asdict(one) for one in ratios],
+        "ratios": [asdict(one) for one in ratios], "from": _origin(folder, group),
     }  # fmt: skip
     write_atomically(note, lambda temporary: _write(temporary, json.dumps(facts) + "\n"))
     return _Merged(file, group, sighting, sighting.clipped_share)
@@ -263,10 +308,19 @@ def _array_digest(array: np.ndarray[Any, Any] | None) -> str:
     return "" if array is None else hashlib.sha256(np.ascontiguousarray(array).tobytes()).hexdigest()
 
 
+def _noted(note: Path) -> dict[str, Any]:
+    """Return what was noted of a frame; nothing when that cannot be read."""
+    try:
+        data = json.loads(note.read_text("utf-8"))
+    except (OSError, ValueError):
+        return {}
+    return data if isinstance(data, dict) else {}
+
+
 def _kept(note: Path, digest: str, frame: Path) -> Sighting | None:
     """Return what an earlier run noted of a frame made from the same photographs in the same way, if it is whole."""
     try:
-        data = json.loads(note.read_text("utf-8"))
+        data = _noted(note)
         size = frame.stat().st_size
         if data["digest"] != digest or data.get("bytes", size) != size:
             return None
