@@ -229,6 +229,15 @@ def test_levels_that_the_photographs_cannot_have_are_told(tmp_path, camera, extr
         merge_captures(read_captures(tmp_path / "captures.csv"), tmp_path, tmp_path / "run", camera=camera)
 
 
+def test_a_file_with_a_hole_is_named(tmp_path):
+    captures = read_captures(shoot(tmp_path, {angle: star(light_px(angle)) for angle in ANGLES}))
+    pixels = np.load(tmp_path / "3-0.npy")
+    pixels[40:, :] = 0
+    np.save(tmp_path / "3-0.npy", pixels)
+    with pytest.raises(FlarewrightError, match=r"3-0\.npy has numbers far below black over 3[78]% of the picture"):
+        merge_captures(captures, tmp_path, tmp_path / "run", camera=KNOWN)
+
+
 def test_a_camera_whose_files_tell_no_white_balance_is_told(tmp_path):
     captures = read_captures(shoot(tmp_path, {angle: star(light_px(angle)) for angle in ANGLES}))
     with pytest.raises(FlarewrightError, match=r"0-0\.npy does not tell its camera's white balance"):

@@ -252,8 +252,8 @@ def _levels_fit(
     path, usual = min(((path, float(np.median(one))) for path, one in numbers.items()), key=lambda one: one[1])
     if usual < level - doubt:
         raise FlarewrightError(
-            f"{told} {level:g}, which is more than most of {path} has ({usual:g}): photograph dark frames with the cap "
-            "on, or correct black_level in camera.json"
+            f"{told} {level:g}, which is more than most of {path} has ({usual:g}): correct black_level in camera.json, "
+            "photograph dark frames with the cap on, or copy that file again if others are right"
         )
     if camera.white_level is not None and lights[0].step > 0.0 and most - level > _FAR_ABOVE * (white - level):
         raise FlarewrightError(

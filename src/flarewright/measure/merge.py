@@ -36,6 +36,10 @@ _BELIEVED = (0.7, 1.4)
 # many numbers must be there, and so large a part of them must agree: hot pixels do not
 _TELLING, _BLACK_KNOWN, _FEWEST, _MOST = (0.1, 0.02), 1e-4, 150, 0.75
 
+# numbers so far below black, as part of full and in standard deviations, are damage when so large a part of a file has
+# them
+_FAR_BELOW, _FAR_SPREADS, _DEAD = 0.002, 10.0, 0.01
+
 
 @dataclass(frozen=True)
 class Exposure:
@@ -229,6 +233,26 @@ def _ratio(short: Exposure, long: Exposure, rows: int) -> Ratio | None:
     if expected <= 0.0 or have <= 0.0:
         return None
     return Ratio(have / expected, sqrt(variance) / expected)
+
+
+def refuse_damage(one: Exposure, *, rows: int = ROWS) -> None:
+    """Refuse a photograph with numbers that no sensor gives, such as a file with a hole of zeros.
+
+    Raises
+    ------
+    FlarewrightError
+        When many lie far below black.
+    """
+    width, height = one.photo.size_px
+    if not np.isfinite(one.white):
+        return
+    least = -np.maximum(_FAR_BELOW * one.full, _FAR_SPREADS * np.sqrt(one.variance(np.zeros(3))))
+    low = sum(int((one.read(top, min(top + rows, height))[0] < least).sum()) for top in range(0, height, rows))
+    if low > _DEAD * 3 * width * height:
+        raise FlarewrightError(
+            f"{one.photo.path} has numbers far below black over {low / (3 * width * height):.0%} of the picture, as no "
+            "sensor gives them: copy it again, or correct black_level"
+        )
 
 
 def refuse_contradiction(exposures: Sequence[Exposure], *, rows: int = ROWS) -> None:

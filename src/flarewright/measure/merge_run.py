@@ -28,7 +28,7 @@ from .calibrate import Calibration, calibrate
 from .drift import without_drift
 from .geometry import Geometry, Seen, believable, solve_geometry
 from .light import Sighting, find_light
-from .merge import exposure_ratios, merge, refuse_contradiction, without_idle_digits
+from .merge import exposure_ratios, merge, refuse_contradiction, refuse_damage, without_idle_digits
 from .symmetry import axis_beside_path, reduced
 from .upright import UPRIGHT, make_upright
 
@@ -256,6 +256,8 @@ def _frame(
     if kept is not None:
         return _Merged(file, group, kept, kept.clipped_share)
     shots = [known.exposure(open_photo(folder / one.file, _white_of(known), known.block), one) for one in group]
+    for one in shots:
+        refuse_damage(one)
     refuse_contradiction(shots)
     ratios = exposure_ratios(shots)
     shots = [replace(one, seconds=one.seconds * ratio.value) for one, ratio in zip(shots, ratios, strict=True)]
