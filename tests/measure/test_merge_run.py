@@ -282,6 +282,33 @@ def test_what_a_person_says_in_pixels_means_those_of_the_file(tmp_path, raw, blo
         merge_captures(beyond[:2], tmp_path, tmp_path / "beyond", camera=camera, settings=settings)
 
 
+def faint(angle, place, part):
+    """Return the light with another spot, of so much of its light."""
+    return star(light_px(angle)) + part * (star(place) - star())
+
+
+@pytest.mark.parametrize("part", [0.1, 0.003])
+@pytest.mark.parametrize(
+    ("angles", "away"), [(ANGLES, (-30.0, 20.0)), (ANGLES[-2:], (10.0, -20.0)), (ANGLES, (-25.0, 0.2))]
+)
+def test_a_faint_second_light_is_told_by_staying_where_it_is(tmp_path, part, angles, away):
+    scenes = {angle: star(light_px(angle)) for angle in ANGLES}
+    scenes |= {angle: faint(angle, np.add(light_px(angle), away), part) for angle in angles}
+    with pytest.raises(FlarewrightError, match=r"two lights were found, at .* of the frame at"):
+        merge_captures(read_captures(shoot(tmp_path, scenes)), tmp_path, tmp_path / "run", camera=KNOWN)
+
+
+@pytest.mark.parametrize("part", [0.1, 0.01])
+@pytest.mark.parametrize("pace", [-1.0, -0.5, 0.3])
+def test_bright_ghosts_are_no_second_light(tmp_path, part, pace):
+    def ghost(angle):
+        return [middle + pace * (x - middle) for x, middle in zip(light_px(angle), (40.3, 31.6), strict=True)]
+
+    scenes = {angle: faint(angle, ghost(angle), part) for angle in ANGLES}
+    run = merge_captures(read_captures(shoot(tmp_path, scenes)), tmp_path, tmp_path / "run", camera=KNOWN)
+    assert run.px_per_rad == pytest.approx(400.0, rel=0.01)
+
+
 def test_raw_files_with_dark_frames_and_flats_merge_to_the_scene(tmp_path):
     scene = {angle: star(light_px(angle)) for angle in ANGLES}
     lines = ["file,constellation_deg,kind\n"]

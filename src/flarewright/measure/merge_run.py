@@ -26,7 +26,7 @@ from ..io.photo import open_photo
 from ..model.capture import CameraNoise, Capture, FrameInfo, Matrix3, MergedFrame, MergedRun
 from .calibrate import Calibration, calibrate
 from .drift import without_drift
-from .geometry import Geometry, Seen, believable, solve_geometry
+from .geometry import Geometry, Seen, believable, refuse_second_light, solve_geometry
 from .light import Sighting, find_light
 from .merge import exposure_ratios, merge, refuse_contradiction, refuse_damage, without_idle_digits
 from .symmetry import axis_beside_path, reduced
@@ -126,6 +126,7 @@ def merge_captures(
     found = believable([one.sighting for one in merged])
     tell(0.95, "axis")
     geometry = _geometry(merged, found, output, known)
+    refuse_second_light([one.sighting for one in merged], geometry)
     run = without_drift(output, _run(merged, geometry, known, balance))
     if chosen.upright:
         run = make_upright(output, run, lambda part, words: tell(0.96 + 0.04 * part, words))
@@ -290,7 +291,7 @@ def _pointed(sighting: Sighting, group: Sequence[Capture], known: Calibration) -
                 f"light_x_px, light_y_px of {one.file} is ({one.light_x_px:g}, {one.light_y_px:g}), outside of its "
                 f"{width * known.side}x{height * known.side} pixels; leave them empty where the light is not in it"
             )
-        return replace(sighting, position_px=(x, y), error_px=_POINTED, at_border=False, rival_px=None)
+        return replace(sighting, position_px=(x, y), error_px=_POINTED, at_border=False, rival_px=None, other_px=None)
     return sighting
 
 
@@ -326,15 +327,12 @@ def _kept(note: Path, digest: str, frame: Path) -> Sighting | None:
         size = frame.stat().st_size
         if data["digest"] != digest or data.get("bytes", size) != size:
             return None
-        facts = data["sighting"]
-        pair = facts["rival_px"]
-        return Sighting(
-            **{
-                **facts,
-                "position_px": (float(facts["position_px"][0]), float(facts["position_px"][1])),
-                "rival_px": None if pair is None else (float(pair[0]), float(pair[1])),
-            }
-        )
+        facts = {"other_px": None, **data["sighting"]}
+        places = {
+            name: None if (pair := facts[name]) is None else (float(pair[0]), float(pair[1]))
+            for name in ("position_px", "rival_px", "other_px")
+        }
+        return Sighting(**{**facts, **places})
     except (OSError, ValueError, KeyError, TypeError, IndexError):
         return None
 
