@@ -34,6 +34,8 @@ _STAYS_PX, _STAYS, _MOSTLY = 2.0, 0.05, 0.8
 # is no ghost: beside the line from axis to light by this part of the width in two frames, or anywhere in three while
 # the light goes so far; ghosts lie on that line, and a tenth of the width from the light they go at another pace
 _BESIDE, _WAY = 0.1, 0.3
+# cosine from which on a direction counts as ahead of the camera
+_AHEAD = 0.1
 # fewer distinct angles do not fix the distortion
 _FOR_DISTORTION = 8
 # and a power of it is believed when it is so many standard errors
@@ -157,13 +159,15 @@ def refuse_second_light(sightings: Sequence[Sighting], geometry: Geometry) -> No
     turned = np.radians([placed.constellation_deg for _, placed in shown])
     spots = np.array([one.other_px for one, _ in shown]) - geometry.axis_px
     x, beside = (spots * along).sum(axis=1), (spots * across).sum(axis=1)
-    # as the camera would see it if it were turned back to the light
+    # as the camera would see it if it were turned back to the light, unless it would be beside the camera then
     depth = x * np.sin(turned) + focal * np.cos(turned)
+    ahead = depth > _AHEAD * focal
+    depth = np.maximum(depth, _AHEAD * focal)
     room = focal * np.stack([x * np.cos(turned) - focal * np.sin(turned), beside], axis=1) / depth[:, None]
     way = focal * np.tan(turned)
     width = 2.0 * max(geometry.axis_px[0], 1.0)
     off = np.abs(beside) > _BESIDE * width
-    for places, chosen, least in ((room, off, 2), (spots, off, 2), (room, np.full(off.size, True), 3)):
+    for places, chosen, least in ((room, off & ahead, 2), (spots, off, 2), (room, ahead, 3)):
         if chosen.sum() < least:
             continue
         span = float(np.ptp(way[chosen]))
@@ -295,7 +299,7 @@ def _fit_path(seen: Sequence[Seen]) -> _Path | None:
             fit, covariance, rest = bent
     side, _, rest_beside = _robust(_by_powers(t, 1), beside)
     # the turntable's direction in the picture, and the law along it: the tilt is small
-    slope = hypot(fit[1], side[1])
+    slope = max(hypot(fit[1], side[1]), 1e-9)
     direction = (fit[1] * u + side[1] * np.array([-u[1], u[0]])) / slope
     foot = fit[0] * u + side[0] * np.array([-u[1], u[0]])
     spread = float(np.sqrt(np.mean(np.square([rest, rest_beside]).sum(axis=0))))
