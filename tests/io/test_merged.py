@@ -56,6 +56,9 @@ def test_a_missing_or_damaged_frame_is_told(tmp_path: Path) -> None:
     info = _frame().info
     with pytest.raises(FlarewrightError, match="does not exist"):
         read_frame(tmp_path, info)
-    (tmp_path / info.file).write_bytes(b"nonsense")
-    with pytest.raises(FlarewrightError, match="cannot be read"):
-        read_frame(tmp_path, info)
+    write_frame(tmp_path, _frame())
+    whole = (tmp_path / info.file).read_bytes()
+    for damaged in (b"nonsense", whole[: len(whole) // 2], whole[:-40]):
+        (tmp_path / info.file).write_bytes(damaged)
+        with pytest.raises(FlarewrightError, match="cannot be read as a merged frame: remove it and merge again"):
+            read_frame(tmp_path, info)

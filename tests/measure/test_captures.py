@@ -89,11 +89,36 @@ def test_what_is_no_rule_is_told(text):
         (HEAD + "0.npy,0,1,100,8\n1.npy,0,2,100,8\n2.npy,1,1,100,8\n", "1 deg lacks the exposure of 2 s"),
         (HEAD + "0.npy,0,1,100,8,,\n", "more cells"),
         ("file,exposure_s,kind\n0.npy,1,dark\n", "no capture of kind light"),
+        ("file,exposure_s,exposure_s\n0.npy,1,2\n", "column 'exposure_s' is named twice"),
+        (HEAD + "0.npy,0,1,100,8\n1.npy,90,1,100,8\n", "line 3: constellation_deg should be less than 90, not '90'"),
+        (HEAD + "0.npy,0,1,100,8\n1.npy,-95,1,100,8\n", "line 3: constellation_deg should be greater than -90"),
+        (HEAD + "0.npy,0,1,100,8\n1.npy,1,1,100,5.6\n", "0.npy was taken at f/8 and 1.npy at f/5.6"),
+        (HEAD + "0.npy,0,1,100,\n1.npy,0,2,100,8\n2.npy,1,1,100,8\n3.npy,1,2,100,4\n", "1.npy .* f/8 and 3.npy at f/4"),
+        (
+            "file,constellation_deg,exposure_s,focal_mm\n0.npy,0,1,24\n1.npy,1,1,70\n",
+            "0.npy was taken at 24 mm and 1.npy at 70 mm",
+        ),
     ],
 )
 def test_mistakes_are_told_with_their_place(folder, text, word):
     with pytest.raises(FlarewrightError, match=word):
         listed(folder, text)
+
+
+def test_one_mistake_is_told_once(folder):
+    with pytest.raises(FlarewrightError) as told:
+        listed(folder, "file,constellation_deg\n0.npy,\n9.npy,0\n1.npy,1\n")
+    assert len(told.value.problems) == 3
+
+
+def test_an_f_number_may_be_unknown_or_rounded(folder):
+    found = listed(folder, HEAD + "0.npy,0,1,100,\n1.npy,1,1,100,5.6\n2.npy,2,1,100,5.66\n")
+    assert [one.f_number for one in found] == [None, 5.6, 5.66]
+
+
+def test_angles_are_told_once(folder):
+    with pytest.raises(FlarewrightError, match=r"tells constellation_deg of 1\.npy, and so does the rule 0\+0\.5"):
+        listed(folder, HEAD + "0.npy,,1,100,8\n1.npy,7,1,100,8\n", AngleRule(0.0, 0.5))
 
 
 def test_the_camera_file_is_checked(tmp_path):

@@ -7,6 +7,7 @@ import pytest
 from camera_raw import camera_to_rec709
 from measured_run import SETUP, Measured
 from star_run import ANGLES, CAMERA, light_px, shoot, shoot_raw, star
+from synthetic_camera import expose
 
 from flarewright.errors import FlarewrightError
 from flarewright.io.captures import read_captures
@@ -95,6 +96,94 @@ def test_a_stopped_run_goes_on_and_gives_the_same(tmp_path):
     assert not stamps(tmp_path / "run").items() & third.items()
 
 
+def test_a_folder_is_for_the_run_of_one_camera(tmp_path):
+    for name in ("mine", "other"):
+        (tmp_path / name).mkdir()
+    mine = shoot(tmp_path / "mine", {angle: star(light_px(angle)) for angle in ANGLES})
+    other = shoot(tmp_path / "other", {angle: star(light_px(angle), level=0.06) for angle in ANGLES})
+    run = tmp_path / "run"
+    merge_captures(read_captures(mine), mine.parent, run)
+    (run / "found.json").write_text("by hand")
+    before = {path: path.read_bytes() for path in run.rglob("*") if path.is_file()}
+
+    def refused():
+        with pytest.raises(FlarewrightError, match=r"run holds the run of other photographs \("):
+            merge_captures(read_captures(other), other.parent, run)
+        assert {path: path.read_bytes() for path in run.rglob("*") if path.is_file()} == before
+
+    # the same names in another folder, or other names in the same one
+    refused()
+    for path in sorted(other.parent.glob("*.npy")):
+        path.rename(mine.parent / f"b{path.name}")
+    other = mine.parent / "other.csv"
+    other.write_text(mine.read_text().replace("\n", "\nb").removesuffix("b"))
+    refused()
+    # photographs that have moved are the same
+    mine.parent.rename(tmp_path / "moved")
+    mine = tmp_path / "moved" / "captures.csv"
+    stamp = stamps(run)
+    merge_captures(read_captures(mine), mine.parent, run)
+    assert stamps(run) == stamp
+
+
+def test_frames_of_lines_that_are_gone_go_too(tmp_path):
+    captures = read_captures(shoot(tmp_path, {angle: star(light_px(angle)) for angle in ANGLES}))
+    run = tmp_path / "run"
+    merge_captures(captures, tmp_path, run, settings=MergeSettings(upright=True))
+    (run / "frames" / "frame-mine.txt").write_text("kept")
+    merge_captures(captures[:-4], tmp_path, run)
+    left = [f"frame-{k:03d}.{kind}" for k in range(len(ANGLES) - 2) for kind in ("exr", "json")]
+    assert sorted(path.name for path in (run / "frames").iterdir()) == [*left, "frame-mine.txt"]
+    assert len(list((run / "upright").iterdir())) == len(ANGLES) - 2
+
+
+def test_a_frame_that_was_cut_short_is_merged_anew(tmp_path):
+    captures = read_captures(shoot(tmp_path, {angle: star(light_px(angle)) for angle in ANGLES}))
+    whole = merge_captures(captures, tmp_path, tmp_path / "run")
+    path = tmp_path / "run" / "frames" / "frame-003.exr"
+    data = path.read_bytes()
+    for damaged in (data[: len(data) // 2], b""):
+        path.write_bytes(damaged)
+        assert merge_captures(captures, tmp_path, tmp_path / "run") == whole
+        assert path.read_bytes() == data
+
+
+KNOWN = CameraNoise(black_level=CAMERA.black, white_level=CAMERA.white, electrons_per_unit=3.0, read_noise=4.0)
+
+
+@pytest.mark.parametrize("camera", [KNOWN, KNOWN.replace(electrons_per_unit=None, read_noise=None)])
+@pytest.mark.parametrize(
+    ("mistake", "words"),
+    [
+        ("swapped", r"2-1\.npy and 2-0\.npy .* more than 100 times"),
+        ("cap on", r"2-0\.npy and 2-1\.npy .* more than 100 times"),
+        ("cap on the short one", r"2-0\.npy and 2-1\.npy .* less than a hundredth"),
+        ("ten times as long", r"0-0\.npy and 0-1\.npy .* should have 0\.0031 .* and has 10 times"),
+        ("half as long", r"0-0\.npy and 0-1\.npy .* and has 0\.5. times"),
+    ],
+)
+def test_exposures_that_are_not_what_the_list_says_are_told(tmp_path, camera, mistake, words):
+    listed = shoot(tmp_path, {angle: star(light_px(angle)) for angle in ANGLES})
+    text = listed.read_text()
+    match mistake:
+        case "swapped":
+            listed.write_text(text.replace("2-0.npy", "@").replace("2-1.npy", "2-0.npy").replace("@", "2-1.npy"))
+        case "cap on" | "cap on the short one":
+            dark = expose(CAMERA, np.zeros((64, 96, 3), np.float32), 1.0, 1.0, (7,))
+            np.save(tmp_path / ("2-1.npy" if mistake == "cap on" else "2-0.npy"), dark)
+        case _:
+            listed.write_text(text.replace(",0.125,", ",1.25," if mistake.startswith("ten") else ",0.0625,"))
+    with pytest.raises(FlarewrightError, match=words):
+        merge_captures(read_captures(listed), tmp_path, tmp_path / "run", camera=camera)
+
+
+def test_a_light_that_flickers_and_a_shutter_that_lies_are_put_right(tmp_path):
+    listed = shoot(tmp_path, {angle: star(light_px(angle)) for angle in ANGLES})
+    listed.write_text(listed.read_text().replace(",0.125,", ",0.15,"))
+    run = merge_captures(read_captures(listed), tmp_path, tmp_path / "run", camera=KNOWN)
+    assert run.px_per_rad == pytest.approx(400.0, rel=0.01)
+
+
 def test_a_person_may_point_at_the_light(tmp_path):
     captures = read_captures(shoot(tmp_path, {angle: star(light_px(angle), (80.0, 10.0)) for angle in ANGLES}))
     with pytest.raises(FlarewrightError, match="two lights were found"):
@@ -105,6 +194,118 @@ def test_a_person_may_point_at_the_light(tmp_path):
         pointed.append(one.replace(light_x_px=x, light_y_px=y))
     run = merge_captures(pointed, tmp_path, tmp_path / "run")
     assert run.frames[2].light_px == pytest.approx(light_px(2.0))
+    assert run.px_per_rad == pytest.approx(400.0, rel=0.01)
+
+
+UNTOLD = KNOWN.replace(black_level=None)
+
+
+def add_dark(folder, level, kind="dark", count=1):
+    """Add photographs of an even level to a list."""
+    for k in range(count):
+        np.save(folder / f"{kind}-{k}.npy", np.full((64, 96, 3), level, np.uint16))
+        with (folder / "captures.csv").open("a") as listed:
+            listed.write(f"{kind}-{k}.npy,,0.125,100,8,{kind}\n")
+
+
+@pytest.mark.parametrize(
+    ("camera", "extra", "words"),
+    [
+        (KNOWN.replace(black_level=9e3), None, r"black level is 9000, which is more than most of .*-0\.npy"),
+        (KNOWN.replace(black_level=600.0), None, "black level is 600, which is more than most"),
+        (KNOWN.replace(white_level=600.0), None, "white_level is 600, but the photographs have numbers up to 16383"),
+        (KNOWN, (3000, "dark"), r"dark-0\.npy, a dark frame, has 3000 where black_level is 512"),
+        (UNTOLD, (3000, "dark"), r"dark-0\.npy, a dark frame, has 3000, which is more than most"),
+        (UNTOLD, (16383, "dark"), r"dark-0\.npy, a dark frame, has 16383, .*where the sensor clips"),
+        (UNTOLD, (16383, "dark", 4), "a dark frame, has 16383, .*where the sensor clips"),
+        (KNOWN, (16383, "flat"), r"flat-0\.npy is saturated, so it is no flat"),
+    ],
+)
+def test_levels_that_the_photographs_cannot_have_are_told(tmp_path, camera, extra, words):
+    shoot(tmp_path, {angle: star(light_px(angle)) for angle in ANGLES})
+    if extra is not None:
+        add_dark(tmp_path, *extra)
+    with pytest.raises(FlarewrightError, match=words):
+        merge_captures(read_captures(tmp_path / "captures.csv"), tmp_path, tmp_path / "run", camera=camera)
+
+
+def test_a_file_with_a_hole_is_named(tmp_path):
+    captures = read_captures(shoot(tmp_path, {angle: star(light_px(angle)) for angle in ANGLES}))
+    pixels = np.load(tmp_path / "3-0.npy")
+    pixels[40:, :] = 0
+    np.save(tmp_path / "3-0.npy", pixels)
+    with pytest.raises(FlarewrightError, match=r"3-0\.npy has numbers far below black over 3[78]% of the picture"):
+        merge_captures(captures, tmp_path, tmp_path / "run", camera=KNOWN)
+
+
+def test_a_camera_whose_files_tell_no_white_balance_is_told(tmp_path):
+    captures = read_captures(shoot(tmp_path, {angle: star(light_px(angle)) for angle in ANGLES}))
+    with pytest.raises(FlarewrightError, match=r"0-0\.npy does not tell its camera's white balance"):
+        merge_captures(captures, tmp_path, tmp_path / "run", settings=MergeSettings(white_balance="camera"))
+
+
+def pointing(listed, scale=1.0):
+    """Let a list say where the light is."""
+    head, *rows = listed.read_text().splitlines()
+    k = head.split(",").index("constellation_deg")
+    places = [np.multiply(light_px(float(row.split(",")[k])), scale) for row in rows]
+    rows = [f"{row},{x:.2f},{y:.2f}\n" for row, (x, y) in zip(rows, places, strict=True)]
+    listed.write_text(f"{head},light_x_px,light_y_px\n" + "".join(rows))
+    return read_captures(listed)
+
+
+@pytest.mark.parametrize("raw", [False, True])
+@pytest.mark.parametrize("block", [1, 2])
+def test_what_a_person_says_in_pixels_means_those_of_the_file(tmp_path, raw, block):
+    if raw:
+        lines = ["file,constellation_deg\n"]
+        for k, angle in enumerate(ANGLES):
+            for j, time in enumerate(CAMERA.exposures_s):
+                shoot_raw(tmp_path, star(light_px(angle)), f"{k}-{j}.dng", time, 10 * k + j)
+                lines.append(f"{k}-{j}.dng,{angle:g}\n")
+        (tmp_path / "captures.csv").write_text("".join(lines))
+    else:
+        shoot(tmp_path, {angle: star(light_px(angle)) for angle in ANGLES})
+    side = 2 if raw else 1
+    captures = pointing(tmp_path / "captures.csv", scale=side)
+    camera, settings = KNOWN.replace(pitch_um=125.0 / side), MergeSettings(block=block)
+    run = merge_captures(captures, tmp_path, tmp_path / "run", camera=camera, settings=settings)
+    assert run.px_per_rad == pytest.approx(400.0 / block, rel=0.01)
+    assert run.frames[3].light_px == pytest.approx(np.divide(light_px(3.0), block), abs=0.01)
+    # a pixel of a merged frame is as large as the pixels of the file that are in it
+    alone = [one.replace(constellation_deg=0.0, focal_mm=50.0) for one in captures[:2]]
+    run = merge_captures(alone, tmp_path, tmp_path / "alone", camera=camera, settings=settings)
+    assert run.px_per_rad == pytest.approx(400.0 / block)
+    beyond = [one.replace(light_x_px=96.5 * side) for one in captures]
+    size = f"{96 * side}x{64 * side}"
+    with pytest.raises(FlarewrightError, match=rf"0-\d\.\w+ is \(.*outside of its {size} pixels"):
+        merge_captures(beyond[:2], tmp_path, tmp_path / "beyond", camera=camera, settings=settings)
+
+
+def faint(angle, place, part):
+    """Return the light with another spot, of so much of its light."""
+    return star(light_px(angle)) + part * (star(place) - star())
+
+
+@pytest.mark.parametrize("part", [0.1, 0.003])
+@pytest.mark.parametrize(
+    ("angles", "away"), [(ANGLES, (-30.0, 20.0)), (ANGLES[-2:], (10.0, -20.0)), (ANGLES, (-25.0, 0.2))]
+)
+def test_a_faint_second_light_is_told_by_staying_where_it_is(tmp_path, part, angles, away):
+    scenes = {angle: star(light_px(angle)) for angle in ANGLES}
+    scenes |= {angle: faint(angle, np.add(light_px(angle), away), part) for angle in angles}
+    with pytest.raises(FlarewrightError, match=r"two lights were found, at .* of the frame at"):
+        merge_captures(read_captures(shoot(tmp_path, scenes)), tmp_path, tmp_path / "run", camera=KNOWN)
+
+
+@pytest.mark.parametrize("part", [0.1, 0.01])
+@pytest.mark.parametrize("pace", [-1.0, -0.5, 0.3])
+def test_bright_ghosts_are_no_second_light(tmp_path, part, pace):
+    def ghost(angle):
+        return [middle + pace * (x - middle) for x, middle in zip(light_px(angle), (40.3, 31.6), strict=True)]
+
+    scenes = {angle: faint(angle, ghost(angle), part) for angle in ANGLES}
+    run = merge_captures(read_captures(shoot(tmp_path, scenes)), tmp_path, tmp_path / "run", camera=KNOWN)
     assert run.px_per_rad == pytest.approx(400.0, rel=0.01)
 
 
@@ -169,6 +370,15 @@ def test_a_path_that_does_not_fit_the_angles_is_refused():
     backwards = [changed(one, nominal_deg=-one.nominal_deg) for one in straight]
     with pytest.raises(FlarewrightError, match="against the angles"):
         solve_geometry(backwards, (96, 64))
+    for roll in (90.0, -90.0, 60.0, 270.0):
+        with pytest.raises(FlarewrightError, match=rf"towards 0 deg .* where roll_deg says {roll:g}: correct"):
+            solve_geometry([changed(one, nominal_roll_deg=roll) for one in straight], (96, 64))
+    leaning = solve_geometry([changed(one, nominal_roll_deg=30.0) for one in straight], (96, 64))
+    assert leaning.px_per_rad == pytest.approx(7.0 * 180 / np.pi, rel=0.01)
+    for roll in (0.0, 90.0):
+        still = [changed(one, nominal_roll_deg=roll, light_px=(50.0, 30.0)) for one in straight]
+        with pytest.raises(FlarewrightError, match="stays where it is in the picture"):
+            solve_geometry(still, (96, 64))
 
 
 def test_two_rolls_fix_the_axis_without_a_mirror():

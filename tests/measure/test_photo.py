@@ -64,6 +64,24 @@ def test_tiff_exr_and_npy_hold_the_same_numbers(tmp_path):
         assert photo.step == (0.0 if name == "a.exr" else 1.0)
 
 
+@pytest.mark.parametrize("damage", ["cut", "hole"])
+@pytest.mark.parametrize("name", ["a.exr", "packed.tif"])
+def test_damaged_packed_pixels_are_told_in_a_sentence(tmp_path, capsys, name, damage):
+    numbers = np.random.default_rng(3).integers(0, 60000, (64, 96, 3), dtype=np.uint16)
+    path = tmp_path / name
+    if name.endswith(".exr"):
+        layer = Layer("beauty", numbers.astype(np.float32), (0, 0, 96, 64))
+        write_exr(path, [layer], (96, 64), pixel_type="float", metadata={})
+    else:
+        tifffile.imwrite(path, numbers, photometric="rgb", compression="zlib")
+    data = path.read_bytes()
+    half = len(data) // 2
+    path.write_bytes(data[:half] if damage == "cut" else data[:half] + bytes(300) + data[half + 300 :])
+    with pytest.raises(FlarewrightError, match=rf"{name} cannot be read as an? \w+ file"):
+        open_photo(path).rows(0, 64)
+    assert capsys.readouterr().out == ""
+
+
 def test_blocks_are_means_and_clip_when_a_part_does(tmp_path):
     rng = np.random.default_rng(3)
     numbers = rng.integers(0, 900, (13, 17, 3), dtype=np.uint16)

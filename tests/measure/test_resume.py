@@ -2,6 +2,7 @@
 
 import json
 from contextlib import suppress
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ from planted_run import GHOSTS
 from test_stages import write
 
 from flarewright.cli.app import run as command
-from flarewright.errors import OutputError
+from flarewright.errors import FlarewrightError, OutputError
 from flarewright.measure import journal as journals
 from flarewright.measure.find import Candidate
 from flarewright.measure.fit import Fit, Shape
@@ -81,6 +82,30 @@ def test_a_full_disk_is_told(tmp_path):
 
     with pytest.raises(OutputError, match=r"cannot write x\.journal: no space left on device"):
         Journal(file=Full()).step(lambda: 1.0)
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no /dev/full")
+def test_a_full_disk_is_told_though_the_journal_cannot_be_closed(tmp_path, monkeypatch):
+    real = Path.open
+
+    def opened(path, mode="r", **options):
+        return real(Path("/dev/full") if mode == "a" else path, mode, **options)
+
+    monkeypatch.setattr(Path, "open", opened)
+    with (
+        pytest.raises(OutputError, match=r"cannot write /dev/full: no space left on device; check the free space"),
+        journal(tmp_path / "j", "d") as steps,
+    ):
+        steps.step(lambda: 1.0)
+
+
+def test_a_stage_that_is_refused_leaves_no_journal(tmp_path):
+    def refused():
+        raise FlarewrightError("no")
+
+    with pytest.raises(FlarewrightError), journal(tmp_path / "j", "d") as steps:
+        steps.step(refused)
+    assert not list(tmp_path.iterdir())
 
 
 def test_find_and_fit_stopped_half_way_end_with_the_same_bytes(tmp_path, capsys, monkeypatch):

@@ -65,6 +65,44 @@ def test_only_what_has_changed_is_done_again(tmp_path, capsys, monkeypatch):
     assert kept() == fresh
 
 
+def test_corrections_hold_until_others_are_given(tmp_path, capsys, monkeypatch):
+    write(tmp_path, ())
+    (tmp_path / "captures.csv").write_text("")
+    told = []
+    model = GhostModel(
+        size_px=SIZE, axis_px=(9.0, 9.0), focal_px=FOCAL, largest_deg=20.0, constellation_deg=(0.0, 20.0)
+    )
+    monkeypatch.setattr(stages, "find_ghosts", lambda *_, **given: told.append(given) or model)
+    run = ["measure", "run", str(tmp_path / "captures.csv"), "-o", str(tmp_path), "--stages", "find", "--json"]
+
+    def kept(*arguments: str) -> bool:
+        assert command([*arguments]) == 0
+        return json.loads(capsys.readouterr().out)["find"]["kept"]
+
+    corrections = tmp_path / "corrections.json"
+    corrections.write_text('{"remove": ["7"]}')
+    assert not kept("measure", "find", str(tmp_path), "--corrections", str(corrections), "--json")
+    assert kept(*run)
+    assert not kept(*run, "--every", "2")
+    assert told[-1]["every"] == 2
+    assert [one["corrections"].remove for one in told] == [("7",), ("7",)]
+    assert command([*run[:-1], "--every", "2"]) == 0
+    assert "corrections that were given before still hold" in capsys.readouterr().err
+    corrections.write_text("{}")
+    assert not kept(*run, "--corrections", str(corrections))
+    assert told[-1]["corrections"] is None
+    assert kept("measure", "find", str(tmp_path), "--json")
+    for words, arguments in (
+        ("--corrections are for the stage find", [*run[:-3], "--stages", "fit", "--corrections", str(corrections)]),
+        ("no.csv does not exist", ["measure", "run", "no.csv", "-o", str(tmp_path), "--stages", "find"]),
+    ):
+        assert command(arguments) == 2
+        assert words in capsys.readouterr().err
+    (tmp_path / "stages.json").write_text('{"corrections": "{"}')
+    assert command(run) == 2
+    assert "give them again with --corrections" in capsys.readouterr().err
+
+
 def test_the_note_is_written_whole_or_not_at_all(tmp_path):
     with pytest.raises(OutputError, match="does not exist"):
         note(tmp_path / "nowhere", "find", "x")

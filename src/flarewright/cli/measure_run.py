@@ -9,6 +9,7 @@ import typer
 
 from ..errors import FlarewrightError
 from .common import print_json, progress_bar, tell
+from .measure_stages import CorrectionsFile, Every
 
 if TYPE_CHECKING:
     from ..measure.merge_run import MergeSettings
@@ -79,11 +80,16 @@ def run(
     block: Block = 1,
     white_balance: WhiteBalance = "none",
     upright: Upright = False,
+    every: Every = 1,
+    corrections: CorrectionsFile = None,
     threads: Threads = None,
     as_json: Json = False,
 ) -> None:
     """Run the stages of a measurement one after the other; what is finished already is kept."""
     chosen = chosen_stages(stages)
+    _check_there(captures)
+    if corrections is not None and "find" not in chosen:
+        raise FlarewrightError("--corrections are for the stage find, which --stages leaves out: add it, or drop them")
     settings = _settings(block, white_balance, upright)
     facts: dict[str, Any] = {"folder": str(output), "stages": chosen}
     if "merge" in chosen:
@@ -96,7 +102,7 @@ def run(
     if later:
         from .measure_stages import run_stages
 
-        facts.update(run_stages(output, later, 1, None, threads, not as_json))
+        facts.update(run_stages(output, later, every, corrections, threads, not as_json))
     if as_json:
         print_json(facts)
 
@@ -140,8 +146,7 @@ def _merge(
     from ..measure.merge_run import check_same_run, merge_captures
     from ..measure.overview import write_overview
 
-    if not captures.exists():
-        raise FlarewrightError(f"{captures} does not exist: check the path and the spelling")
+    _check_there(captures)
     rule = None if angles is None else parse_rule(angles)
     known = _camera(captures, camera)
     check_same_run(output)
@@ -154,6 +159,11 @@ def _merge(
         )
         write_overview(output, merged)
     return merged
+
+
+def _check_there(captures: Path) -> None:
+    if not captures.exists():
+        raise FlarewrightError(f"{captures} does not exist: check the path and the spelling")
 
 
 def _camera(captures: Path, camera: Path | None) -> CameraNoise | None:

@@ -15,6 +15,7 @@ from .common import print_json, progress_bar, tell
 if TYPE_CHECKING:
     from ..measure.journal import Journal
     from ..model.capture import MergedRun
+    from ..model.corrections import Corrections
     from ..model.ghost_model import GhostModel
 
 FIND_EPILOG = "Example:\n\nflarewright measure find run"
@@ -30,6 +31,13 @@ STAGES = ("find", "fit", "track", "compress")
 
 Folder = Annotated[Path, typer.Argument(metavar="DIR", help="A folder that `measure merge` has written.")]
 Every = Annotated[int, typer.Option(min=1, help="Use every n-th constellation only; the others never enter.")]
+CorrectionsFile = Annotated[
+    Path | None,
+    typer.Option(
+        "--corrections", metavar="FILE",
+        help="JSON: ghosts to add and to remove (docs/ghost-model.md); those given before hold until others are given.",
+    ),
+]  # fmt: skip
 Threads = Annotated[int | None, typer.Option(min=1, help="All cores when left out.")]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
 
@@ -37,9 +45,7 @@ Json = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
 def find(
     folder: Folder,
     every: Every = 1,
-    corrections: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="JSON: ghosts to add and to remove (docs/ghost-model.md).")
-    ] = None,
+    corrections: CorrectionsFile = None,
     threads: Threads = None,
     as_json: Json = False,
 ) -> None:
@@ -75,7 +81,7 @@ class _Job:
     folder: Path
     run: MergedRun
     every: int
-    corrections: Path | None
+    corrections: Corrections | None
     threads: int | None
     told: Callable[[str], None]
     progress: Callable[[float, str], None]
@@ -112,6 +118,8 @@ def run_stages(
 ) -> dict[str, Any]:
     """Run stages in a run's folder; one is not repeated while what it is made from is the same.
 
+    Corrections that the folder's search was told hold until others are given.
+
     Returns
     -------
     dict
@@ -124,9 +132,10 @@ def run_stages(
     """
     from ..io.merged import read_run
     from ..measure.journal import journal
-    from ..measure.notes import is_current, note, run_digest
+    from ..measure.notes import is_current, note, note_corrections, run_digest
 
     run = read_run(folder)
+    told_of = _corrections(folder, corrections) if "find" in stages else None
     facts: dict[str, Any] = {}
 
     def told(line: str) -> None:
@@ -137,7 +146,7 @@ def run_stages(
         stage = _STAGES[name]
         made = folder / stage.file
         with progress_bar() as begin:
-            job = _Job(folder, run, every, corrections, threads, told, begin(name))
+            job = _Job(folder, run, every, told_of, threads, told, begin(name))
             digest = run_digest(folder, run, stage.given(job))
             kept = is_current(folder, name, digest, made)
             if not kept:
@@ -145,12 +154,28 @@ def run_stages(
                     if steps.remembered:
                         told(f"{name} goes on after {steps.remembered} steps that an earlier run had done")
                     stage.make(job, made, steps)
+                if name == "find":
+                    note_corrections(folder, told_of)
                 note(folder, name, digest)
         facts[name] = {**_facts(made), "file": str(made), "kept": kept}
         if talk:
             words = ", ".join(f"{value} {key}" for key, value in _facts(made).items())
             print(f"{made}: {words}" + (", as before" if kept else ""))
     return facts
+
+
+def _corrections(folder: Path, given: Path | None) -> Corrections | None:
+    """Return what the search is told: what is given now, or else what it was told before."""
+    from ..io.ghost_model_file import read_corrections
+    from ..measure.notes import noted_corrections
+
+    if given is not None:
+        known = read_corrections(given)
+        return known if known.add or known.remove else None
+    before = noted_corrections(folder)
+    if before is not None:
+        tell(["the corrections that were given before still hold; give --corrections a file with {} to drop them"])
+    return before
 
 
 def _facts(made: Path) -> dict[str, int]:
@@ -165,19 +190,15 @@ def _facts(made: Path) -> dict[str, int]:
 
 
 def _find_given(job: _Job) -> dict[str, object]:
-    from ..io.ghost_model_file import read_corrections
-
-    known = None if job.corrections is None else read_corrections(job.corrections)
-    return {"every": job.every, "corrections": None if known is None else known.model_dump_json()}
+    return {"every": job.every, "corrections": None if job.corrections is None else job.corrections.model_dump_json()}
 
 
 def _find(job: _Job, made: Path, steps: Journal) -> None:
-    from ..io.ghost_model_file import read_corrections, write_ghost_model
+    from ..io.ghost_model_file import write_ghost_model
     from ..measure.stages import find_ghosts
 
-    known = None if job.corrections is None else read_corrections(job.corrections)
     found = find_ghosts(
-        job.folder, job.run, every=job.every, corrections=known, threads=job.threads, tell=job.told,
+        job.folder, job.run, every=job.every, corrections=job.corrections, threads=job.threads, tell=job.told,
         progress=job.progress, journal=steps,
     )  # fmt: skip
     write_ghost_model(made, found)

@@ -34,6 +34,9 @@ from .text_file import read_text
 
 _COLUMNS = tuple(Capture.model_fields)
 
+# f-numbers and focal lengths that differ by less are one: a list rounds what the camera writes
+_SAME = 0.03
+
 
 @dataclass(frozen=True)
 class AngleRule:
@@ -97,9 +100,11 @@ def read_captures(path: Path, rule: AngleRule | None = None) -> tuple[Capture, .
     problems: list[str] = []
     filled = [_with_exif(row, folder, where, problems) for where, row in rows]
     if not problems and rule is not None:
-        filled = _with_angles(filled, rule)
+        filled = _with_angles(filled, rule, path)
     found = []
     for (where, _), row in zip(rows, filled, strict=True):
+        if row is None:
+            continue
         try:
             found.append(Capture.model_validate(row))
         except ValidationError as error:
@@ -154,7 +159,9 @@ def _csv_rows(path: Path) -> list[tuple[str, dict[str, Any]]]:
     separator = ";" if text.partition("\n")[0].count(";") > text.partition("\n")[0].count(",") else ","
     reader = csv.DictReader(text.splitlines(), delimiter=separator, skipinitialspace=True)
     names = [name.strip() for name in reader.fieldnames or ()]
-    for name in names:
+    for k, name in enumerate(names):
+        if name in names[:k]:
+            raise FlarewrightError(f"{path}: the column {name!r} is named twice; remove one of them")
         if name not in _COLUMNS:
             raise FlarewrightError(
                 f"{path}: the column {name!r} is unknown{did_you_mean(name, _COLUMNS)}; known are {', '.join(_COLUMNS)}"
@@ -188,35 +195,42 @@ def _folder_rows(path: Path, rule: AngleRule | None) -> list[tuple[str, dict[str
     return [(name, {"file": name}) for name in files]
 
 
-def _with_exif(row: dict[str, Any], folder: Path, where: str, problems: list[str]) -> dict[str, Any]:
-    """Fill in what the list leaves out and the photograph tells."""
+def _with_exif(row: dict[str, Any], folder: Path, where: str, problems: list[str]) -> dict[str, Any] | None:
+    """Fill in what the list leaves out and the photograph tells; None when there is no more to say of the row."""
     file = folder / str(row.get("file", ""))
     if not row.get("file"):
         problems.append(f"{where}: file is missing")
-        return row
+        return None
     if not file.is_file():
         problems.append(f"{where}: {file} does not exist: check the path and the spelling")
-        return row
+        return None
     if {"exposure_s", "iso", "f_number"} <= row.keys():
         return row
     try:
         facts = photo_facts(file)
     except FlarewrightError as error:
         problems.append(f"{where}: {error}")
-        return row
+        return None
     full = {**facts, **row}
     if "exposure_s" not in full:
         problems.append(f"{where}: {row['file']} does not tell its exposure_s; give it in the list")
+        return None
     return full
 
 
-def _with_angles(rows: Sequence[dict[str, Any]], rule: AngleRule) -> list[dict[str, Any]]:
+def _with_angles(rows: Sequence[dict[str, Any] | None], rule: AngleRule, path: Path) -> list[dict[str, Any] | None]:
     """Give angles by the rule; the next one begins when an exposure comes a second time."""
-    found, seen, step = [], set[tuple[str, str]](), 0
+    found: list[dict[str, Any] | None] = []
+    seen, step = set[tuple[str, str]](), 0
     for row in rows:
-        if row.get("kind", "light") != "light" or "constellation_deg" in row:
+        if row is None or row.get("kind", "light") != "light":
             found.append(row)
             continue
+        if "constellation_deg" in row:
+            raise FlarewrightError(
+                f"{path} tells constellation_deg of {row['file']}, and so does the rule {rule.start:g}{rule.step:+g}: "
+                "leave out --angles, or empty that column"
+            )
         setting = (str(row.get("exposure_s")), str(row.get("iso")))
         if setting in seen:
             seen, step = set(), step + 1
@@ -234,7 +248,20 @@ def _mistakes(captures: Sequence[Capture]) -> list[str]:
     twice = next((name for k, name in enumerate(names) if name in names[:k]), None)
     if twice is not None:
         return [f"{twice} is listed twice; remove one of the lines"]
-    return _disorder(lights) or _missing_exposures(lights)
+    return _disorder(lights) or _missing_exposures(lights) or _other_lens(lights)
+
+
+def _other_lens(lights: Sequence[Capture]) -> list[str]:
+    """Look for photographs at another aperture or zoom: their ghosts are others."""
+    for name, words in (("f_number", "f/{:g}"), ("focal_mm", "{:g} mm")):
+        known = [(one.file, getattr(one, name)) for one in lights if getattr(one, name) is not None]
+        odd = next(((file, value) for file, value in known if abs(value / known[0][1] - 1.0) > _SAME), None)
+        if odd is not None:
+            return [
+                f"{known[0][0]} was taken at {words.format(known[0][1])} and {odd[0]} at {words.format(odd[1])}, which "
+                f"have other ghosts: merge them into runs of their own, or correct {name}"
+            ]
+    return []
 
 
 def _disorder(lights: Sequence[Capture]) -> list[str]:

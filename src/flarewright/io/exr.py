@@ -14,10 +14,13 @@ corner, for which `full_windows=True` writes every layer at the size of the pict
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Mapping, Sequence
+from contextlib import redirect_stdout
 from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
+from threading import Lock
 from typing import Any, Literal
 
 import numpy as np
@@ -42,6 +45,9 @@ _INTEROP_ID: Mapping[Colorspace, str] = {"rec709": "lin_rec709_scene", "acescg":
 
 _PREFIX = "flarewright."
 _CHANNELS = "RGB"
+
+# the library prints to stdout what is wrong with a file; who redirects that does it for all threads
+_ONE_READS = Lock()
 
 
 @dataclass(frozen=True)
@@ -167,11 +173,9 @@ def read_exr(path: str | PathLike[str]) -> ExrContents:
     OutputError
         When it is no readable EXR file.
     """
-    import OpenEXR
-
     try:
-        file = OpenEXR.File(str(path), separate_channels=True)
-    except RuntimeError as error:
+        file = _opened(path)
+    except OSError as error:
         raise OutputError(f"{path} cannot be read as an EXR file: {error}") from error
     layers = []
     for k, part in enumerate(file.parts):
@@ -188,6 +192,21 @@ def read_exr(path: str | PathLike[str]) -> ExrContents:
     kind: Literal["half", "float"] = "half" if file.parts[0].channels["R"].pixels.dtype == np.float16 else "float"
     size = (int(high[0] - low[0]) + 1, int(high[1] - low[1]) + 1)
     return ExrContents(tuple(layers), size, kind, metadata, header)
+
+
+def _opened(path: str | PathLike[str]) -> Any:
+    """Read a file with all its parts; raises OSError when one is damaged, which the library leaves out with a word."""
+    import OpenEXR
+
+    try:
+        with _ONE_READS, redirect_stdout(sys.stderr):
+            file = OpenEXR.File(str(path), separate_channels=True)
+            whole = len(OpenEXR.File(str(path), header_only=True).parts)
+    except RuntimeError as error:
+        raise OSError(str(error).rstrip(".")) from error
+    if len(file.parts) < max(whole, 1):
+        raise OSError("its pixels are damaged or cut short")
+    return file
 
 
 def read_exr_plane(path: str | PathLike[str], choices: Sequence[Sequence[str]]) -> NDArray[np.float64]:
@@ -244,12 +263,7 @@ def read_exr_colour(path: str | PathLike[str]) -> NDArray[np.float32]:
 
 def _part_with(path: str | PathLike[str], choices: Sequence[Sequence[str]]) -> tuple[Any, Sequence[str]]:
     """Find the part and the names of the first choice that a file has; a single channel may have any name."""
-    import OpenEXR
-
-    try:
-        file = OpenEXR.File(str(path), separate_channels=True)
-    except RuntimeError as error:
-        raise OSError(str(error).rstrip(".")) from error
+    file = _opened(path)
     known = [name for part in file.parts for name in part.channels]
     wanted = [*choices, known] if len(known) == 1 else choices
     found = [(part, names) for names in wanted for part in file.parts if all(name in part.channels for name in names)]

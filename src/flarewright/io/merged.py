@@ -74,9 +74,11 @@ def read_frame(folder: Path, info: FrameInfo) -> MergedFrame:
     try:
         layers = {layer.name: layer.pixels for layer in read_exr(path).layers}
     except (OutputError, KeyError, ValueError):
-        raise FlarewrightError(f"{path} cannot be read as a merged frame: {again}") from None
+        raise FlarewrightError(f"{path} cannot be read as a merged frame: remove it and {again}") from None
     if not {_RADIANCE, _VARIANCE} <= layers.keys() or layers[_RADIANCE].shape != layers[_VARIANCE].shape:
-        raise FlarewrightError(f"{path} has no radiance with a variance, so it is no merged frame: {again}")
+        raise FlarewrightError(
+            f"{path} has no radiance with a variance, so it is no merged frame: remove it and {again}"
+        )
     gain = np.float32(info.gain)
     return MergedFrame(info, layers[_RADIANCE] / gain, layers[_VARIANCE] / gain**2)
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import struct
 import warnings
+import zlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -53,10 +54,12 @@ class Photo:
         How many readings were averaged into each number of red, green and blue.
     step : float
         By how much two numbers of the file differ at least; 0 for floating point.
-    white_balance : tuple of float
-        The camera's own multipliers, green 1.
+    white_balance : tuple of float or None
+        The camera's own multipliers, green 1; None when the file does not tell.
     to_rec709 : tuple of 3 tuples of 3 float, or None
         From its numbers above black, before any white balance, to linear Rec.709; None: the file does not tell.
+    side : int
+        So many by so many of the file's own pixels, or photosites, are one of these.
     """
 
     path: Path
@@ -66,8 +69,9 @@ class Photo:
     white_level: float | None = None
     samples: tuple[int, int, int] = (1, 1, 1)
     step: float = 1.0
-    white_balance: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    white_balance: tuple[float, float, float] | None = None
     to_rec709: Matrix3 | None = None
+    side: int = 1
 
 
 def open_photo(path: Path, white_level: float | None = None, block: int = 1) -> Photo:
@@ -226,7 +230,7 @@ def _exr_picture(path: Path) -> _Picture:
 
 def _tiff_picture(path: Path) -> _Picture:
     tifffile = _extra("tifffile", path)
-    broken = (OSError, ValueError, KeyError, IndexError, TypeError, RuntimeError, tifffile.TiffFileError)
+    broken = (OSError, ValueError, KeyError, IndexError, TypeError, RuntimeError, zlib.error, tifffile.TiffFileError)
 
     def told(error: BaseException) -> FlarewrightError:
         return FlarewrightError(f"{path} cannot be read as a TIFF file ({_short(error)}): convert it again")
@@ -276,12 +280,11 @@ def _open_raw(path: Path, white_level: float | None) -> Photo:
         size = sizes.width // 2, sizes.height // 2
     if sorted(colors) != ["B", "G", "G", "R"]:
         raise FlarewrightError(f"{path} has photosites {''.join(colors)}, not red, green and blue: develop it as TIFF")
-    balance = [value / camera[1] for value in camera] if min(camera) > 0.0 else [1.0, 1.0, 1.0]
+    balance = (camera[0] / camera[1], 1.0, camera[2] / camera[1]) if min(camera) > 0.0 else None
     levels = [float(np.mean([black[k] for k, name in enumerate(colors) if name == color])) for color in "RGB"]
     return Photo(
         path, size, _mosaic_rows(lru_cache(maxsize=1)(load), colors, size[0], white), (levels[0], levels[1], levels[2]),
-        white, (1, 2, 1), white_balance=(balance[0], balance[1], balance[2]),
-        to_rec709=to_rec709,
+        white, (1, 2, 1), white_balance=balance, to_rec709=to_rec709, side=2,
     )  # fmt: skip
 
 
@@ -346,7 +349,7 @@ def _blocks(photo: Photo, block: int) -> Photo:
 
     red, green, blue = photo.samples
     samples = (red * block**2, green * block**2, blue * block**2)
-    return replace(photo, size_px=(width, height), rows=rows, samples=samples)
+    return replace(photo, size_px=(width, height), rows=rows, samples=samples, side=photo.side * block)
 
 
 def _extra(name: str, path: Path) -> Any:

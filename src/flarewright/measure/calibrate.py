@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ..errors import FlarewrightError
 from ..io.photo import Photo, open_photo
 from ..model.capture import CameraNoise, Capture, Matrix3
-from .merge import Exposure
+from .merge import Exposure, refuse_contradiction
 from .noise import LEVEL_SIDE, Band, Noise, Transfer, common_black, fit_transfer, noise_of, smooth, transfers
 
 # so many constellations and bands of rows are looked at
@@ -25,6 +25,10 @@ _PILE = 50
 _DARKS_FOR_PICTURE = 4
 # a flat tells how a pixel differs from the neighbourhood of so many pixels; lens and light are even over it
 _FLAT_SIDE = 31
+# levels contradict each other that differ by this part of full, and a flat is none of which this part is clipped
+_LEVELS_DIFFER, _CLIPPED_FLAT = 0.002, 0.01
+# a person may let clipping begin early, where a sensor bends, but not below this part of what it gives
+_FAR_ABOVE = 2.0
 # pixels above this part of the brightest are well lit
 _LIT = 0.05
 
@@ -46,12 +50,14 @@ class Calibration:
     size_px : tuple of int
     samples : tuple of int
     step : float
-    white_balance : tuple of float
-        The camera's own.
+    white_balance : tuple of float or None
+        The camera's own; None when its files do not tell.
     to_rec709 : tuple of 3 tuples of 3 float, or None
         As of `Photo`.
     block : int
         Pixels averaged a side.
+    side : int
+        As of `Photo`.
     remarks : tuple of str
     """
 
@@ -63,9 +69,10 @@ class Calibration:
     size_px: tuple[int, int]
     samples: tuple[int, int, int]
     step: float
-    white_balance: tuple[float, float, float]
+    white_balance: tuple[float, float, float] | None
     to_rec709: Matrix3 | None
     block: int
+    side: int
     remarks: tuple[str, ...]
 
     def exposure(self, photo: Photo, capture: Capture, ratio: float = 1.0) -> Exposure:
@@ -86,7 +93,7 @@ def calibrate(captures: Sequence[Capture], folder: Path, camera: CameraNoise, bl
     folder : Path
         Where their files are.
     camera : CameraNoise
-        What is known already; it wins.
+        What is known already; it wins, and dark frames must not contradict it.
     block : int
         As of `open_photo`.
 
@@ -97,7 +104,7 @@ def calibrate(captures: Sequence[Capture], folder: Path, camera: CameraNoise, bl
     Raises
     ------
     FlarewrightError
-        When files cannot be read or have several sizes, or the noise cannot be told.
+        When files cannot be read or have several sizes, contradict the levels, or do not tell the noise.
     """
     lights = [one for one in captures if one.kind == "light"]
     photos = {one.file: open_photo(folder / one.file, camera.white_level, block) for one in captures}
@@ -115,7 +122,13 @@ def calibrate(captures: Sequence[Capture], folder: Path, camera: CameraNoise, bl
     ]
     darks = [photos[one.file] for one in captures if one.kind == "dark"]
     black = _black(first, camera, darks, pairs, white, remarks)
+    _levels_fit(camera, black, white, darks, [photos[group[k].file] for group in groups for k in (0, -1)])
     black_noise = 1.0 / len(darks) if black.ndim == 3 else 0.0
+    if np.isfinite(white):
+        # noise is found by exposures of the same light, so they have to be what the list says
+        silent = (Noise(0.0, 0.0),) * 3
+        for group in groups:
+            refuse_contradiction([Exposure(photos[a.file], a.exposure_s, silent, black, white) for a in group])
     points = _points(pairs, black, white, first.samples, black_noise) + _dark_points(darks, first.samples)
     known = camera
     if camera.electrons_per_unit is None or camera.read_noise is None:
@@ -123,10 +136,10 @@ def calibrate(captures: Sequence[Capture], folder: Path, camera: CameraNoise, bl
         remarks.append(_noise_words(camera, known))
     level = float(black.reshape(-1, 3).mean())
     known = known.replace(black_level=level, white_level=white if np.isfinite(white) else None)
-    response = _response([photos[one.file] for one in captures if one.kind == "flat"], black)
+    response = _response([photos[one.file] for one in captures if one.kind == "flat"], black, white)
     return Calibration(
         known, black, black_noise, white, response, first.size_px, first.samples, first.step, first.white_balance,
-        first.to_rec709, block, tuple(remarks),
+        first.to_rec709, block, first.side, tuple(remarks),
     )  # fmt: skip
 
 
@@ -217,6 +230,38 @@ def _black(
     return np.full(3, found, np.float32)
 
 
+def _levels_fit(
+    camera: CameraNoise, black: Band, white: float, darks: Sequence[Photo], lights: Sequence[Photo]
+) -> None:
+    """Refuse a black or white level that the photographs cannot have."""
+    level = float(black.reshape(-1, 3).mean())
+    numbers = {photo.path: np.concatenate([photo.rows(*band).ravel() for band in _bands(photo)]) for photo in lights}
+    most = max(float(one.max()) for one in numbers.values())
+    doubt = _LEVELS_DIFFER * ((white if np.isfinite(white) else most) - level)
+    told = f"{darks[0].path}, a dark frame, has" if darks else "the black level is"
+    if level >= white:
+        raise FlarewrightError(
+            f"{told} {level:g}, which is not below {white:g}, where the sensor clips: photograph dark frames with the "
+            "cap on, or correct the levels in camera.json"
+        )
+    if darks and camera.black_level is not None and abs(level - camera.black_level) > doubt:
+        raise FlarewrightError(
+            f"{told} {level:g} where black_level is {camera.black_level:g}: photograph dark frames with the cap on, or "
+            "correct black_level in camera.json or leave it out"
+        )
+    path, usual = min(((path, float(np.median(one))) for path, one in numbers.items()), key=lambda one: one[1])
+    if usual < level - doubt:
+        raise FlarewrightError(
+            f"{told} {level:g}, which is more than most of {path} has ({usual:g}): correct black_level in camera.json, "
+            "photograph dark frames with the cap on, or copy that file again if others are right"
+        )
+    if camera.white_level is not None and lights[0].step > 0.0 and most - level > _FAR_ABOVE * (white - level):
+        raise FlarewrightError(
+            f"white_level is {white:g}, but the photographs have numbers up to {most:g}, and no sensor goes on so far "
+            "where it clips: correct white_level in camera.json or leave it out"
+        )
+
+
 @dataclass(frozen=True)
 class _Compared:
     """Some rows of one channel of two exposures of the same light, as read."""
@@ -275,7 +320,7 @@ def _dark_points(darks: Sequence[Photo], samples: tuple[int, int, int]) -> list[
     return found
 
 
-def _response(flats: Sequence[Photo], black: Band) -> Band | None:
+def _response(flats: Sequence[Photo], black: Band, white: float) -> Band | None:
     """Return each pixel's answer over that of its neighbourhood.
 
     What is wider than that is left in: it is the lens' own shading of the direct image, which ghosts do not share.
@@ -285,7 +330,12 @@ def _response(flats: Sequence[Photo], black: Band) -> Band | None:
     width, height = flats[0].size_px
     total = np.zeros((height, width, 3))
     for photo in flats:
-        total += photo.rows(0, height) - black
+        numbers = photo.rows(0, height)
+        if float((numbers >= white).mean()) > _CLIPPED_FLAT:
+            raise FlarewrightError(
+                f"{photo.path} is saturated, so it is no flat: photograph an evenly lit surface with a shorter exposure"
+            )
+        total += numbers - black
     around = smooth(total, _FLAT_SIDE)
     if not (around > 0.0).all():
         raise FlarewrightError(

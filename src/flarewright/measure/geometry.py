@@ -26,6 +26,16 @@ _FAINTEST = 0.05
 _LEAST_CONTRAST = 20.0
 # residuals of the path beyond this part of the width are no path of one light
 _WORST_PATH = 0.02
+# a light that moves by less than this part of the width per tangent stays where it is: even a fisheye has more
+_LEAST_FOCAL = 0.1
+# what stays where it is, in the room or in the picture, to so many pixels or to this part of the light's way, in so
+# large a part of the frames that show it
+_STAYS_PX, _STAYS, _MOSTLY = 2.0, 0.05, 0.8
+# is no ghost: beside the line from axis to light by this part of the width in two frames, or anywhere in three while
+# the light goes so far; ghosts lie on that line, and a tenth of the width from the light they go at another pace
+_BESIDE, _WAY = 0.1, 0.3
+# cosine from which on a direction counts as ahead of the camera
+_AHEAD = 0.1
 # fewer distinct angles do not fix the distortion
 _FOR_DISTORTION = 8
 # and a power of it is believed when it is so many standard errors
@@ -119,13 +129,61 @@ def believable(sightings: Sequence[Sighting]) -> list[bool]:
     ]
     if rivals and len(rivals) > 0.5 * sum(found):
         one = sightings[rivals[0]]
-        assert one.rival_px is not None
-        (x, y), (other_x, other_y) = one.position_px, one.rival_px
-        raise FlarewrightError(
-            f"two lights were found, at ({x:.0f}, {y:.0f}) and ({other_x:.0f}, {other_y:.0f}) of one frame: cover one "
-            "of them, or give light_x_px and light_y_px in captures.csv"
-        )
+        raise _two_lights(one, one.rival_px, "one frame")
     return found
+
+
+def refuse_second_light(sightings: Sequence[Sighting], geometry: Geometry) -> None:
+    """Refuse a run with a second light, however faint beside the first.
+
+    Parameters
+    ----------
+    sightings : sequence of Sighting
+        Of all frames of a run.
+    geometry : Geometry
+        Of the same frames.
+
+    Raises
+    ------
+    FlarewrightError
+        When a bright spot stays where it is in the room while the camera turns, or in the picture beside the line from
+        axis to light, where no ghost is.
+    """
+    both = zip(sightings, geometry.placed, strict=True)
+    shown = [(one, placed) for one, placed in both if placed.light_found and one.other_px is not None]
+    if len(shown) < 2:
+        return
+    focal = geometry.px_per_rad
+    along = np.array([(cos(radians(placed.roll_deg)), -sin(radians(placed.roll_deg))) for _, placed in shown])
+    across = np.stack([-along[:, 1], along[:, 0]], axis=1)
+    turned = np.radians([placed.constellation_deg for _, placed in shown])
+    spots = np.array([one.other_px for one, _ in shown]) - geometry.axis_px
+    x, beside = (spots * along).sum(axis=1), (spots * across).sum(axis=1)
+    # as the camera would see it if it were turned back to the light, unless it would be beside the camera then
+    depth = x * np.sin(turned) + focal * np.cos(turned)
+    ahead = depth > _AHEAD * focal
+    depth = np.maximum(depth, _AHEAD * focal)
+    room = focal * np.stack([x * np.cos(turned) - focal * np.sin(turned), beside], axis=1) / depth[:, None]
+    way = focal * np.tan(turned)
+    width = 2.0 * max(geometry.axis_px[0], 1.0)
+    off = np.abs(beside) > _BESIDE * width
+    for places, chosen, least in ((room, off & ahead, 2), (spots, off, 2), (room, ahead, 3)):
+        if chosen.sum() < least:
+            continue
+        span = float(np.ptp(way[chosen]))
+        far = np.hypot(*(places[chosen] - np.median(places[chosen], axis=0)).T)
+        if (far < max(_STAYS_PX, _STAYS * span)).mean() < _MOSTLY or (least > 2 and span < _WAY * width):
+            continue
+        one, placed = shown[int(np.flatnonzero(chosen)[0])]
+        raise _two_lights(one, one.other_px, f"the frame at {placed.constellation_deg:.1f} deg")
+
+
+def _two_lights(sighting: Sighting, other: tuple[float, float] | None, where: str) -> FlarewrightError:
+    (x, y), (other_x, other_y) = sighting.position_px, other or (0.0, 0.0)
+    return FlarewrightError(
+        f"two lights were found, at ({x:.0f}, {y:.0f}) and ({other_x:.0f}, {other_y:.0f}) of {where}: cover one of "
+        "them, or give light_x_px and light_y_px in captures.csv"
+    )
 
 
 Across = Callable[[tuple[float, float], tuple[float, float]], tuple[float, float] | None]
@@ -159,15 +217,11 @@ def solve_geometry(
     seen = [one for one in frames if one.light_px is not None]
     rolls = list(dict.fromkeys(one.nominal_roll_deg for one in frames))
     paths = {roll: path for roll in rolls if (path := _fit_path([one for one in seen if one.nominal_roll_deg == roll]))}
+    for roll, path in paths.items():
+        _check_direction(path, roll, size_px[0])
     centre = 0.5 * size_px[0], 0.5 * size_px[1]
     if not paths:
         return _without_path(frames, centre, size_px, px_per_rad)
-    worst = max(path.residual_px for path in paths.values())
-    if worst > _WORST_PATH * size_px[0]:
-        raise FlarewrightError(
-            f"the light does not move as the angles say (it is {worst:.0f} pixels off): check constellation_deg and "
-            "roll_deg in captures.csv, and that no other light is in the picture"
-        )
     remarks: list[str] = []
     axis, error = _axis(paths, centre, size_px, across, remarks)
     placed = tuple(_place(one, paths.get(one.nominal_roll_deg), axis, next(iter(paths.values()))) for one in frames)
@@ -245,16 +299,10 @@ def _fit_path(seen: Sequence[Seen]) -> _Path | None:
             fit, covariance, rest = bent
     side, _, rest_beside = _robust(_by_powers(t, 1), beside)
     # the turntable's direction in the picture, and the law along it: the tilt is small
-    slope = hypot(fit[1], side[1])
+    slope = max(hypot(fit[1], side[1]), 1e-9)
     direction = (fit[1] * u + side[1] * np.array([-u[1], u[0]])) / slope
     foot = fit[0] * u + side[0] * np.array([-u[1], u[0]])
     spread = float(np.sqrt(np.mean(np.square([rest, rest_beside]).sum(axis=0))))
-    sign = 1.0 if fit[1] >= 0.0 else -1.0
-    if sign < 0.0:
-        raise FlarewrightError(
-            "the light moves against the angles: with positive angles it should go right in the upright picture; "
-            "change the sign of constellation_deg, or set roll_deg to 180"
-        )
     # where the law fails there is no jitter
     scatter = 1.4826 * float(np.median(np.abs(rest - np.median(rest))))
     jitter = sqrt(max(scatter**2 - float(np.median([one.error_px**2 for one in seen])), 0.0))
@@ -263,6 +311,32 @@ def _fit_path(seen: Sequence[Seen]) -> _Path | None:
         (float(foot[0]), float(foot[1])), (float(direction[0]), float(direction[1])), law,
         float(np.abs(t).max()), degrees(jitter / slope), spread, len(seen), tuple(map(tuple, covariance.tolist())),
     )  # fmt: skip
+
+
+def _check_direction(path: _Path, roll_deg: float, width: int) -> None:
+    """Refuse a path that is not the one the captures tell of."""
+    if path.residual_px > _WORST_PATH * width:
+        raise FlarewrightError(
+            f"the light does not move as the angles say (it is {path.residual_px:.0f} pixels off): check "
+            "constellation_deg and roll_deg in captures.csv, and that no other light is in the picture"
+        )
+    if path.focal_px < _LEAST_FOCAL * width:
+        raise FlarewrightError(
+            "the light stays where it is in the picture, though the angles change: check constellation_deg in "
+            "captures.csv, and that the photographs are of one light seen by a turning camera"
+        )
+    found_deg = degrees(np.arctan2(-path.direction[1], path.direction[0]))
+    off_deg = (found_deg - roll_deg + 180.0) % 360.0 - 180.0
+    if abs(off_deg) > 135.0:
+        raise FlarewrightError(
+            "the light moves against the angles: with positive angles it should go right in the upright picture; "
+            "change the sign of constellation_deg, or set roll_deg to 180"
+        )
+    if abs(off_deg) > 45.0:
+        raise FlarewrightError(
+            f"the light moves towards {round(found_deg)} deg in the picture (0 right, 90 up) as the angles grow, where "
+            f"roll_deg says {roll_deg:g}: correct roll_deg in captures.csv"
+        )
 
 
 def _by_powers(t: Floats | float, count: int) -> Floats:

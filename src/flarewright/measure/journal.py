@@ -10,7 +10,7 @@ from __future__ import annotations
 import base64
 import json
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any, TextIO, TypeVar, cast
@@ -45,6 +45,7 @@ class Journal:
     def __init__(self, known: list[Any] | None = None, file: TextIO | None = None) -> None:
         self._known = known or []
         self._at = 0
+        self._written = 0
         self._file = file
 
     def step(self, make: Callable[[], Made]) -> Made:
@@ -69,7 +70,8 @@ class Journal:
                 self._file.write(json.dumps(_packed(made)) + "\n")
                 self._file.flush()
             except OSError as error:
-                raise OutputError(f"cannot write {self._file.name}: {(error.strerror or str(error)).lower()}") from None
+                raise _unwritten(self._file.name, error) from None
+            self._written += 1
         return made
 
     @property
@@ -77,10 +79,22 @@ class Journal:
         """How many steps an earlier run had done."""
         return len(self._known)
 
+    @property
+    def empty(self) -> bool:
+        """Whether no step is known."""
+        return not self._known and self._written == 0
+
+
+def _unwritten(name: str | Path, error: OSError) -> OutputError:
+    reason = (error.strerror or str(error)).lower()
+    return OutputError(
+        f"cannot write {name}: {reason}; check the free space, and begin again: what is done is kept"
+    )
+
 
 @contextmanager
 def journal(path: Path, digest: str) -> Iterator[Journal]:
-    """Open the journal of a stage; it is removed when the stage ends well, and stays when it is stopped.
+    """Open the journal of a stage; removed when the stage ends well, kept with its steps when it is stopped.
 
     Parameters
     ----------
@@ -105,10 +119,18 @@ def journal(path: Path, digest: str) -> Iterator[Journal]:
     try:
         file = path.open("a", encoding="utf-8")
     except OSError as error:
-        raise OutputError(f"cannot write {path}: {(error.strerror or str(error)).lower()}") from None
-    with file:
-        yield Journal(known, file)
-    path.unlink(missing_ok=True)
+        raise _unwritten(path, error) from None
+    steps = Journal(known, file)
+    ended = False
+    try:
+        yield steps
+        ended = True
+    finally:
+        # what a full disk did not take is tried once more here, and would hide what was said of it
+        with suppress(OSError):
+            file.close()
+        if ended or steps.empty:
+            path.unlink(missing_ok=True)
 
 
 def _read(path: Path, head: dict[str, Any]) -> list[Any]:

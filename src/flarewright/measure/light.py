@@ -7,6 +7,7 @@ where its middle is clipped: by the point about which the neighbourhood is symme
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import hypot, sqrt
 
@@ -20,6 +21,11 @@ Band = NDArray[np.float32]
 _RIVAL = 0.25
 # a clipped area smaller than this may be a hot pixel
 _LEAST_AREA = 4
+# what may be another light, fainter than the first: clipped over so many pixels, or this part of it as far as it is not
+# clipped; so far from it, part of the width, and pixels
+_OTHER_AREA, _OTHER, _OTHER_FAR, _OTHER_PX = 9, 0.01, 0.1, 15.0
+# around it, so many pixels from its rim, there is less than this part of its light
+_RING, _DARK = (3.0, 6.0), 0.1
 # how far beyond the clipped area the star is compared with itself, pixels
 _RIM = 14
 # how much the star may differ from its turned self for other reasons than noise, as part of it
@@ -50,6 +56,8 @@ class Sighting:
         Where another light seems to be.
     clipped_share : float
         Part of the pixels that every exposure clipped.
+    other_px : tuple of float or None
+        The brightest spot far from it, a light or a ghost: which shows in the run (`geometry.refuse_second_light`).
     """
 
     position_px: tuple[float, float]
@@ -59,6 +67,7 @@ class Sighting:
     at_border: bool
     rival_px: tuple[float, float] | None
     clipped_share: float
+    other_px: tuple[float, float] | None = None
 
 
 def find_light(radiance: Band, variance: Band) -> Sighting:
@@ -88,6 +97,7 @@ def find_light(radiance: Band, variance: Band) -> Sighting:
     else:
         x, y, rivals = *_brightest(light), _second(light)
         radius = 2.0
+    other = _other(light, blobs, (x, y), radius)
     reach = radius + _RIM
     at_border = not (reach / 2 < x < width - reach / 2 and reach / 2 < y < height - reach / 2)
     (x, y), error = _symmetric(light, variance.mean(axis=2, dtype=np.float64), clipped, (x, y), reach)
@@ -96,7 +106,7 @@ def find_light(radiance: Band, variance: Band) -> Sighting:
     row, column = (min(max(int(value) - 7, 0), side) for value, side in ((y, height), (x, width)))
     flux = float(light[row : row + 15, column : column + 15].sum())
     rival = rivals[0] if rivals else None
-    return Sighting((x, y), error, flux, contrast, at_border, rival, float(clipped.mean()))
+    return Sighting((x, y), error, flux, contrast, at_border, rival, float(clipped.mean()), other)
 
 
 @dataclass(frozen=True)
@@ -178,6 +188,41 @@ def _second(light: Floats) -> list[tuple[float, float]]:
         return []
     b, a = np.unravel_index(int(rest.argmax()), light.shape)
     return [(float(a) + 0.5, float(b) + 0.5)]
+
+
+def _other(
+    light: Floats, blobs: Sequence[_Blob], first: tuple[float, float], radius: float
+) -> tuple[float, float] | None:
+    """Return the brightest spot far from the light that may be another: clipped, or the top of a little star."""
+    height, width = light.shape
+    away = max(_OTHER_PX, _OTHER_FAR * width)
+    for blob in blobs[1:]:
+        if blob.area >= _OTHER_AREA and _apart(blob.middle, first) > max(away, 3.0 * (radius + blob.radius)):
+            return blob.middle if _alone(light, blob.middle, blob.radius) else None
+    boxes = _boxed(light)
+    least = _OTHER * float(boxes[min(int(first[1]), height - 1), min(int(first[0]), width - 1)])
+    far = (np.arange(width) + 0.5 - first[0]) ** 2 + (np.arange(height)[:, None] + 0.5 - first[1]) ** 2 > away**2
+    rest = np.where(far, boxes, 0.0)
+    row, column = np.unravel_index(int(rest.argmax()), light.shape)
+    top = rest[row, column]
+    around = boxes[max(row - 3, 0) : row + 4, max(column - 3, 0) : column + 4]
+    spot = light[max(row - 1, 0) : row + 2, max(column - 1, 0) : column + 2]
+    # the first one's star has no top of its own there, and a hot pixel has dark neighbours
+    if top < max(least, 1e-30) or top < around.max() or np.median(spot) < 0.1 * spot.max():
+        return None
+    found = float(column) + 0.5, float(row) + 0.5
+    return found if _alone(light, found, 2.0) else None
+
+
+def _alone(light: Floats, middle: tuple[float, float], radius: float) -> bool:
+    """Tell whether a spot is dark all around, as lights are, and bright places in a ghost are not."""
+    reach = int(radius + _RING[1]) + 1
+    left, top = max(int(middle[0]) - reach, 0), max(int(middle[1]) - reach, 0)
+    part = light[top : int(middle[1]) + reach + 1, left : int(middle[0]) + reach + 1]
+    x, y = np.arange(part.shape[1]) + left + 0.5, np.arange(part.shape[0])[:, None] + top + 0.5
+    r = np.hypot(x - middle[0], y - middle[1])
+    ring = part[(r > radius + _RING[0]) & (r < radius + _RING[1])]
+    return bool(np.median(ring) < _DARK * np.median(part[r < radius])) if ring.size else False
 
 
 def _symmetric(

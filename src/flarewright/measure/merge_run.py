@@ -10,7 +10,7 @@ import hashlib
 import json
 import os
 import shutil
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import asdict, dataclass, replace
 from math import hypot
@@ -21,16 +21,16 @@ import numpy as np
 
 from ..errors import FlarewrightError, OutputError
 from ..io.atomic import write_atomically
-from ..io.merged import read_frame, write_frame, write_run
+from ..io.merged import read_frame, read_run, write_frame, write_run
 from ..io.photo import open_photo
 from ..model.capture import CameraNoise, Capture, FrameInfo, Matrix3, MergedFrame, MergedRun
 from .calibrate import Calibration, calibrate
 from .drift import without_drift
-from .geometry import Geometry, Seen, believable, solve_geometry
+from .geometry import Geometry, Seen, believable, refuse_second_light, solve_geometry
 from .light import Sighting, find_light
-from .merge import exposure_ratios, merge, without_idle_digits
+from .merge import exposure_ratios, merge, refuse_contradiction, refuse_damage, without_idle_digits
 from .symmetry import axis_beside_path, reduced
-from .upright import make_upright
+from .upright import UPRIGHT, make_upright
 
 FRAMES = "frames"
 # raise when the same photographs give other pixels, or another place of the light
@@ -109,7 +109,8 @@ def merge_captures(
     Raises
     ------
     FlarewrightError
-        When photographs cannot be read, are of several sizes or saturated everywhere, or show no light or two.
+        When photographs cannot be read, are of several sizes, saturated everywhere, or not what the list says, or show
+        no light or two; when `output` holds the run of others.
     OutputError
         When the folder cannot be written or is too small.
     """
@@ -117,20 +118,34 @@ def merge_captures(
     tell = progress or (lambda _part, _words: None)
     tell(0.0, "looking at the photographs")
     known = calibrate(captures, folder, camera or CameraNoise(), chosen.block)
-    balance = known.white_balance if chosen.white_balance == "camera" else (1.0, 1.0, 1.0)
-    balance = chosen.white_balance if isinstance(chosen.white_balance, tuple) else balance
     groups = _groups(captures)
+    balance = _balance(chosen, known, folder / groups[0][0].file)
+    _refuse_other_run(output, folder, captures, known.size_px)
     output = _folder(output, len(groups), known.size_px)
     merged = _merge_all(groups, folder, output, known, balance, threads, tell)
     found = believable([one.sighting for one in merged])
     tell(0.95, "axis")
     geometry = _geometry(merged, found, output, known)
+    refuse_second_light([one.sighting for one in merged], geometry)
     run = without_drift(output, _run(merged, geometry, known, balance))
     if chosen.upright:
         run = make_upright(output, run, lambda part, words: tell(0.96 + 0.04 * part, words))
     write_run(output, run)
+    _drop_stale(output, len(groups))
     tell(1.0, "merged")
     return run
+
+
+def _balance(settings: MergeSettings, known: Calibration, photograph: Path) -> tuple[float, float, float]:
+    if isinstance(settings.white_balance, tuple):
+        return settings.white_balance
+    if settings.white_balance == "none":
+        return 1.0, 1.0, 1.0
+    if known.white_balance is None:
+        raise FlarewrightError(
+            f"{photograph} does not tell its camera's white balance: give three factors, --white-balance 2,1,1.5"
+        )
+    return known.white_balance
 
 
 def _groups(captures: Sequence[Capture]) -> list[tuple[Capture, ...]]:
@@ -159,6 +174,49 @@ def _folder(output: Path, frames: int, size_px: tuple[int, int]) -> Path:
             "space, choose another folder, or average pixels with --block 2"
         )
     return output
+
+
+def _origin(folder: Path, captures: Iterable[Capture]) -> dict[str, Any]:
+    """Return what photographs are known by: their folder, names, sizes and times."""
+    stamps = [(one.file, (folder / one.file).stat()) for one in captures]
+    return {"folder": _digest(str(folder.resolve())), "files": [[n, s.st_size, s.st_mtime_ns] for n, s in stamps]}
+
+
+def _refuse_other_run(output: Path, folder: Path, captures: Sequence[Capture], size_px: tuple[int, int]) -> None:
+    """Refuse a folder with the run of other photographs: ghosts that were found in those would pass for these ones'.
+
+    A list may grow and shrink, photographs may move, and be converted anew where they are.
+    """
+    origins = [note["from"] for path in (output / FRAMES).glob("frame-*.json") if "from" in (note := _noted(path))]
+    here = _origin(folder, captures)
+    files = {tuple(one) for one in here["files"]}
+    names = {name for name, *_ in files}
+    for one in origins:
+        known = {tuple(stamp) for stamp in one["files"]}
+        if known & files or (one["folder"] == here["folder"] and names & {name for name, *_ in known}):
+            return
+    told = origins[0]["files"][0][0] if origins else _other_size(output, size_px)
+    if told is not None:
+        raise FlarewrightError(
+            f"{output} holds the run of other photographs ({told}): choose another folder, or remove that one first"
+        )
+
+
+def _other_size(output: Path, size_px: tuple[int, int]) -> str | None:
+    """Return the size of a run that notes no photographs, when it is another."""
+    try:
+        width, height = read_run(output).size_px
+    except FlarewrightError:
+        return None
+    return None if (width, height) == size_px else f"{width}x{height} pixels"
+
+
+def _drop_stale(output: Path, frames: int) -> None:
+    """Remove frames of constellations that the list no longer has."""
+    for path in (*(output / FRAMES).glob("frame-*"), *(output / UPRIGHT).glob("frame-*")):
+        number = path.stem.removeprefix("frame-")
+        if path.suffix in (".exr", ".json") and number.isdecimal() and int(number) >= frames:
+            path.unlink()
 
 
 def _merge_all(
@@ -195,10 +253,13 @@ def _frame(
     note = output / f"{FRAMES}/frame-{number:03d}.json"
     stamps = [(folder / one.file).stat() for one in group]
     digest = _digest([common, [one.model_dump() for one in group], [(s.st_size, s.st_mtime_ns) for s in stamps]])
-    kept = _kept(note, digest) if (output / file).is_file() else None
+    kept = _kept(note, digest, output / file)
     if kept is not None:
         return _Merged(file, group, kept, kept.clipped_share)
     shots = [known.exposure(open_photo(folder / one.file, _white_of(known), known.block), one) for one in group]
+    for one in shots:
+        refuse_damage(one)
+    refuse_contradiction(shots)
     ratios = exposure_ratios(shots)
     shots = [replace(one, seconds=one.seconds * ratio.value) for one, ratio in zip(shots, ratios, strict=True)]
     mean, variance = merge(shots)
@@ -206,17 +267,32 @@ def _frame(
     full = float(np.mean(shots[0].full)) if np.isfinite(known.white) else 1.0
     scale = np.asarray(balance, np.float32) / np.float32(full)
     mean, variance = without_idle_digits(mean * scale, variance * scale**2)
-    sighting = find_light(mean, variance)
-    pointed = next((one for one in group if one.light_x_px is not None), None)
-    if pointed is not None and pointed.light_x_px is not None and pointed.light_y_px is not None:
-        place = (pointed.light_x_px, pointed.light_y_px)
-        sighting = replace(sighting, position_px=place, error_px=_POINTED, at_border=False, rival_px=None)
+    sighting = _pointed(find_light(mean, variance), group, known)
     info = FrameInfo(file=file, constellation_deg=group[0].constellation_deg or 0.0, nominal_deg=0.0,
                      light_px=sighting.position_px, axis_px=(0.0, 0.0))  # fmt: skip
     write_frame(output, MergedFrame(info, mean, variance))
-    facts = {"digest": digest, "sighting": asdict(sighting), "ratios": [asdict(one) for one in ratios]}
+    facts = {
+        "digest": digest, "bytes": (output / file).stat().st_size, "sighting": asdict(sighting),
+        "ratios": [asdict(one) for one in ratios], "from": _origin(folder, group),
+    }  # fmt: skip
     write_atomically(note, lambda temporary: _write(temporary, json.dumps(facts) + "\n"))
     return _Merged(file, group, sighting, sighting.clipped_share)
+
+
+def _pointed(sighting: Sighting, group: Sequence[Capture], known: Calibration) -> Sighting:
+    """Return the light where a person says that it is, if one does."""
+    for one in group:
+        if one.light_x_px is None or one.light_y_px is None:
+            continue
+        x, y = one.light_x_px / known.side, one.light_y_px / known.side
+        width, height = known.size_px
+        if not (0.0 <= x <= width and 0.0 <= y <= height):
+            raise FlarewrightError(
+                f"light_x_px, light_y_px of {one.file} is ({one.light_x_px:g}, {one.light_y_px:g}), outside of its "
+                f"{width * known.side}x{height * known.side} pixels; leave them empty where the light is not in it"
+            )
+        return replace(sighting, position_px=(x, y), error_px=_POINTED, at_border=False, rival_px=None, other_px=None)
+    return sighting
 
 
 def _white_of(known: Calibration) -> float | None:
@@ -235,21 +311,28 @@ def _array_digest(array: np.ndarray[Any, Any] | None) -> str:
     return "" if array is None else hashlib.sha256(np.ascontiguousarray(array).tobytes()).hexdigest()
 
 
-def _kept(note: Path, digest: str) -> Sighting | None:
-    """Return what an earlier run noted of a frame made from the same photographs in the same way."""
+def _noted(note: Path) -> dict[str, Any]:
+    """Return what was noted of a frame; nothing when that cannot be read."""
     try:
         data = json.loads(note.read_text("utf-8"))
-        if data["digest"] != digest:
+    except (OSError, ValueError):
+        return {}
+    return data if isinstance(data, dict) else {}
+
+
+def _kept(note: Path, digest: str, frame: Path) -> Sighting | None:
+    """Return what an earlier run noted of a frame made from the same photographs in the same way, if it is whole."""
+    try:
+        data = _noted(note)
+        size = frame.stat().st_size
+        if data["digest"] != digest or data.get("bytes", size) != size:
             return None
-        facts = data["sighting"]
-        pair = facts["rival_px"]
-        return Sighting(
-            **{
-                **facts,
-                "position_px": (float(facts["position_px"][0]), float(facts["position_px"][1])),
-                "rival_px": None if pair is None else (float(pair[0]), float(pair[1])),
-            }
-        )
+        facts = {"other_px": None, **data["sighting"]}
+        places = {
+            name: None if (pair := facts[name]) is None else (float(pair[0]), float(pair[1]))
+            for name in ("position_px", "rival_px", "other_px")
+        }
+        return Sighting(**{**facts, **places})
     except (OSError, ValueError, KeyError, TypeError, IndexError):
         return None
 
@@ -277,9 +360,8 @@ def _geometry(merged: Sequence[_Merged], found: Sequence[bool], output: Path, kn
             frames.append(reduced(frame.radiance, frame.variance, one.sighting.position_px))
         return axis_beside_path(frames, foot, normal)
 
-    first = merged[0].group[0]
-    pitch = known.camera.pitch_um
-    focal_px = first.focal_mm * 1000.0 / pitch if first.focal_mm is not None and pitch is not None else None
+    focal, pitch = _first(capture.focal_mm for one in merged for capture in one.group), known.camera.pitch_um
+    focal_px = focal * 1000.0 / (pitch * known.side) if focal is not None and pitch is not None else None
     return solve_geometry(seen, known.size_px, across, focal_px)
 
 
@@ -294,17 +376,22 @@ def _run(
                 file=one.file, constellation_deg=placed.constellation_deg,
                 nominal_deg=first.constellation_deg or 0.0, roll_deg=placed.roll_deg, nominal_roll_deg=first.roll_deg,
                 light_px=placed.light_px, light_error_px=placed.light_error_px, light_found=placed.light_found,
-                axis_px=geometry.axis_px, iso=first.iso, f_number=first.f_number,
-                exposures_s=tuple(capture.exposure_s for capture in one.group), focal_mm=first.focal_mm,
-                clipped_share=one.clipped_share,
+                axis_px=geometry.axis_px, iso=first.iso, f_number=_first(capture.f_number for capture in one.group),
+                exposures_s=tuple(capture.exposure_s for capture in one.group),
+                focal_mm=_first(capture.focal_mm for capture in one.group), clipped_share=one.clipped_share,
             )
         )  # fmt: skip
     return MergedRun(
         size_px=known.size_px, frames=tuple(frames), axis_px=geometry.axis_px, axis_error_px=geometry.axis_error_px,
         px_per_rad=geometry.px_per_rad, camera=known.camera, reference_iso=known.camera.iso,
-        reference_f_number=merged[0].group[0].f_number, white_balance=balance,
+        reference_f_number=_first(capture.f_number for one in merged for capture in one.group), white_balance=balance,
         to_rec709=_to_rec709(known, balance), remarks=(*known.remarks, *geometry.remarks),
     )  # fmt: skip
+
+
+def _first(values: Iterable[float | None]) -> float | None:
+    """Return the first that is known."""
+    return next((value for value in values if value is not None), None)
 
 
 def _to_rec709(known: Calibration, balance: tuple[float, float, float]) -> Matrix3 | None:

@@ -7,11 +7,16 @@ import json
 from collections.abc import Mapping
 from pathlib import Path
 
+from pydantic import ValidationError
+
+from ..errors import FlarewrightError
 from ..io.atomic import write_atomically
 from ..io.merged import INDEX
 from ..model.capture import MergedRun
+from ..model.corrections import Corrections
 
 NOTES = "stages.json"
+_CORRECTIONS = "corrections"
 # raise when the same frames give other ghosts
 _VERSION = 1
 
@@ -60,6 +65,28 @@ def note(folder: Path, stage: str, digest: str) -> None:
         temporary.write_text(text, "utf-8")
 
     write_atomically(folder / NOTES, write)
+
+
+def note_corrections(folder: Path, corrections: Corrections | None) -> None:
+    """Note what a person told the search, so that it is told again; raises as `note`."""
+    note(folder, _CORRECTIONS, "" if corrections is None else corrections.model_dump_json())
+
+
+def noted_corrections(folder: Path) -> Corrections | None:
+    """Return what a person has told the search in a run's folder, None when nothing.
+
+    Raises
+    ------
+    FlarewrightError
+        When the note is damaged.
+    """
+    text = _noted(folder).get(_CORRECTIONS, "")
+    try:
+        return Corrections.model_validate_json(text) if text else None
+    except ValidationError:
+        raise FlarewrightError(
+            f"{folder / NOTES} tells corrections that cannot be read: give them again with --corrections"
+        ) from None
 
 
 def _noted(folder: Path) -> dict[str, str]:

@@ -18,6 +18,8 @@ from .base import Frozen
 Kind = Literal["light", "dark", "flat"]
 Positive = Annotated[float, Field(gt=0.0)]
 Degrees = Annotated[float, Field(ge=-360.0, le=360.0)]
+# a light beside the camera or behind it makes no picture
+Constellation = Annotated[float, Field(gt=-90.0, lt=90.0)]
 Matrix3 = tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]]
 
 
@@ -39,13 +41,13 @@ class Capture(Frozen):
         right: 0 when the camera is turned along its horizon, 90 when it is held upright.
     focal_mm : float or None
     light_x_px, light_y_px : float or None
-        Where the light is, when a person knows better than the program.
+        Where the light is in the file's own pixels, when a person knows better than the program.
     kind : {"light", "dark", "flat"}
         dark: taken with the cap on; flat: of an evenly lit surface.
     """
 
     file: str = Field(min_length=1)
-    constellation_deg: Degrees | None = None
+    constellation_deg: Constellation | None = None
     exposure_s: Positive
     iso: Positive = 100.0
     f_number: Positive | None = None
@@ -134,7 +136,7 @@ class FrameInfo(Frozen):
     """
 
     file: str
-    constellation_deg: float
+    constellation_deg: Constellation
     nominal_deg: float
     roll_deg: float = 0.0
     nominal_roll_deg: float = 0.0
