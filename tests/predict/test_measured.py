@@ -112,7 +112,15 @@ def test_beyond_what_was_measured_is_told(file, tmp_path, capsys):
     assert run(["predict", str(scene), "--json"]) == 0
     told = capsys.readouterr()
     assert "was measured from 1 to 26 degrees; lamp stands elsewhere in 100% of the times" in told.err
-    assert json.loads(told.out)["cameras"][0]["lights"][0]["known"] == [False]
+    data = json.loads(told.out)
+    assert data["cameras"][0]["lights"][0]["known"] == [False]
+    assert data["cameras"][0]["veil_cd_m2"] == [None]
+    assert data["ranking"][0]["mean_veil_cd_m2"] is data["ranking"][0]["contrast_left"] is None
+    assert data["ranking"][0]["known_share"] == 0.0
+    assert run(["predict", str(scene), "--near", "A", "--radius", "60"]) == 0
+    told = capsys.readouterr()
+    assert "not known" in told.out
+    assert "100 %" not in told.out
 
 
 @pytest.mark.parametrize(

@@ -154,7 +154,7 @@ def _glare(plan: Plan, c: int, threads: int | None) -> VeilingGlare | None:
 def _print(plan: Plan, ranked: Sequence[Ranked], shots: Sequence[Shot], found: Found | None) -> None:
     from rich.table import Table
 
-    from ..predict.scene_data import found_words, time_words
+    from ..predict.scene_data import found_words, time_words, unknown_share
     from ..render.chart import number
 
     scene = plan.scene
@@ -164,14 +164,19 @@ def _print(plan: Plan, ranked: Sequence[Ranked], shots: Sequence[Shot], found: F
     for column in ("mean veil", "worst", "at", "degrees", "contrast left"):
         out.add_column(column, justify="right")
     for one in ranked[:20]:
+        names = scene.cameras[one.camera].name, scene.lights[one.light].name
+        if one.worst is None or one.mean_veil_cd_m2 is None or one.worst_veil_cd_m2 is None:
+            out.add_row(*names, "not known", *["-"] * 4)
+            continue
         left = "-" if one.contrast_left is None else f"{one.contrast_left:.1%}"
         out.add_row(
-            scene.cameras[one.camera].name, scene.lights[one.light].name, number(one.mean_veil_cd_m2),
-            number(one.worst_veil_cd_m2), time_words(plan, one.worst), f"{one.worst_constellation_deg:.1f}", left,
+            *names, number(one.mean_veil_cd_m2), number(one.worst_veil_cd_m2), time_words(plan, one.worst),
+            f"{one.worst_constellation_deg:.1f}", left,
         )  # fmt: skip
     console().print(out)
     for shot in shots:
-        camera = scene.cameras[shot.camera].name
-        console().print(f"{time_words(plan, shot.first)} to {time_words(plan, shot.until)}: {camera}")
+        camera, unknown = scene.cameras[shot.camera].name, unknown_share(plan, shot)
+        doubt = f", its flare not known in {unknown:.0%} of the times" if unknown else ""
+        console().print(f"{time_words(plan, shot.first)} to {time_words(plan, shot.until)}: {camera}{doubt}")
     if found is not None:
         console().print(found_words(plan, found))

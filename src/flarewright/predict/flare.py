@@ -85,6 +85,10 @@ class Flare:
     fingerprint: str = ""
     remarks: tuple[str, ...] = ()
 
+    def covers(self, constellation_deg: Floats) -> NDArray[np.bool_]:
+        """Tell of each constellation whether it can be drawn."""
+        return np.asarray((constellation_deg >= self.least_deg) & (constellation_deg <= self.reach_deg))
+
     @property
     def aperture(self) -> str:
         """The f-number in words."""

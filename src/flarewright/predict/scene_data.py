@@ -14,7 +14,7 @@ from .statistics import NAMES
 from .switching import Shot
 from .worst import Worst
 
-__all__ = ["found_words", "scene_data", "time_words"]
+__all__ = ["found_words", "scene_data", "time_words", "unknown_share"]
 
 
 def time_words(plan: Plan, index: int) -> str:
@@ -26,11 +26,27 @@ def time_words(plan: Plan, index: int) -> str:
     return f"{date:%Y-%m-%d %H:%M:%S}" if days else f"{date:%H:%M:%S}"
 
 
+def unknown_share(plan: Plan, shot: Shot) -> float:
+    """Return in which part of a shot's times the camera's flare is not known."""
+    return float(np.isnan(plan.veil(shot.camera)[shot.first : shot.until + 1]).mean())
+
+
 def found_words(plan: Plan, found: Found) -> str:
     """Say in a sentence what a search for a better position came to."""
     name = plan.scene.cameras[found.camera].name
     tried, old = len(found.veils_cd_m2) - 1, float(found.veils_cd_m2[0])
+    if not found.moments:
+        return (
+            f"what flare {name} has where it stands is not known, for its lights stand beyond what was measured, so no "
+            "position can be told to be better"
+        )
+    unknown = int(np.isnan(found.veils_cd_m2).sum())
     about = f"of {tried} positions within {found.radius_m:g} m of {name}"
+    limits = [f"{unknown} of which stand where its flare is not known"] if unknown else []
+    if found.unknown:
+        times = found.moments + found.unknown
+        limits.append(f"at the {found.moments} of {times} times at which it is known where it stands")
+    about += "".join(f", {one}" for one in limits) + ("," if limits else "")
     if old == 0.0:
         return f"{name} has no flare where it stands; none {about} can be better"
     if not found.better:
@@ -77,8 +93,9 @@ def scene_data(
             {
                 "camera": cameras[one.camera].name,
                 "light": lights[one.light].name,
+                "known_share": one.known_share,
                 "mean_veil_cd_m2": one.mean_veil_cd_m2,
-                "worst_at_s": float(plan.times_s[one.worst]),
+                "worst_at_s": None if one.worst is None else float(plan.times_s[one.worst]),
                 "worst_veil_cd_m2": one.worst_veil_cd_m2,
                 "worst_constellation_deg": one.worst_constellation_deg,
                 "contrast_left": one.contrast_left,
@@ -96,6 +113,7 @@ def scene_data(
                 "to_s": float(plan.times_s[shot.until]),
                 "from": time_words(plan, shot.first),
                 "to": time_words(plan, shot.until),
+                "unknown_share": unknown_share(plan, shot),
             }
             for shot in shots
         ],
