@@ -121,6 +121,18 @@ def test_layers_add_up_and_single_ghosts_too():
     assert "ghost.2" not in {layer.name for layer in replay(model, 22.0, single=True)}
 
 
+def test_a_ghost_at_the_border_has_a_layer_where_it_is_and_none_when_it_has_left():
+    model = planted()
+    for angle in (22.0, 23.5, 24.9):
+        for layer in replay(model.replace(axis_px=(28.3, 44.6)), angle, single=True):
+            if layer.name == "ghost.1":
+                # rounding had left 1e-17 in rows right across the picture
+                assert layer.window[2] < 60
+                assert layer.pixels.max() > 1e-6
+    gone = replay(model.replace(axis_px=(-28.3, 44.6)), 24.9, single=True)
+    assert "ghost.1" not in {layer.name for layer in gone}
+
+
 def test_the_cameras_colours_become_rec709_by_its_matrix():
     model = planted()
     with pytest.raises(FlarewrightError, match="does not know its camera's colour matrix"):

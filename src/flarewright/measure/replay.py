@@ -35,6 +35,8 @@ BEYOND_DEG = 1.0
 _NEAR_AXIS = 0.04
 # most cells of detail to a pixel
 _CELLS = 1.5
+# of all of a ghost's light, in one pixel: less is none
+_ROUNDING = 1e-12
 _NOTHING = np.empty((0, 0, 3, 19))
 
 
@@ -274,6 +276,13 @@ def draw_packed(
     return pixels
 
 
+def _most_light(ghost: AberrationGhost | BezierGhost) -> float:
+    """Return what all of a ghost's light is at most, radiance times pixels; 0 for one that is drawn without sums."""
+    if isinstance(ghost, BezierGhost):
+        return 0.0
+    return float(np.pi * max(np.abs(one.intensity).sum() for one in (ghost.red, ghost.green, ghost.blue)))
+
+
 def _single(
     model: GhostModel, constellation_deg: float, roll_deg: float, size: tuple[int, int], gain: float
 ) -> Sequence[Layer]:
@@ -286,7 +295,8 @@ def _single(
             continue
         alone = cast(GhostModel, bare.replace(ghosts=(ghost,)))
         pixels = draw(alone, constellation_deg, roll_deg, size) * gain
-        lit = np.argwhere(pixels.any(axis=2))
+        # rows are sums of differences, of which rounding leaves something where there is no light
+        lit = np.argwhere((pixels > _ROUNDING * gain * _most_light(ghost)).any(axis=2))
         if not lit.size:
             continue
         (top, left), (bottom, right) = lit.min(axis=0), lit.max(axis=0) + 1
