@@ -187,8 +187,7 @@ def _call(words: list[str]) -> int:
     except (KeyboardInterrupt, typer.Abort):
         code = 130
     except MemoryError:
-        remedy = "choose a smaller --size or fewer layers (--brightest 20)"
-        return _fail(f"there is not enough memory for this picture; {remedy}")
+        return _fail(f"there is not enough memory for this; {_smaller(words)}")
     except BrokenPipeError:
         raise
     except OSError as error:
@@ -207,6 +206,20 @@ def _call(words: list[str]) -> int:
     if code == 130:
         print("flarewright: interrupted; nothing was left half-written", file=sys.stderr)
     return code if isinstance(code, int) else 0
+
+
+def _smaller(words: Sequence[str]) -> str:
+    """Say what takes less memory."""
+    match list(words[:2]):
+        case ["measure", "replay"]:
+            return "choose a smaller --size, or leave --ghosts out"
+        case ["measure", "run" | "merge"]:
+            return "choose a larger --block, which makes smaller frames"
+        case ["measure", _]:
+            return "merge again with a larger --block, which makes smaller frames"
+        case ["render", *_]:
+            return "choose a smaller --size or fewer layers (--brightest 20)"
+    return "close other programs, or choose a smaller picture"
 
 
 def _usage(error: Any) -> str:

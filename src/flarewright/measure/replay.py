@@ -88,7 +88,7 @@ def replay(
     Raises
     ------
     FlarewrightError
-        When the constellation lies outside what was measured, or the model knows no matrix.
+        When the constellation lies outside what was measured, the roll is no direction, or the model knows no matrix.
 
     Notes
     -----
@@ -98,8 +98,10 @@ def replay(
     if not low - BEYOND_DEG <= constellation_deg <= high + BEYOND_DEG:
         raise FlarewrightError(
             f"the model was measured from {low:g} to {high:g} degrees; it cannot tell the flare at "
-            f"{constellation_deg:g}"
+            f"{constellation_deg:g}: {_remedy(model, constellation_deg, roll_deg)}"
         )
+    if not np.isfinite(roll_deg):
+        raise FlarewrightError(f"roll {roll_deg:g} is no direction; choose degrees between -360 and 360")
     size = size_px or model.size_px
     about: dict[str, str | float] = {"constellation_deg": constellation_deg, "roll_deg": roll_deg}
     parts = _held(pack(model), model, constellation_deg, roll_deg, size)
@@ -111,6 +113,14 @@ def replay(
     singles = _single(model, constellation_deg, roll_deg, size, gain) if single else []
     drawn = (whole, *layers, *singles)
     return drawn if colors == "camera" else tuple(_in_rec709(layer, model) for layer in drawn)
+
+
+def _remedy(model: GhostModel, constellation_deg: float, roll_deg: float) -> str:
+    """Say which constellation would do."""
+    low, high = model.constellation_deg
+    if low <= -constellation_deg <= high:
+        return f"choose {-constellation_deg:g} with roll {(roll_deg + 180.0) % 360.0:g}, where the light stands as well"
+    return "choose degrees in between"
 
 
 def _held(

@@ -68,7 +68,9 @@ def scene_page(
         parts.append(section("Which camera when", _shots(plan, shots)))
     tried = "Small squares are positions that were tried: green with little flare, red with much, grey where it is not "
     tried += "known."
-    parts.append(section("Plan", figures(_map(plan, found)), paragraph(tried) if found is not None else ""))
+    parts.append(
+        section("Plan", figures(_map(plan, found)), paragraph(tried) if found is not None and found.moments else "")
+    )
     if found is not None:
         parts.append(section("A better position", paragraph(_sentence(found_words(plan, found)))))
     if worst:
