@@ -556,6 +556,9 @@ def test_a_damaged_cache_and_a_lens_that_is_not_there_are_told(tmp_path, capsys)
     assert "is damaged" in capsys.readouterr().err
     file.write_text(SCENE.replace("triplet-pestrecov", "no-such-lens"))
     assert run(["predict", str(file)]) == 2
-    assert "camera A: " in capsys.readouterr().err
+    assert f"{file}: camera A: " in capsys.readouterr().err
+    file.write_text(SCENE.replace("[0.0, 0.0, 2.0]", "[0.0, -20.0, 2.0]"))
+    assert run(["predict", str(file)]) == 2
+    assert f"{file}: cameras[0] (A): the camera aims at its own place" in capsys.readouterr().err
     assert run(["predict", "heliar-tronnier", "--near", "A"]) == 2
     assert "--near has no meaning for a lens" in capsys.readouterr().err

@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..errors import FlarewrightError, ProjectError
+from ..errors import FlarewrightError, ProjectError, naming
 from .common import console, print_json, progress_bar, remembered, tell
 
 if TYPE_CHECKING:
@@ -68,9 +68,11 @@ def predict_scene(path: Path, wishes: SceneWishes) -> None:
     scene = read_scene(path)
     camera = None if wishes.near is None else _camera_number(scene, wishes.near)
     maker = partial(_named, quality=wishes.quality, threads=wishes.threads)
-    _compile(scene, wishes.threads)
+    with naming(path):
+        _compile(scene, wishes.threads)
     with progress_bar() as told, remembered(wishes.cache, wishes.output) as memory:
-        plan = plan_scene(scene, partial(maker, shown=False), told, memory)
+        with naming(path):
+            plan = plan_scene(scene, partial(maker, shown=False), told, memory)
         ranked = ranking(plan)
         found = None
         if camera is not None:
