@@ -1,5 +1,6 @@
 """Replay: geometry, brightness, file and command."""
 
+import ctypes
 import json
 
 import numpy as np
@@ -100,6 +101,32 @@ def test_without_memory_a_replay_tells_what_its_own_flags_can_do(tmp_path, capsy
     assert "not enough memory" in told
     assert "leave --ghosts out" in told
     assert "--brightest" not in told
+
+
+def test_ctrl_c_while_a_kernel_compiles_is_an_interrupt(tmp_path, capsys, monkeypatch):
+    """The compiler calls back from C, where an exception ends; what it had not noted then is missed later."""
+
+    def compiling(*_, **__):
+        @ctypes.CFUNCTYPE(None)
+        def callback():
+            raise KeyboardInterrupt
+
+        callback()
+        raise RuntimeError("no compiled object yet for a kernel")
+
+    monkeypatch.setattr("flarewright.measure.replay.replay", compiling)
+    write_ghost_model(tmp_path / "model.json", planted())
+    arguments = [
+        "measure",
+        "replay",
+        str(tmp_path / "model.json"),
+        "--constellation",
+        "8",
+        "-o",
+        str(tmp_path / "o.exr"),
+    ]
+    assert run(arguments) == 130
+    assert capsys.readouterr().err == "flarewright: interrupted; nothing was left half-written\n"
 
 
 def test_roll_turns_ghosts_and_the_other_side_is_half_a_turn():
