@@ -129,7 +129,7 @@ def test_ghosts_are_outlined_and_named_over_frames_and_curves_say_whose_they_are
     assert ">2</text>" in charts[0]
     assert "0.5 s: 1.02, 2 s: 1<" in text
     assert "1.0000 to 1.0200" in text
-    assert "Light over what neighbours foretell" in text
+    assert "Light less what neighbours foretell" in text
     assert "<td>-0</td>" not in text
     assert "8.89 pixels (1/18 of the width)" in text
 

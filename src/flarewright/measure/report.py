@@ -152,8 +152,10 @@ def _ratios(folder: Path, run: MergedRun) -> str:
                 noted.setdefault(seconds, []).append(float(ratio["value"]))
         except (OSError, ValueError, KeyError, TypeError):
             continue
-    told = [f"{seconds:.4g} s: {np.mean(found):.4g}" + (f" ± {np.std(found):.1g}" if np.ptp(found) else "")
-            for seconds, found in sorted(noted.items())]  # fmt: skip
+    told = [
+        f"{seconds:.4g} s: {_with_error(float(np.mean(found)), float(np.std(found)) or None)}"
+        for seconds, found in sorted(noted.items())
+    ]
     return ", ".join(told) or "not told"
 
 
@@ -200,8 +202,8 @@ def _geometry(run: MergedRun) -> str:
         chart("Light's distance from the axis", both(away), x_label="constellation told, degrees", y_label="pixels"),
     ]
     if any(frame.gain != 1.0 for frame in run.frames):
-        gain = [Series("", angle, [frame.gain for frame in run.frames], COLOURS[0], 0.0)]
+        gain = [Series("", angle, [100.0 * (frame.gain - 1.0) for frame in run.frames], COLOURS[0], 0.0)]
         charts.append(
-            chart("Light over what neighbours foretell", gain, x_label="constellation told, degrees", y_label="factor")
+            chart("Light less what neighbours foretell", gain, x_label="constellation told, degrees", y_label="%")
         )
     return section("Geometry", figures(*charts))

@@ -33,7 +33,7 @@ _RIM, _LIT = 0.25, 0.02
 _LEAST, _RING_PX = 60, 7.0
 # between names; and standard deviations of noise that are plainly seen
 _APART_PX, _SEEN = 14.0, 4.0
-_NAME_PX, _REST = 12.0, "#d8dee4"
+_NAME_PX, _REST = 12.0, "#a9b4be"
 
 _TONE_WORDS = f"Logarithmic, {_DECADES:g} decades from black to white; what every exposure clipped is white."
 
@@ -139,6 +139,8 @@ def outlines_section(
         if place is not None:
             drawn.append(_outlined(frame_of(folder, run, info), ghosts, place, colours))
     words = f"Rims are where a quarter of a ghost's usual light is. {_TONE_WORDS}"
+    if len(colours) < len(model.ghosts):
+        words += f" In colour are the {len(colours)} ghosts that the charts show."
     return section("Found ghosts over frames", paragraph(words), figures(*drawn)) if drawn else ""
 
 
@@ -153,7 +155,9 @@ def _outlined(frame: MergedFrame, ghosts: GhostModel, place: tuple[float, float]
     pixels = toned[row][:, column]
     names: list[Mark] = []
     taken: list[tuple[float, float]] = []
-    for name, layer in ghosts_alone(ghosts, *place, (width, height)).items():
+    drawn = ghosts_alone(ghosts, *place, (width, height))
+    # those with a colour over the others
+    for name, layer in sorted(drawn.items(), key=lambda one: one[0] in colours):
         colour = _lighter(colours[name]) if name in colours else _REST
         y, x = _rim(layer, (height, width))
         pixels[y, x] = [int(colour[k : k + 2], 16) for k in (1, 3, 5)]
