@@ -303,6 +303,16 @@ def test_search_finds_where_the_lamp_leaves_the_view():
     assert found.veils_cd_m2[found.best] < 1.1 * least
 
 
+def test_positions_are_compared_at_the_times_that_are_known_where_the_camera_stands():
+    keys = [{"at_s": 10.0, "position_m": (4.0, 10.0, 0.0)}, {"at_s": 20.0, "position_m": (40.0, 1.0, 0.0)}]
+    light = lamp(position_m=(4.0, 10.0, 0.0), keyframes=keys)
+    given = scene([camera()], [light], time={"duration_s": 20.0, "step_s": 5.0})
+    found = best_position(measured_plan(given, 30.0), 0, 2.0)
+    assert (found.moments, found.unknown) == (3, 2)
+    assert found.veils_cd_m2[0] == pytest.approx(measured_plan(given, 30.0).veil(0)[0])
+    assert "at the 3 of 5 times at which it is known where it stands" in found_words(measured_plan(given, 30.0), found)
+
+
 def test_search_says_when_nothing_is_better():
     moon = {"kind": "distant", "name": "m", "azimuth_deg": 20.0, "elevation_deg": 0.0, "illuminance_lx": 1.0}
     # it aims so far away that nothing changes within a metre
