@@ -223,6 +223,14 @@ def test_a_camera_file_without_a_picture_is_refused(tmp_path, capsys, size):
     assert "camera.json: size_px[" in capsys.readouterr().err
 
 
+def test_two_rolls_at_one_constellation_each_tell_a_halo(tmp_path):
+    model = planted()
+    twice = ((2.0, 1.0), (5.0, 0.9), (5.0, 0.8))
+    told = model.replace(halo=model.halo.replace(strength=twice), star=model.star.replace(strength=twice))
+    write_ghost_model(tmp_path / "model.json", told)
+    assert read_ghost_model(tmp_path / "model.json") == told
+
+
 @pytest.mark.parametrize(
     ("place", "value", "message"),
     [

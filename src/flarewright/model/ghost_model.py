@@ -202,9 +202,10 @@ class BezierGhost(Frozen):
     _appears = model_validator(mode="after")(_appears_first)
 
 
-def _rises(what: str, values: Sequence[float]) -> None:
-    if any(b <= a for a, b in pairwise(values)):
-        raise ValueError(f"{what} must rise")
+def _by_constellation(what: str, constellation_deg: Sequence[float]) -> None:
+    # two rolls may have been photographed at one constellation
+    if any(b < a for a, b in pairwise(constellation_deg)):
+        raise ValueError(f"the constellations of {what} must rise")
 
 
 def _along_radii(what: str, radius_px: Sequence[float], radiance: Sequence[Rgb3]) -> None:
@@ -212,7 +213,8 @@ def _along_radii(what: str, radius_px: Sequence[float], radiance: Sequence[Rgb3]
         raise ValueError(f"{what} needs one radiance for each radius, not {len(radiance)} for {len(radius_px)}")
     if radius_px[0] <= 0.0:
         raise ValueError(f"{what}'s radius_px must be above 0")
-    _rises(f"{what}'s radius_px", radius_px)
+    if any(b <= a for a, b in pairwise(radius_px)):
+        raise ValueError(f"{what}'s radius_px must rise")
 
 
 class Halo(Frozen):
@@ -239,8 +241,8 @@ class Halo(Frozen):
     @model_validator(mode="after")
     def _rising(self) -> Halo:
         _along_radii("a halo", self.radius_px, self.radiance)
-        _rises("the constellations of a halo's strength", [angle for angle, _ in self.strength])
-        _rises("the constellations of a halo's even", [angle for angle, _ in self.even])
+        _by_constellation("a halo's strength", [angle for angle, _ in self.strength])
+        _by_constellation("a halo's even", [angle for angle, _ in self.even])
         return self
 
 
@@ -273,7 +275,7 @@ class Star(Frozen):
     @model_validator(mode="after")
     def _rising(self) -> Star:
         _along_radii("a star", self.radius_px, self.radiance)
-        _rises("the constellations of a star's strength", [angle for angle, _ in self.strength])
+        _by_constellation("a star's strength", [angle for angle, _ in self.strength])
         return self
 
 
