@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ..render.chart import number
 from ..render.glare import VeilingGlare
 from .plan import Plan, Ranked
 from .search import WORTH, Found
@@ -56,8 +57,8 @@ def found_words(plan: Plan, found: Found) -> str:
     x, y, z = (float(part) for part in found.offsets_m[found.best])
     level = f", {abs(z):.3g} m {'higher' if z > 0 else 'lower'}" if abs(z) > 0.005 else ""
     return (
-        f"the best {about} lies {x:+.3g} m along x and {y:+.3g} m along y{level}: mean veil {new:.3g} instead of "
-        f"{old:.3g} cd/m², {1.0 - new / old:.0%} less"
+        f"the best {about} lies {x:+.3g} m along x and {y:+.3g} m along y{level}: mean veil {number(new)} instead of "
+        f"{number(old)} cd/m², {1.0 - new / old:.0%} less"
     )
 
 
