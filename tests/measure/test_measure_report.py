@@ -1,19 +1,25 @@
 """The report of a run: it stands alone, and its replays are laid on the right frames."""
 
+import base64
 import json
 import re
+from io import BytesIO
 from math import cos, radians, sin, tan
 
 import numpy as np
 import pytest
 from measured_run import Measured
+from PIL import Image
 from test_replay import planted
 
 from flarewright.cli.app import run
 from flarewright.io.ghost_model_file import write_ghost_model
 from flarewright.io.merged import write_frame, write_run
 from flarewright.measure.replay import replay
+from flarewright.measure.report import write_report
+from flarewright.measure.report_frames import outlines_section, replays_section
 from flarewright.model.capture import FrameInfo, MergedFrame, MergedRun
+from flarewright.model.ghost_model import Halo
 
 
 def test_the_report_of_a_merged_run_stands_alone(measured: Measured, tmp_path, capsys):
@@ -58,6 +64,108 @@ def test_a_replay_is_laid_on_its_frame_at_both_sides_and_any_roll(tmp_path, caps
     rows = re.findall(r"<td>([12])</td><td>([\d.]+) to ([\d.]+)</td>", drawn)
     assert {name for name, _, _ in rows} == {"1", "2"}
     assert float(next(low for name, low, _ in rows if name == "2")) == pytest.approx(5.0, abs=1.0)
+
+
+def run_of(folder, model, angles=(6.0, 12.0, 18.0), noise=1e-3, **changes):
+    """Write a run of frames that show a model's flare, and return it."""
+    width, height = model.size_px
+    infos = []
+    (folder / "frames").mkdir(parents=True, exist_ok=True)
+    for k, angle in enumerate(angles):
+        drawn = replay(model, angle)[0].pixels
+        noisy = drawn + np.random.default_rng(k).normal(size=drawn.shape) * noise
+        light = model.axis_px[0] + model.focal_px * tan(radians(angle)), model.axis_px[1]
+        info = FrameInfo(file=f"frames/{k}.exr", constellation_deg=angle, nominal_deg=angle, light_px=light,
+                         axis_px=model.axis_px, exposures_s=(0.5, 2.0), gain=1.0 + 0.01 * k)  # fmt: skip
+        infos.append(info)
+        facts = {"ratios": [{"value": 1.02, "error": 0.001}, {"value": 1.0, "error": 0.0}]}
+        (folder / "frames" / f"{k}.json").write_text(json.dumps(facts))
+        variance = np.full((height, width, 3), max(noise, 1e-6) ** 2, np.float32)
+        write_frame(folder, MergedFrame(info, (noisy * info.gain).astype(np.float32), variance * info.gain**2))
+    fields = {"size_px": (width, height), "frames": tuple(infos), "axis_px": model.axis_px, "px_per_rad": 170.0}
+    written = MergedRun(**{**fields, **changes})
+    write_run(folder, written)
+    return written
+
+
+def pictures_of(html):
+    return [
+        np.asarray(Image.open(BytesIO(base64.b64decode(data))).convert("RGB")).astype(int)
+        for data in re.findall(r"base64,([^\"]+)", html)
+    ]
+
+
+def test_a_ghost_that_a_replay_lacks_is_plain_to_see_in_the_difference(tmp_path):
+    """The light is a hundred times as bright as ghosts; the scale of the differences is theirs."""
+    halo = Halo(radius_px=(1.0, 4.0), radiance=((900.0, 900.0, 900.0), (90.0, 90.0, 90.0)))
+    model = planted().replace(star=None, halo=halo)
+    written = run_of(tmp_path, model)
+    lacking = model.replace(ghosts=model.ghosts[1:])
+    *_, off = pictures_of(replays_section(tmp_path, written, written.frames[1:2], lacking))
+    single = next(one for one in replay(model, 12.0, single=True) if one.name == "ghost.1")
+    x, y, w, h = single.window
+    lit = single.pixels.mean(axis=2) > 0.5 * single.pixels.mean(axis=2).max()
+    assert np.abs(off[y : y + h, x : x + w][lit] - 127).mean() > 40
+    assert np.abs(off[:20, -20:] - 127).max() < 10
+    assert "black to white: ± " in replays_section(tmp_path, written, written.frames[1:2], lacking)
+
+
+def test_ghosts_are_outlined_and_named_over_frames_and_curves_say_whose_they_are(tmp_path):
+    model = planted()
+    written = run_of(tmp_path, model)
+    colours = {"1": "#1d5fa8", "2": "#c8413b"}
+    html = outlines_section(tmp_path, written, written.frames[1:2], model, colours)
+    assert len(re.findall(r">1</text>", html)) == len(re.findall(r">2</text>", html)) == 5
+    (picture,) = pictures_of(html)
+    red = (picture[..., 0] > 200) & (picture[..., 1] < 140) & (picture[..., 2] < 140)
+    blue = (picture[..., 2] > 200) & (picture[..., 0] < 140)
+    # thin closed lines, not patches
+    assert 40 < np.count_nonzero(red) < 600
+    assert 40 < np.count_nonzero(blue) < 600
+    write_report(tmp_path, written, model, tmp_path / "r.html")
+    text = re.sub(r"base64,[^\"]*", "", (tmp_path / "r.html").read_text())
+    charts = [one for one in re.findall(r"<svg.*?</svg>", text, re.DOTALL) if "Where the ghosts" in one]
+    assert ">1</text>" in charts[0]
+    assert ">2</text>" in charts[0]
+    assert "0.5 s: 1.02, 2 s: 1<" in text
+    assert "1.0000 to 1.0200" in text
+    assert "Light less what neighbours foretell" in text
+    assert "<td>-0</td>" not in text
+    assert "8.89 pixels (1/18 of the width)" in text
+
+
+def test_a_model_of_another_camera_is_left_out_and_refused_where_it_was_chosen(tmp_path, capsys):
+    model = planted()
+    run_of(tmp_path, model)
+    other = tmp_path / "other.json"
+    for change in ({"size_px": (180, 120)}, {"axis_px": (70.0, 44.6)}, {"focal_px": 250.0}):
+        write_ghost_model(other, model.replace(**change))
+        assert run(["measure", "report", str(tmp_path), "--model", str(other)]) == 2
+        told = capsys.readouterr().err
+        assert "does not belong to the frames" in told
+        assert told.count("\n") == 1
+        assert not (tmp_path / "report.html").exists()
+    write_ghost_model(tmp_path / "compact.json", model.replace(size_px=(180, 120)))
+    (tmp_path / "tracks.json").write_text("{}")
+    assert run(["measure", "report", str(tmp_path), "--json"]) == 0
+    told = capsys.readouterr()
+    data = json.loads(told.out)
+    assert data["ghosts"] is None
+    assert "pictures of 180 x 120 pixels, and the frames have 160 x 90" in data["remarks"][0]
+    assert "is left out" in told.err
+    assert "is left out" in (tmp_path / "report.html").read_text()
+
+
+def test_runs_without_frames_and_frames_of_another_size_are_refused(tmp_path, capsys):
+    model = planted()
+    run_of(tmp_path / "a", model, size_px=(96, 64))
+    run_of(tmp_path / "b", model, frames=())
+    for folder, words in (("a", "0.exr has 160 x 90 pixels, and the run 96 x 64"), ("b", "a run without frames")):
+        assert run(["measure", "report", str(tmp_path / folder)]) == 2
+        told = capsys.readouterr().err
+        assert words in told
+        assert "merge again" in told
+        assert not (tmp_path / folder / "report.html").exists()
 
 
 def test_frames_of_both_sides_are_laid_on_a_model_of_both_sides(tmp_path, capsys):

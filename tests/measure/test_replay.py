@@ -1,5 +1,6 @@
 """Replay: geometry, brightness, file and command."""
 
+import ctypes
 import json
 
 import numpy as np
@@ -75,6 +76,59 @@ def test_a_setting_without_its_old_value_is_refused():
         brightness(Reference(f_number=2.0), ReplayCamera(iso=100.0))
 
 
+@pytest.mark.parametrize("change", [{"iso": 1e308, "exposure_s": 1e308}, {"f_number": 1e-300}, {"iso": 1e-300}])
+def test_a_brightness_that_no_picture_holds_is_refused(change):
+    with pytest.raises(FlarewrightError, match="check these settings"):
+        brightness(planted().reference, ReplayCamera(**change))
+
+
+def test_a_camera_that_looks_nowhere_is_told_as_such():
+    with pytest.raises(FlarewrightError, match="forward has no length"):
+        constellation_and_roll((0, 0, 0), (0, 0, 0), (0, 1, 0), (0, 1, -1))
+    with pytest.raises(FlarewrightError, match="light at the camera's own place"):
+        constellation_and_roll((0, 1, 0), (0, 0, -1), (0, 1, 0), (0, 1, 0))
+
+
+def test_without_memory_a_replay_tells_what_its_own_flags_can_do(tmp_path, capsys, monkeypatch):
+    def stop(*_, **__):
+        raise MemoryError
+
+    monkeypatch.setattr("flarewright.measure.replay.replay", stop)
+    write_ghost_model(tmp_path / "model.json", planted())
+    arguments = ["--constellation", "8", "--size", "80x45", "-o", str(tmp_path / "o.exr")]
+    assert run(["measure", "replay", str(tmp_path / "model.json"), *arguments]) == 2
+    told = capsys.readouterr().err
+    assert "not enough memory" in told
+    assert "leave --ghosts out" in told
+    assert "--brightest" not in told
+
+
+def test_ctrl_c_while_a_kernel_compiles_is_an_interrupt(tmp_path, capsys, monkeypatch):
+    """The compiler calls back from C, where an exception ends; what it had not noted then is missed later."""
+
+    def compiling(*_, **__):
+        @ctypes.CFUNCTYPE(None)
+        def callback():
+            raise KeyboardInterrupt
+
+        callback()
+        raise RuntimeError("no compiled object yet for a kernel")
+
+    monkeypatch.setattr("flarewright.measure.replay.replay", compiling)
+    write_ghost_model(tmp_path / "model.json", planted())
+    arguments = [
+        "measure",
+        "replay",
+        str(tmp_path / "model.json"),
+        "--constellation",
+        "8",
+        "-o",
+        str(tmp_path / "o.exr"),
+    ]
+    assert run(arguments) == 130
+    assert capsys.readouterr().err == "flarewright: interrupted; nothing was left half-written\n"
+
+
 def test_roll_turns_ghosts_and_the_other_side_is_half_a_turn():
     model = planted().replace(size_px=(161, 161), axis_px=(80.5, 80.5), halo=None, star=None)
     right, up, left = (replay(model, 15.0, roll_deg=roll)[0].pixels for roll in (0.0, 90.0, 180.0))
@@ -121,6 +175,18 @@ def test_layers_add_up_and_single_ghosts_too():
     assert "ghost.2" not in {layer.name for layer in replay(model, 22.0, single=True)}
 
 
+def test_a_ghost_at_the_border_has_a_layer_where_it_is_and_none_when_it_has_left():
+    model = planted()
+    for angle in (22.0, 23.5, 24.9):
+        for layer in replay(model.replace(axis_px=(28.3, 44.6)), angle, single=True):
+            if layer.name == "ghost.1":
+                # rounding had left 1e-17 in rows right across the picture
+                assert layer.window[2] < 60
+                assert layer.pixels.max() > 1e-6
+    gone = replay(model.replace(axis_px=(-28.3, 44.6)), 24.9, single=True)
+    assert "ghost.1" not in {layer.name for layer in gone}
+
+
 def test_the_cameras_colours_become_rec709_by_its_matrix():
     model = planted()
     with pytest.raises(FlarewrightError, match="does not know its camera's colour matrix"):
@@ -147,6 +213,51 @@ def test_file_and_command(tmp_path, capsys):
     assert np.array_equal(read_exr(out).layers[0].pixels, expected[0].pixels)
 
 
+@pytest.mark.parametrize("size", [[0, 5], [-5, 5], [80, 70000]])
+def test_a_camera_file_without_a_picture_is_refused(tmp_path, capsys, size):
+    path, camera = tmp_path / "model.json", tmp_path / "camera.json"
+    write_ghost_model(path, planted())
+    camera.write_text(json.dumps({"size_px": size}))
+    arguments = ["--constellation", "8", "--camera", str(camera), "-o", str(tmp_path / "o.exr")]
+    assert run(["measure", "replay", str(path), *arguments]) == 2
+    assert "camera.json: size_px[" in capsys.readouterr().err
+
+
+def test_two_rolls_at_one_constellation_each_tell_a_halo(tmp_path):
+    model = planted()
+    twice = ((2.0, 1.0), (5.0, 0.9), (5.0, 0.8))
+    told = model.replace(halo=model.halo.replace(strength=twice), star=model.star.replace(strength=twice))
+    write_ghost_model(tmp_path / "model.json", told)
+    assert read_ghost_model(tmp_path / "model.json") == told
+
+
+@pytest.mark.parametrize(
+    ("place", "value", "message"),
+    [
+        (("star", "radiance"), [[1, 1, 1]], "star: a star needs one radiance for each radius, not 1 for 2"),
+        (("star", "radius_px"), [60.0, 1.0], "star: a star's radius_px must rise"),
+        (("star", "strength"), [[5.0, 1.0], [2.0, 1.0]], "constellations of a star's strength must rise"),
+        (("halo", "radius_px"), [0.0, 1.0, 2.0], "halo: a halo's radius_px must be above 0"),
+        (("halo", "strength"), [[5.0, 1.0], [2.0, 1.0]], "constellations of a halo's strength must rise"),
+        (("halo", "even"), [[5.0, [1, 1, 1]], [2.0, [1, 1, 1]]], "constellations of a halo's even must rise"),
+        (("constellation_deg",), [25.0, 0.0], "constellation_deg 25 to 0: the smaller comes first"),
+        (("ghosts", 1, "visible_deg"), [20.0, 5.0], "visible_deg 20 to 5: it appears before it disappears"),
+    ],
+)
+def test_a_model_whose_numbers_do_not_fit_together_is_refused(tmp_path, capsys, place, value, message):
+    data = planted().model_dump(mode="json")
+    target = data
+    for key in place[:-1]:
+        target = target[key]
+    target[place[-1]] = value
+    (tmp_path / "model.json").write_text(json.dumps(data))
+    arguments = ["--constellation", "8", "-o", str(tmp_path / "o.exr")]
+    assert run(["measure", "replay", str(tmp_path / "model.json"), *arguments]) == 2
+    told = capsys.readouterr().err
+    assert message in told
+    assert told.count("\n") == 1
+
+
 @pytest.mark.parametrize(
     ("text", "arguments", "message"),
     [
@@ -155,7 +266,15 @@ def test_file_and_command(tmp_path, capsys):
         ('{"schema_version": 2}', ["--constellation", "3"], "newer than"),
         ('{"size_px": [3, 3]}', ["--constellation", "3"], "axis_px"),
         (None, [], "--constellation DEG"),
-        (None, ["--constellation", "80"], "measured from 0 to 25"),
+        (
+            None,
+            ["--constellation", "80"],
+            "measured from 0 to 25 degrees; it cannot tell the flare at 80: choose degrees",
+        ),
+        (None, ["--constellation", "nan"], "cannot tell the flare at nan"),
+        (None, ["--constellation", "-10"], "choose 10 with roll 180, where the light stands as well"),
+        (None, ["--constellation", "-10", "--roll", "200"], "choose 10 with roll 20"),
+        (None, ["--constellation", "8", "--roll", "nan"], "roll nan is no direction"),
         (None, ["--constellation", "8", "--size", "8"], "--size"),
     ],
 )

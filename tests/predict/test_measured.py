@@ -1,6 +1,7 @@
 """A measured flare goes where a lens goes: curves and scenes from a ghost model."""
 
 import json
+from html import unescape
 
 import numpy as np
 import pytest
@@ -71,6 +72,36 @@ def test_an_f_number_that_nobody_told_is_not_made_up(tmp_path, capsys):
     assert "f/nan" not in page.read_text()
 
 
+def test_values_of_a_model_that_does_not_know_its_light_are_told_in_its_own_unit(file, tmp_path, capsys):
+    write_ghost_model(tmp_path / "own.json", planted(Reference()))
+    arguments = ["predict", str(tmp_path / "own.json"), "--samples", "12", "--unit-per-cd-m2", "0.02"]
+    assert run([*arguments, "-o", str(tmp_path / "m.html"), "--json"]) == 0
+    data = json.loads(capsys.readouterr().out)
+    assert data["unit"] == "radiance in the captures' unit, with the light that was photographed"
+    assert data["illuminance_lx"] is None
+    # no lux that nobody gave
+    np.testing.assert_allclose(data["veil_cd_m2"], np.array(data["statistics"]["mean"]["values"]) / 0.02)
+    page = (tmp_path / "m.html").read_text("utf-8")
+    assert data["unit"] in unescape(page)
+    assert "illuminance that the light gives" not in page
+    assert "The light that was photographed lights the sensor" in page
+    assert run(arguments) == 0
+    assert "over the light's illuminance" not in capsys.readouterr().out
+    assert run([*arguments, "--illuminance", "5"]) == 2
+    assert "it does not tell luminance_cd_m2 and solid_angle_sr" in capsys.readouterr().err
+    assert run(["predict", str(file), "--samples", "12", "--json"]) == 0
+    assert "over the illuminance" in json.loads(capsys.readouterr().out)["unit"]
+
+
+@pytest.mark.parametrize("text", ['{"frames": [], "axis_px": [1, 2]}', "[1, 2]", "no JSON"])
+def test_json_that_is_no_model_is_told_as_such(tmp_path, capsys, text):
+    (tmp_path / "merged.json").write_text(text)
+    assert run(["predict", str(tmp_path / "merged.json")]) == 2
+    told = capsys.readouterr().err
+    assert "merged.json is no ghost model: predict takes" in told
+    assert told.count("\n") == 1
+
+
 def test_without_a_unit_there_is_no_veil_to_tell(file, tmp_path, capsys):
     assert run(["predict", str(file), "-o", str(tmp_path / "m.html"), "--samples", "14", "--json"]) == 0
     data = json.loads(capsys.readouterr().out)
@@ -112,7 +143,15 @@ def test_beyond_what_was_measured_is_told(file, tmp_path, capsys):
     assert run(["predict", str(scene), "--json"]) == 0
     told = capsys.readouterr()
     assert "was measured from 1 to 26 degrees; lamp stands elsewhere in 100% of the times" in told.err
-    assert json.loads(told.out)["cameras"][0]["lights"][0]["known"] == [False]
+    data = json.loads(told.out)
+    assert data["cameras"][0]["lights"][0]["known"] == [False]
+    assert data["cameras"][0]["veil_cd_m2"] == [None]
+    assert data["ranking"][0]["mean_veil_cd_m2"] is data["ranking"][0]["contrast_left"] is None
+    assert data["ranking"][0]["known_share"] == 0.0
+    assert run(["predict", str(scene), "--near", "A", "--radius", "60"]) == 0
+    told = capsys.readouterr()
+    assert "not known" in told.out
+    assert "100 %" not in told.out
 
 
 @pytest.mark.parametrize(
@@ -122,6 +161,12 @@ def test_beyond_what_was_measured_is_told(file, tmp_path, capsys):
         (["--unit-per-cd-m2", "0"], "--unit-per-cd-m2 0 is no unit"),
         (["--to", "50"], "up to 26"),
         (["--glare"], "--glare has no meaning"),
+        (["--check", "3"], "--check has no meaning for a measured flare"),
+        (["--quality", "draft"], "--quality has no meaning for a measured flare"),
+        (
+            ["--sensor", "36x24"],
+            "has other proportions than the captures, which have 160 x 90 pixels; give --sensor 36x20.25",
+        ),
     ],
 )
 def test_bad_flags_for_a_measured_flare(flags, words, file, capsys):

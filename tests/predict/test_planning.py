@@ -4,6 +4,7 @@ import itertools
 import json
 import re
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +21,8 @@ from flarewright.optics.constellation import brightness_scale
 from flarewright.predict.flare import Frame
 from flarewright.predict.photometry import beam, disc_illuminance, exposure_level, point_illuminance
 from flarewright.predict.plan import plan_scene, ranking
+from flarewright.predict.scene_data import found_words
+from flarewright.predict.scene_page import scene_page
 from flarewright.predict.search import best_position
 from flarewright.predict.switching import shots_of, switching
 from flarewright.predict.tracks import camera_track, lamp_places, moments, sightings
@@ -184,6 +187,36 @@ def test_a_light_behind_makes_no_flare():
     assert found.veil(0)[0] == 0.0
 
 
+def measured_plan(given, reach_deg):
+    """Return a plan whose cameras' flare is known so far and no farther."""
+    flare = replace(painted(), reach_deg=reach_deg, dark_beyond=False)
+    return plan_scene(given, lambda *_: (flare, FRAME), lambda _: lambda *_: None)
+
+
+def test_beyond_what_was_measured_nothing_is_known_and_nobody_ranks_it():
+    aside = lamp(name="aside", position_m=(10.0, 1.0, 0.0), intensity_cd=1e6)
+    found = measured_plan(scene(lights=[lamp(position_m=(3.0, 10.0, 0.0)), aside], luminance_cd_m2=(1.0, 9.0)), 30.0)
+    assert found.veil(0, 0)[0] > 0.0
+    assert np.isnan(found.veil(0, 1)[0])
+    assert np.isnan(found.veil(0)[0])
+    known, unknown = ranking(found)
+    assert (known.light, unknown.light) == (0, 1)
+    assert (known.known_share, unknown.known_share) == (1.0, 0.0)
+    assert unknown.mean_veil_cd_m2 is unknown.contrast_left is unknown.worst is None
+    shown = scene_page(found, [known, unknown], (), None, ())
+    assert "<td>aside</td><td>not known</td>" in shown
+    assert "without flare" not in shown
+
+
+def test_a_mean_is_of_the_times_that_are_known():
+    keys = [{"at_s": 20.0, "position_m": (40.0, 1.0, 0.0)}]
+    given = scene(lights=[lamp(position_m=(0.0, 10.0, 0.0), keyframes=keys)], time={"duration_s": 20.0, "step_s": 5.0})
+    found = measured_plan(given, 60.0)
+    (one,) = ranking(found)
+    assert one.known_share == pytest.approx(0.4)
+    assert one.mean_veil_cd_m2 == pytest.approx(found.veil(0)[:2].mean())
+
+
 # ---------------------------------------------------------------------------------------------------------------------
 # which camera when
 
@@ -223,8 +256,30 @@ def test_shots_last_as_long_as_asked():
     assert shots_of(veil[:1], times, 0.0) == ()
 
 
+def test_a_camera_whose_flare_is_not_known_is_taken_only_where_no_other_is_known():
+    dark, times = np.nan, np.arange(5) * 60.0
+    shots = shots_of(np.array([[9.0, 9.0, 9.0, 9.0, dark], [1.0, dark, dark, dark, dark]]), times, 0.0)
+    assert {shot.camera for shot in shots if shot.first < 3} == {0}
+    assert len(shots_of(np.full((2, 5), dark), times, 0.0)) == 1
+
+
 # ---------------------------------------------------------------------------------------------------------------------
 # a better position
+
+
+def test_search_does_not_go_where_nothing_is_known():
+    """The flare of a measured camera ends at 25 degrees on paper, not in the world."""
+    given = scene([camera(aim_m=(0.0, 10.0, 0.0))], [lamp(position_m=(4.0, 10.0, 0.0))])
+    found = best_position(measured_plan(given, 25.0), 0, 6.0)
+    best = found.veils_cd_m2[found.best]
+    assert np.isnan(found.veils_cd_m2).any()
+    assert best == np.nanmin(found.veils_cd_m2) > 0.0
+    words = found_words(measured_plan(given, 25.0), found)
+    assert "stand where its flare is not known" in words
+    lost = best_position(measured_plan(given, 10.0), 0, 6.0)
+    assert not lost.better
+    assert "is not known" in found_words(measured_plan(given, 10.0), lost)
+    assert "is not known" in scene_page(measured_plan(given, 10.0), [], (), lost, ())
 
 
 def test_search_finds_where_the_lamp_leaves_the_view():
@@ -246,6 +301,16 @@ def test_search_finds_where_the_lamp_leaves_the_view():
         for x, y in grid[::4]
     )
     assert found.veils_cd_m2[found.best] < 1.1 * least
+
+
+def test_positions_are_compared_at_the_times_that_are_known_where_the_camera_stands():
+    keys = [{"at_s": 10.0, "position_m": (4.0, 10.0, 0.0)}, {"at_s": 20.0, "position_m": (40.0, 1.0, 0.0)}]
+    light = lamp(position_m=(4.0, 10.0, 0.0), keyframes=keys)
+    given = scene([camera()], [light], time={"duration_s": 20.0, "step_s": 5.0})
+    found = best_position(measured_plan(given, 30.0), 0, 2.0)
+    assert (found.moments, found.unknown) == (3, 2)
+    assert found.veils_cd_m2[0] == pytest.approx(measured_plan(given, 30.0).veil(0)[0])
+    assert "at the 3 of 5 times at which it is known where it stands" in found_words(measured_plan(given, 30.0), found)
 
 
 def test_search_says_when_nothing_is_better():
@@ -501,6 +566,9 @@ def test_a_damaged_cache_and_a_lens_that_is_not_there_are_told(tmp_path, capsys)
     assert "is damaged" in capsys.readouterr().err
     file.write_text(SCENE.replace("triplet-pestrecov", "no-such-lens"))
     assert run(["predict", str(file)]) == 2
-    assert "camera A: " in capsys.readouterr().err
+    assert f"{file}: camera A: " in capsys.readouterr().err
+    file.write_text(SCENE.replace("[0.0, 0.0, 2.0]", "[0.0, -20.0, 2.0]"))
+    assert run(["predict", str(file)]) == 2
+    assert f"{file}: cameras[0] (A): the camera aims at its own place" in capsys.readouterr().err
     assert run(["predict", "heliar-tronnier", "--near", "A"]) == 2
     assert "--near has no meaning for a lens" in capsys.readouterr().err

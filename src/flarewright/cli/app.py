@@ -5,8 +5,8 @@ from __future__ import annotations
 import gc
 import os
 import sys
-from collections.abc import Sequence
-from contextlib import nullcontext
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, nullcontext
 from typing import Annotated, Any
 
 import typer
@@ -180,15 +180,16 @@ def _rings(words: Sequence[str]) -> bool:
 
 def _call(words: list[str]) -> int:
     """Turn every expected end of a command into an exit code, with its one sentence."""
+    swallowed: list[object] = []
     try:
-        code: Any = app(args=words, prog_name="flarewright", standalone_mode=False)
+        with _keeping_interrupts(swallowed):
+            code: Any = app(args=words, prog_name="flarewright", standalone_mode=False)
     except FlarewrightError as error:
         return _fail(str(error), getattr(error, "problems", ()))
     except (KeyboardInterrupt, typer.Abort):
         code = 130
     except MemoryError:
-        remedy = "choose a smaller --size or fewer layers (--brightest 20)"
-        return _fail(f"there is not enough memory for this picture; {remedy}")
+        return _fail(f"there is not enough memory for this; {_smaller(words)}")
     except BrokenPipeError:
         raise
     except OSError as error:
@@ -201,12 +202,46 @@ def _call(words: list[str]) -> int:
         raise
     except Exception as error:
         # Usage errors come from Typer's copy of click or from click itself, by version; both can tell their message.
-        if not hasattr(error, "format_message"):
+        if hasattr(error, "format_message"):
+            return _fail(_usage(error))
+        if not swallowed:
             raise
-        return _fail(_usage(error))
+        code = 130
     if code == 130:
         print("flarewright: interrupted; nothing was left half-written", file=sys.stderr)
     return code if isinstance(code, int) else 0
+
+
+@contextmanager
+def _keeping_interrupts(swallowed: list[object]) -> Iterator[None]:
+    """Note every Ctrl-C that ends in a call from C, where none goes on: a kernel that compiled is then left undone."""
+    hook = sys.unraisablehook
+
+    def note(one: sys.UnraisableHookArgs) -> None:
+        if one.exc_type is KeyboardInterrupt:
+            swallowed.append(one.exc_type)
+        else:
+            hook(one)
+
+    sys.unraisablehook = note
+    try:
+        yield
+    finally:
+        sys.unraisablehook = hook
+
+
+def _smaller(words: Sequence[str]) -> str:
+    """Say what takes less memory."""
+    match list(words[:2]):
+        case ["measure", "replay"]:
+            return "choose a smaller --size, or leave --ghosts out"
+        case ["measure", "run" | "merge"]:
+            return "choose a larger --block, which makes smaller frames"
+        case ["measure", _]:
+            return "merge again with a larger --block, which makes smaller frames"
+        case ["render", *_]:
+            return "choose a smaller --size or fewer layers (--brightest 20)"
+    return "close other programs, or choose a smaller picture"
 
 
 def _usage(error: Any) -> str:

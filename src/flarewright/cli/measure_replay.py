@@ -23,7 +23,7 @@ def replay(
     camera: Annotated[
         Path | None,
         typer.Option(
-            metavar="FILE", help="JSON: camera and light in space, f-number, ISO, exposure (docs/measure.md)."
+            metavar="FILE", help="JSON: camera and light in space, f-number, ISO, exposure (docs/ghost-model.md)."
         ),
     ] = None,
     size: Annotated[str | None, typer.Option(metavar="WxH", help="Picture in pixels; the captures' when left out.")] = (

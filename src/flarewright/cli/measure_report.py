@@ -7,7 +7,8 @@ from typing import Annotated
 
 import typer
 
-from .common import check_place, print_json
+from ..errors import FlarewrightError
+from .common import check_place, print_json, tell
 
 EPILOG = "Example:\n\nflarewright measure report run"
 
@@ -30,15 +31,27 @@ def report(
     run = read_run(folder)
     check_place(place, (".html", ".htm"))
     from ..io.ghost_model_file import read_ghost_model, read_tracks
-    from ..measure.report import write_report
+    from ..measure.report import strange, write_report
     from .measure_stages import COMPACT, MODEL, TRACKS
 
-    made = [folder / name for name in (COMPACT, MODEL) if (folder / name).is_file()]
-    given = model or (made[0] if made else None)
-    known = None if given is None else read_ghost_model(given)
-    tracks = read_tracks(folder / TRACKS) if model is None and (folder / TRACKS).is_file() else None
-    write_report(folder, run, known, place, tracks)
+    known, remarks = None, []
+    for file in [model] if model else [folder / name for name in (COMPACT, MODEL) if (folder / name).is_file()]:
+        found = read_ghost_model(file)
+        why = strange(run, found)
+        if why is None:
+            known = found
+            break
+        if model is not None:
+            raise FlarewrightError(f"{file} does not belong to the frames in {folder}: {why}; choose another --model")
+        remarks.append(
+            f"{file} does not belong to the frames and is left out: {why}; flarewright measure fit renews it"
+        )
+    tell(remarks)
+    wanted = model is None and (known is not None or not remarks) and (folder / TRACKS).is_file()
+    tracks = read_tracks(folder / TRACKS) if wanted else None
+    write_report(folder, run, known, place, tracks, remarks)
     if as_json:
-        print_json({"report": str(place), "ghosts": None if known is None else len(known.ghosts)})
+        ghosts = None if known is None else len(known.ghosts)
+        print_json({"report": str(place), "ghosts": ghosts, "remarks": remarks})
     else:
         print(f"{place}: {len(run.frames)} frames" + ("" if known is None else f", {len(known.ghosts)} ghosts"))

@@ -115,8 +115,11 @@ def predict(
         float | None, typer.Option(help="Least seconds between two switches of camera (0).", rich_help_panel=_SCENE)
     ] = None,
     quality: Annotated[
-        str, typer.Option(help="final: traced rays; draft: matrices, quick but dark beyond the field of view.")
-    ] = "final",
+        str | None,
+        typer.Option(
+            help="final (traced rays, the default) or draft: matrices, quick but dark beyond the field of view."
+        ),
+    ] = None,
     glare: Annotated[bool, typer.Option("--glare", help="Also tell the veiling glare index.")] = False,
     cache: Annotated[
         Path | None,
@@ -134,7 +137,7 @@ def predict(
         check_place(output, ".html")
     if cache is not None:
         check_place(cache, ".npz")
-    if quality not in ("draft", "final"):
+    if quality not in (None, "draft", "final"):
         raise ProjectError(f"--quality {quality!r} is unknown here; choose draft or final")
     lens_flags = {
         "--fstop": fstop, "--coating": coating, "--zoom": zoom, "--focus": focus, "--spectrum": spectrum,
@@ -151,23 +154,27 @@ def predict(
         predict_scene(
             Path(subject),
             _scene_wishes(SceneWishes(
-                output, quality, near, 5.0 if radius is None else radius, height or 0.0, shortest_shot or 0.0, glare,
-                threads, as_json, cache,
+                output, quality or "final", near, 5.0 if radius is None else radius, height or 0.0,
+                shortest_shot or 0.0, glare, threads, as_json, cache,
             ), radius or height),
         )  # fmt: skip
         return
     _refuse(scene_flags, "a lens or a measured flare", "give a scene file")
     wanted = _wanted(to, roll, tolerance, samples, check, bins, _setting(illuminance, luminance), output)
-    width, high = _sensor(sensor)
+    size = _sensor(sensor)
     if is_model(subject):
-        _refuse({**lens_flags, "--glare": glare or None}, "a measured flare", "it was measured")
+        measured = {"--glare": glare or None, "--quality": quality, "--check": check}
+        _refuse({**lens_flags, **measured}, "a measured flare", "it was measured")
         if unit_per_cd_m2 is not None and not 0.0 < unit_per_cd_m2 < math.inf:
             raise ProjectError(f"--unit-per-cd-m2 {unit_per_cd_m2:g} is no unit; give a number above 0")
-        project, flares = None, model_flares(subject, width, unit_per_cd_m2)
+        project, flares = None, model_flares(subject, size, unit_per_cd_m2)
+        if not flares.sampled.per_lux:
+            untold = "it does not tell luminance_cd_m2 and solid_angle_sr of its captures' light"
+            _refuse({"--illuminance": illuminance}, subject, untold)
     else:
         _refuse({"--unit-per-cd-m2": unit_per_cd_m2}, "a lens", "it follows from the glass")
-        project = _project(subject, fstop, coating, zoom, focus, (width, high), spectrum, light_diameter)
-        flares = lens_flares(project, quality, threads)
+        project = _project(subject, fstop, coating, zoom, focus, size or (36.0, 24.0), spectrum, light_diameter)
+        flares = lens_flares(project, quality or "final", threads)
     _curves(flares, wanted, project if glare else None, threads, output, as_json, cache)
 
 
@@ -242,9 +249,9 @@ def _wanted(
     return Wanted(setting=setting, pictures=output is not None, **known)
 
 
-def _sensor(text: str | None) -> tuple[float, float]:
+def _sensor(text: str | None) -> tuple[float, float] | None:
     if text is None:
-        return 36.0, 24.0
+        return None
     width, height = pair(text, "--sensor", "36x24 (mm)", "x")
     if min(width, height) <= 0.0:
         raise ProjectError(f"--sensor {text!r}: a sensor has a width and a height above 0 mm")
@@ -311,7 +318,7 @@ def _print(found: Occurrence) -> None:
     data = occurrence_data(found)
     out = Table(
         title=f"{found.flare.name} · {found.flare.aperture} · {found.frame.width:g}x{found.frame.height:g} mm",
-        caption="Irradiance on the sensor over the light's illuminance; the light's own image is left out.",
+        caption=f"{found.flare.unit.capitalize()}; the light's own image is left out.",
     )
     out.add_column("estimator")
     for column in ("least", "at degrees", "most", "at degrees"):
@@ -323,8 +330,9 @@ def _print(found: Occurrence) -> None:
     console().print(out)
     if not math.isfinite(found.flare.scene_scale):
         return
-    lux, veil = number(found.setting.illuminance_lx), number(max(data["veil_cd_m2"]))
-    console().print(f"a light of {lux} lx lights the sensor, on average, as much as a scene of {veil} cd/m² at worst")
+    veil = number(max(data["veil_cd_m2"]))
+    light = f"a light of {number(found.setting.illuminance_lx)} lx" if found.flare.per_lux else "the captures' light"
+    console().print(f"{light} lights the sensor, on average, as much as a scene of {veil} cd/m² at worst")
     if "k_ratio" in data:
         console().print(f"it leaves at least {min(data['k_ratio']):.1%} of the scene's contrast")
     if found.glare is not None:

@@ -19,21 +19,25 @@ if TYPE_CHECKING:
 
 # pixels across a measured flare that is drawn for statistics, or to be looked at
 SIDE_PX, SHOWN_PX = 192, 240
+# a sensor whose proportions differ by a larger part is not that of the captures
+_OTHER_SHAPE = 0.03
 # wavelengths of pictures to be looked at, evenly spread, and of those that judge, by Gauss
 SHOWN_NM, JUDGED_NM = 15, 9
 
 
 def is_model(subject: str) -> bool:
-    """Whether a word on the command line names a measured flare."""
-    return subject.lower().endswith(".json") and Path(subject).is_file() and _looks_like_a_model(Path(subject))
+    """Whether a word on the command line names a measured flare: no lens is read from JSON."""
+    return subject.lower().endswith(".json") and Path(subject).is_file()
 
 
-def _looks_like_a_model(path: Path) -> bool:
-    # a lens of another program may be JSON too
-    try:
-        return '"axis_px"' in path.read_text("utf-8", errors="ignore")
-    except OSError:
-        return False
+def _refuse_others(path: str) -> None:
+    """Refuse JSON that is plainly no ghost model, of whose keys a list would be no help."""
+    text = Path(path).read_text("utf-8", errors="ignore")
+    if not all(f'"{key}"' in text for key in ("axis_px", "focal_px", "largest_deg")):
+        raise ProjectError(
+            f"{path} is no ghost model: predict takes a lens, a scene (.toml), or the model.json or compact.json that "
+            "flarewright measure run writes"
+        )
 
 
 def lens_flares(project: Project, quality: str, threads: int | None) -> Flares:
@@ -60,22 +64,35 @@ def lens_flares(project: Project, quality: str, threads: int | None) -> Flares:
     return Flares(sampled, frame, quality, judge, lens_flare(final, threads=threads))
 
 
-def model_flares(path: str, sensor_width_mm: float, unit_per_cd_m2: float | None) -> Flares:
+def model_flares(path: str, sensor_mm: tuple[float, float] | None, unit_per_cd_m2: float | None) -> Flares:
     """Return a measured flare as it is sampled and shown; nothing better judges it.
 
     Parameters
     ----------
     path : str
-    sensor_width_mm : float
+    sensor_mm : tuple of float or None
+        None: 36 mm wide.
     unit_per_cd_m2 : float or None
         What a scene of 1 cd/m2 has in the captures; None: not known.
+
+    Raises
+    ------
+    FlarewrightError
+        When the file is no ghost model, or the sensor has other proportions than the captures.
     """
     from ..io.ghost_model_file import read_ghost_model
     from ..predict.occurrence import Flares
 
+    _refuse_others(path)
     model = read_ghost_model(path)
-    sampled = model_flare(model, Path(path).name, sensor_width_mm, unit_per_cd_m2, SIDE_PX)
-    shown = model_flare(model, Path(path).name, sensor_width_mm, unit_per_cd_m2, SHOWN_PX)
+    (wide, high), (width, height) = model.size_px, sensor_mm or (36.0, 36.0 * model.size_px[1] / model.size_px[0])
+    if abs(height * wide / (width * high) - 1.0) > _OTHER_SHAPE:
+        raise ProjectError(
+            f"--sensor {width:g}x{height:g} has other proportions than the captures, which have {wide} x {high} "
+            f"pixels; give --sensor {width:g}x{width * high / wide:.4g}"
+        )
+    sampled = model_flare(model, Path(path).name, width, unit_per_cd_m2, SIDE_PX)
+    shown = model_flare(model, Path(path).name, width, unit_per_cd_m2, SHOWN_PX)
     return Flares(sampled, sampled.sensor, "measured", None, shown)
 
 
@@ -103,9 +120,11 @@ def model_flare(
 
     remarks = ["star, halo and residual of the measured flare are not counted: the light's own image is in them"]
     reference = model.reference
-    light_lx = 1.0
+    light_lx, unit = 1.0, "radiance in the captures' unit, with the light that was photographed"
+    per_lux = reference.luminance_cd_m2 is not None and reference.solid_angle_sr is not None
     if reference.luminance_cd_m2 is not None and reference.solid_angle_sr is not None:
         light_lx = reference.luminance_cd_m2 * reference.solid_angle_sr
+        unit = "radiance in the captures' unit over the illuminance that the light gives on a plane facing it"
     else:
         remarks.append("the model does not tell the light of its captures: values are in its own unit, not per lux")
     width, height = model.size_px
@@ -131,6 +150,8 @@ def model_flare(
         least_deg=max(math.ceil((low - BEYOND_DEG) * grid) / grid, 0.0),
         reach_deg=math.floor((high + BEYOND_DEG) * grid) / grid,
         dark_beyond=False,
+        unit=unit,
+        per_lux=per_lux,
         fingerprint=hashlib.sha256(model.model_dump_json().encode() + str((size, unit_per_cd_m2)).encode()).hexdigest(),
         remarks=tuple(remarks),
     )

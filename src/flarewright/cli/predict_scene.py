@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..errors import FlarewrightError, ProjectError
+from ..errors import FlarewrightError, ProjectError, naming
 from .common import console, print_json, progress_bar, remembered, tell
 
 if TYPE_CHECKING:
@@ -68,9 +68,11 @@ def predict_scene(path: Path, wishes: SceneWishes) -> None:
     scene = read_scene(path)
     camera = None if wishes.near is None else _camera_number(scene, wishes.near)
     maker = partial(_named, quality=wishes.quality, threads=wishes.threads)
-    _compile(scene, wishes.threads)
+    with naming(path):
+        _compile(scene, wishes.threads)
     with progress_bar() as told, remembered(wishes.cache, wishes.output) as memory:
-        plan = plan_scene(scene, partial(maker, shown=False), told, memory)
+        with naming(path):
+            plan = plan_scene(scene, partial(maker, shown=False), told, memory)
         ranked = ranking(plan)
         found = None
         if camera is not None:
@@ -154,7 +156,7 @@ def _glare(plan: Plan, c: int, threads: int | None) -> VeilingGlare | None:
 def _print(plan: Plan, ranked: Sequence[Ranked], shots: Sequence[Shot], found: Found | None) -> None:
     from rich.table import Table
 
-    from ..predict.scene_data import found_words, time_words
+    from ..predict.scene_data import found_words, time_words, unknown_share
     from ..render.chart import number
 
     scene = plan.scene
@@ -164,14 +166,19 @@ def _print(plan: Plan, ranked: Sequence[Ranked], shots: Sequence[Shot], found: F
     for column in ("mean veil", "worst", "at", "degrees", "contrast left"):
         out.add_column(column, justify="right")
     for one in ranked[:20]:
+        names = scene.cameras[one.camera].name, scene.lights[one.light].name
+        if one.worst is None or one.mean_veil_cd_m2 is None or one.worst_veil_cd_m2 is None:
+            out.add_row(*names, "not known", *["-"] * 4)
+            continue
         left = "-" if one.contrast_left is None else f"{one.contrast_left:.1%}"
         out.add_row(
-            scene.cameras[one.camera].name, scene.lights[one.light].name, number(one.mean_veil_cd_m2),
-            number(one.worst_veil_cd_m2), time_words(plan, one.worst), f"{one.worst_constellation_deg:.1f}", left,
+            *names, number(one.mean_veil_cd_m2), number(one.worst_veil_cd_m2), time_words(plan, one.worst),
+            f"{one.worst_constellation_deg:.1f}", left,
         )  # fmt: skip
     console().print(out)
     for shot in shots:
-        camera = scene.cameras[shot.camera].name
-        console().print(f"{time_words(plan, shot.first)} to {time_words(plan, shot.until)}: {camera}")
+        camera, unknown = scene.cameras[shot.camera].name, unknown_share(plan, shot)
+        doubt = f", its flare not known in {unknown:.0%} of the times" if unknown else ""
+        console().print(f"{time_words(plan, shot.first)} to {time_words(plan, shot.until)}: {camera}{doubt}")
     if found is not None:
         console().print(found_words(plan, found))

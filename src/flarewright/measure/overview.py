@@ -7,9 +7,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import FlarewrightError
 from ..io.merged import read_frame
 from ..io.png import write_png
-from ..model.capture import MergedRun
+from ..model.capture import FrameInfo, MergedFrame, MergedRun
 
 Floats = NDArray[np.float64]
 
@@ -56,7 +57,7 @@ def overview_picture(folder: Path, run: MergedRun) -> NDArray[np.uint8]:
     Raises
     ------
     FlarewrightError
-        When a frame cannot be read.
+        When a frame cannot be read or is of another size.
 
     Notes
     -----
@@ -80,13 +81,31 @@ def overview_picture(folder: Path, run: MergedRun) -> NDArray[np.uint8]:
     return shown
 
 
+def frame_of(folder: Path, run: MergedRun, info: FrameInfo) -> MergedFrame:
+    """Read a frame of a run, refusing one of another size.
+
+    Raises
+    ------
+    FlarewrightError
+        When it cannot be read, or is not as large as the run says.
+    """
+    frame = read_frame(folder, info)
+    height, width = frame.radiance.shape[:2]
+    if (width, height) != run.size_px:
+        raise FlarewrightError(
+            f"{folder / info.file} has {width} x {height} pixels, and the run {run.size_px[0]} x {run.size_px[1]}: "
+            "merge again with flarewright measure merge"
+        )
+    return frame
+
+
 def _laid_over(folder: Path, run: MergedRun) -> tuple[Floats, int]:
     """Return the brightest of some frames at each pixel, reduced, and how many pixels became one."""
     width, height = run.size_px
     block = -(-width // _WIDTH)
     brightest = np.zeros((height // block, width // block, 3))
     for k in np.unique(np.linspace(0, len(run.frames) - 1, min(_FRAMES, len(run.frames))).round().astype(int)):
-        light = read_frame(folder, run.frames[int(k)]).radiance
+        light = frame_of(folder, run, run.frames[int(k)]).radiance
         part = light[: brightest.shape[0] * block, : brightest.shape[1] * block].astype(np.float64)
         parts = part.reshape(brightest.shape[0], block, brightest.shape[1], block, 3)
         brightest = np.maximum(brightest, parts.mean(axis=(1, 3)))

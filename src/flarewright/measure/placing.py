@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import inf
+
 import numpy as np
 
 from ..errors import FlarewrightError
@@ -9,6 +11,9 @@ from ..model.ghost_model import Reference
 from ..model.replay_camera import ReplayCamera, Vector
 from ..optics.constellation import POWERS, brightness_scale, view_axes
 from ..optics.constellation import constellation_and_roll as optics_constellation
+
+# of the captures' brightness: fainter, and as much brighter, pixels of 32 bits do not hold
+_FAINTEST = 1e-20
 
 
 def constellation_and_roll(position: Vector, forward: Vector, up: Vector, light: Vector) -> tuple[float, float]:
@@ -35,7 +40,9 @@ def constellation_and_roll(position: Vector, forward: Vector, up: Vector, light:
     Equations 8.1 and 8.2 (`optics.constellation`).
     """
     away = np.array(light, float) - np.array(position, float)
-    if not (np.linalg.norm(away) > 0.0 and np.linalg.norm(forward) > 0.0):
+    if not np.linalg.norm(forward) > 0.0:
+        raise FlarewrightError("the camera's forward has no length, so it looks nowhere; give another forward")
+    if not np.linalg.norm(away) > 0.0:
         raise FlarewrightError("a light at the camera's own place has no direction; move one of them")
     axes = view_axes(forward, up)
     if np.isnan(axes).any():
@@ -61,7 +68,8 @@ def brightness(reference: Reference, camera: ReplayCamera) -> float:
     Raises
     ------
     FlarewrightError
-        When a new setting is given whose old value the model does not know.
+        When a new setting is given whose old value the model does not know, or all together are no brightness that a
+        picture can hold.
     """
     ratios: dict[str, float] = {}
     for name in POWERS:
@@ -74,4 +82,13 @@ def brightness(reference: Reference, camera: ReplayCamera) -> float:
                 f"leave it out or write it into the model's reference"
             )
         ratios[name] = new / old
-    return brightness_scale(ratios)
+    try:
+        gain = brightness_scale(ratios)
+    except (OverflowError, ZeroDivisionError):
+        gain = inf
+    if not _FAINTEST <= gain <= 1.0 / _FAINTEST:
+        told = ", ".join(f"{name} {getattr(camera, name):g}" for name in ratios)
+        raise FlarewrightError(
+            f"{told} make the flare {gain:g} times as bright as in the captures; check these settings"
+        )
+    return gain

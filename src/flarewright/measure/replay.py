@@ -35,6 +35,8 @@ BEYOND_DEG = 1.0
 _NEAR_AXIS = 0.04
 # most cells of detail to a pixel
 _CELLS = 1.5
+# of all of a ghost's light, in one pixel: less is none
+_ROUNDING = 1e-12
 _NOTHING = np.empty((0, 0, 3, 19))
 
 
@@ -86,7 +88,7 @@ def replay(
     Raises
     ------
     FlarewrightError
-        When the constellation lies outside what was measured, or the model knows no matrix.
+        When the constellation lies outside what was measured, the roll is no direction, or the model knows no matrix.
 
     Notes
     -----
@@ -96,8 +98,10 @@ def replay(
     if not low - BEYOND_DEG <= constellation_deg <= high + BEYOND_DEG:
         raise FlarewrightError(
             f"the model was measured from {low:g} to {high:g} degrees; it cannot tell the flare at "
-            f"{constellation_deg:g}"
+            f"{constellation_deg:g}: {_remedy(model, constellation_deg, roll_deg)}"
         )
+    if not np.isfinite(roll_deg):
+        raise FlarewrightError(f"roll {roll_deg:g} is no direction; choose degrees between -360 and 360")
     size = size_px or model.size_px
     about: dict[str, str | float] = {"constellation_deg": constellation_deg, "roll_deg": roll_deg}
     parts = _held(pack(model), model, constellation_deg, roll_deg, size)
@@ -109,6 +113,14 @@ def replay(
     singles = _single(model, constellation_deg, roll_deg, size, gain) if single else []
     drawn = (whole, *layers, *singles)
     return drawn if colors == "camera" else tuple(_in_rec709(layer, model) for layer in drawn)
+
+
+def _remedy(model: GhostModel, constellation_deg: float, roll_deg: float) -> str:
+    """Say which constellation would do."""
+    low, high = model.constellation_deg
+    if low <= -constellation_deg <= high:
+        return f"choose {-constellation_deg:g} with roll {(roll_deg + 180.0) % 360.0:g}, where the light stands as well"
+    return "choose degrees in between"
 
 
 def _held(
@@ -274,6 +286,13 @@ def draw_packed(
     return pixels
 
 
+def _most_light(ghost: AberrationGhost | BezierGhost) -> float:
+    """Return what all of a ghost's light is at most, radiance times pixels; 0 for one that is drawn without sums."""
+    if isinstance(ghost, BezierGhost):
+        return 0.0
+    return float(np.pi * max(np.abs(one.intensity).sum() for one in (ghost.red, ghost.green, ghost.blue)))
+
+
 def _single(
     model: GhostModel, constellation_deg: float, roll_deg: float, size: tuple[int, int], gain: float
 ) -> Sequence[Layer]:
@@ -286,7 +305,8 @@ def _single(
             continue
         alone = cast(GhostModel, bare.replace(ghosts=(ghost,)))
         pixels = draw(alone, constellation_deg, roll_deg, size) * gain
-        lit = np.argwhere(pixels.any(axis=2))
+        # rows are sums of differences, of which rounding leaves something where there is no light
+        lit = np.argwhere((pixels > _ROUNDING * gain * _most_light(ghost)).any(axis=2))
         if not lit.size:
             continue
         (top, left), (bottom, right) = lit.min(axis=0), lit.max(axis=0) + 1

@@ -2,29 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
 from ..model.ghost_tracks import GhostTrack, Step, Tracks, Turn
-from ..render.chart import COLOURS, Series, chart
+from ..render.chart import Series, chart
 from ..render.figure import Figure
 from ..render.page import figures, paragraph, section, table
 
-# ghosts drawn, those that are seen in most frames first
-_DRAWN = 12
 # by how much the others may widen an error before it is told as a crossing
 _CROSSING = 1.5
 _WORDS = {"range": "where the captures end", "fade": "fades", "frame": "at the frame's border", "hidden": "hidden"}
 
 
-def tracks_section(tracks: Tracks) -> str:
-    """Return a report's section about tracks, as HTML."""
-    often = sorted(tracks.ghosts, key=lambda one: -sum(step.state == "seen" for step in one.steps))[:_DRAWN]
+def tracks_section(tracks: Tracks, colours: Mapping[str, str]) -> str:
+    """Return a report's section about tracks, as HTML.
+
+    Parameters
+    ----------
+    tracks : Tracks
+    colours : mapping of str to str
+        Of the ghosts that are drawn, by name.
+    """
+    drawn = [track for track in tracks.ghosts if track.name in colours]
     charts = [
-        _chart("Brightness over what the fit foretells", often, lambda step: step.brightness, "factor"),
-        _chart("Place, towards the light", often, lambda step: step.along_px, "pixels from what is foretold"),
-        _chart("Size over what the fit foretells", often, lambda step: step.size, "factor"),
+        _chart("Brightness over what the fit foretells", drawn, colours, lambda step: step.brightness, "factor"),
+        _chart("Place, towards the light", drawn, colours, lambda step: step.along_px, "pixels from what is foretold"),
+        _chart("Size over what the fit foretells", drawn, colours, lambda step: step.size, "factor"),
     ]
     words = "Every frame was asked by itself, all its ghosts at once. A flat line at 1, or 0, is a ghost that the fit "
     words += "describes at all constellations."
@@ -33,13 +38,19 @@ def tracks_section(tracks: Tracks) -> str:
     return section("Tracks", paragraph(words), figures(*charts), table(head, rows))
 
 
-def _chart(title: str, tracks: list[GhostTrack], value: Callable[[Step], float | None], y_label: str) -> Figure:
+def _chart(
+    title: str,
+    tracks: list[GhostTrack],
+    colours: Mapping[str, str],
+    value: Callable[[Step], float | None],
+    y_label: str,
+) -> Figure:
     lines = []
-    for k, track in enumerate(tracks):
+    for track in tracks:
         at = [step.constellation_deg for step in track.steps]
         found = [value(step) if step.state == "seen" else None for step in track.steps]
         shown = np.array([np.nan if one is None else one for one in found])
-        lines.append(Series("", at, shown, COLOURS[k % len(COLOURS)]))
+        lines.append(Series(track.name, at, shown, colours[track.name]))
     return chart(title, lines, x_label="constellation, degrees", y_label=y_label)
 
 

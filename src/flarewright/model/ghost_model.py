@@ -7,7 +7,9 @@ the captures at their settings (`Reference`).
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Annotated, Literal, TypeVar
 
 from pydantic import Field, model_validator
 
@@ -16,6 +18,7 @@ from .sprite import Sprite
 
 Ten = tuple[float, float, float, float, float, float, float, float, float, float]
 Rgb3 = tuple[float, float, float]
+AnyGhost = TypeVar("AnyGhost", "AberrationGhost", "BezierGhost")
 Fade = tuple[Annotated[float, Field(ge=0.0)], Annotated[float, Field(ge=0.0)]]
 
 
@@ -131,6 +134,15 @@ class Blades(Frozen):
     first_deg: float
 
 
+def _appears_first(ghost: AnyGhost) -> AnyGhost:
+    low, high = ghost.visible_deg
+    if low > high:
+        raise ValueError(
+            f"visible_deg {low:g} to {high:g}: it appears before it disappears, so the smaller comes first"
+        )
+    return ghost
+
+
 class AberrationGhost(Frozen):
     """A ghost by its aberrations: one set of numbers for all constellations.
 
@@ -157,6 +169,8 @@ class AberrationGhost(Frozen):
     visible_deg: tuple[float, float]
     fade_deg: Fade = (0.0, 0.0)
     curves: Curves = Curves()
+
+    _appears = model_validator(mode="after")(_appears_first)
 
 
 class BezierGhost(Frozen):
@@ -185,6 +199,23 @@ class BezierGhost(Frozen):
     visible_deg: tuple[float, float]
     fade_deg: Fade = (0.0, 0.0)
 
+    _appears = model_validator(mode="after")(_appears_first)
+
+
+def _by_constellation(what: str, constellation_deg: Sequence[float]) -> None:
+    # two rolls may have been photographed at one constellation
+    if any(b < a for a, b in pairwise(constellation_deg)):
+        raise ValueError(f"the constellations of {what} must rise")
+
+
+def _along_radii(what: str, radius_px: Sequence[float], radiance: Sequence[Rgb3]) -> None:
+    if len(radius_px) != len(radiance):
+        raise ValueError(f"{what} needs one radiance for each radius, not {len(radiance)} for {len(radius_px)}")
+    if radius_px[0] <= 0.0:
+        raise ValueError(f"{what}'s radius_px must be above 0")
+    if any(b <= a for a, b in pairwise(radius_px)):
+        raise ValueError(f"{what}'s radius_px must rise")
+
 
 class Halo(Frozen):
     """Light around the light's image: haze, scatter and the star's core.
@@ -209,10 +240,9 @@ class Halo(Frozen):
 
     @model_validator(mode="after")
     def _rising(self) -> Halo:
-        if len(self.radius_px) != len(self.radiance):
-            raise ValueError("a halo needs one radiance for each radius")
-        if any(b <= a for a, b in zip(self.radius_px, self.radius_px[1:], strict=False)) or self.radius_px[0] <= 0.0:
-            raise ValueError("a halo's radii must rise from above 0")
+        _along_radii("a halo", self.radius_px, self.radiance)
+        _by_constellation("a halo's strength", [angle for angle, _ in self.strength])
+        _by_constellation("a halo's even", [angle for angle, _ in self.even])
         return self
 
 
@@ -241,6 +271,12 @@ class Star(Frozen):
     radius_px: tuple[float, ...] = Field(min_length=2)
     radiance: tuple[Rgb3, ...]
     strength: tuple[tuple[float, float], ...] = ()
+
+    @model_validator(mode="after")
+    def _rising(self) -> Star:
+        _along_radii("a star", self.radius_px, self.radiance)
+        _by_constellation("a star's strength", [angle for angle, _ in self.strength])
+        return self
 
 
 class Reference(Frozen):
@@ -322,4 +358,9 @@ class GhostModel(Frozen):
             raise ValueError("two ghosts have the same name")
         if min(self.size_px) < 1:
             raise ValueError("size_px must be at least 1 by 1")
+        low, high = self.constellation_deg
+        if not -90.0 < low <= high < 90.0:
+            raise ValueError(
+                f"constellation_deg {low:g} to {high:g}: the smaller comes first, both lie between -90 and 90"
+            )
         return self

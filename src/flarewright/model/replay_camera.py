@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import Field
 
 from .base import Frozen
 
 Vector = tuple[float, float, float]
+Side = Annotated[int, Field(ge=1, le=65536)]
 
 
 class ReplayCamera(Frozen):
@@ -34,7 +35,7 @@ class ReplayCamera(Frozen):
     forward: Vector = (0.0, 0.0, -1.0)
     up: Vector = (0.0, 1.0, 0.0)
     light: Vector | None = None
-    size_px: tuple[int, int] | None = None
+    size_px: tuple[Side, Side] | None = None
     f_number: float | None = Field(None, gt=0.0)
     iso: float | None = Field(None, gt=0.0)
     exposure_s: float | None = Field(None, gt=0.0)

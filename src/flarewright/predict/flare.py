@@ -65,6 +65,10 @@ class Flare:
         The smallest and the largest constellation that it knows.
     dark_beyond : bool
         Whether a light beyond makes no flare; else nobody knows.
+    unit : str
+        Of what it draws, in words.
+    per_lux : bool
+        Whether that is over the light's illuminance; else it is of the light that was photographed, whatever that gave.
     fingerprint : str
         The same for flares that draw the same.
     remarks : tuple of str
@@ -82,8 +86,14 @@ class Flare:
     least_deg: float = 0.0
     reach_deg: float = 85.0
     dark_beyond: bool = True
+    unit: str = "irradiance on the sensor over the illuminance that the light gives on a plane facing it"
+    per_lux: bool = True
     fingerprint: str = ""
     remarks: tuple[str, ...] = ()
+
+    def covers(self, constellation_deg: Floats) -> NDArray[np.bool_]:
+        """Tell of each constellation whether it can be drawn."""
+        return np.asarray((constellation_deg >= self.least_deg) & (constellation_deg <= self.reach_deg))
 
     @property
     def aperture(self) -> str:

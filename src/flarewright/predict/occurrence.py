@@ -127,7 +127,8 @@ class Occurrence:
     @property
     def veil_cd_m2(self) -> Floats:
         """Mean flare as the luminance of a scene that would light the sensor as much, over the constellation."""
-        return self.curves.column("mean") * self.setting.illuminance_lx / self.flare.scene_scale
+        lux = self.setting.illuminance_lx if self.flare.per_lux else 1.0
+        return self.curves.column("mean") * lux / self.flare.scene_scale
 
 
 def predict_occurrence(
@@ -213,9 +214,10 @@ def occurrence_data(found: Occurrence) -> dict[str, Any]:
         "roll_deg": curves.roll_deg,
         "scene_irradiance_per_radiance": flare.scene_scale,
         "constellation_deg": at.tolist(),
+        "unit": flare.unit,
         "statistics": statistics,
         "worst_step": curves.worst_step,
-        "illuminance_lx": found.setting.illuminance_lx,
+        "illuminance_lx": found.setting.illuminance_lx if flare.per_lux else None,
         "veil_cd_m2": found.veil_cd_m2.tolist(),
     }
     ratio = contrast_curve(found)

@@ -15,7 +15,7 @@ from .occurrence import Occurrence, contrast_curve
 from .statistics import NAMES
 
 WORDS = {
-    "sum_mm2": "sum (flux, mm²)",
+    "sum_mm2": "sum (times mm²)",
     "mean": "mean",
     "maximum": "maximum",
     "minimum": "minimum",
@@ -43,8 +43,8 @@ def occurrence_page(found: Occurrence) -> str:
     efl = "" if flare.efl is None else f"{flare.efl:.4g} mm, "
     lead = (
         f"{flare.name}, {efl}{flare.aperture}, sensor {found.frame.width:g} x {found.frame.height:g} mm, "
-        f"{found.quality} quality, {len(curves.constellation_deg)} constellations. Values are irradiance on the sensor "
-        "over the illuminance that the light gives on a plane facing it; the light's own direct image is left out."
+        f"{found.quality} quality, {len(curves.constellation_deg)} constellations. Values are {flare.unit}; "
+        "the light's own direct image is left out."
     )
     parts = [section("Flare over the constellation", _charts(found), _extremes(found))]
     if found.pictures:
@@ -127,10 +127,10 @@ def _context(found: Occurrence) -> str:
             y_label="cd/m²", logarithmic=True,
         )
     ]  # fmt: skip
-    words = (
-        f"A light that gives {number(setting.illuminance_lx)} lx on a plane facing it lights the sensor, on average, "
-        f"as much as a scene of {number(float(veil.max()))} cd/m² at worst."
-    )
+    light = "The light that was photographed"
+    if found.flare.per_lux:
+        light = f"A light that gives {number(setting.illuminance_lx)} lx on a plane facing it"
+    words = f"{light} lights the sensor, on average, as much as a scene of {number(float(veil.max()))} cd/m² at worst."
     ratio = contrast_curve(found)
     if ratio is not None and setting.luminance_cd_m2 is not None:
         low, high = setting.luminance_cd_m2

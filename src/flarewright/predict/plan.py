@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from datetime import datetime
-from math import log2
+from math import inf, log2
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,9 +43,9 @@ class Pair:
     ----------
     sighting : Sighting
     values : ndarray, shape (T, 5)
-        `statistics.NAMES`, in lx on the sensor (the sum in lx mm^2).
+        `statistics.NAMES`, in lx on the sensor (the sum in lx mm^2); NaN where it is not known.
     known : ndarray of bool, shape (T,)
-        Whether the camera's flare is known there; where it is not the values are 0.
+        Whether the camera's flare is known there.
     """
 
     sighting: Sighting
@@ -87,7 +87,10 @@ class Plan:
         return self.tables[camera][0].flare.scene_scale
 
     def veil(self, camera: int, light: int | None = None) -> Floats:
-        """Return the mean flare of one light, or of all together, as luminance of the scene, cd/m^2, shape (T,)."""
+        """Return the mean flare of one light, or of all together, as luminance of the scene, cd/m^2, shape (T,).
+
+        NaN where a light stands beyond what is known of the camera.
+        """
         chosen = self.pairs[camera] if light is None else [self.pairs[camera][light]]
         total = np.zeros(len(self.times_s))
         for pair in chosen:
@@ -119,12 +122,14 @@ class Ranked:
     Attributes
     ----------
     camera, light : int
-    mean_veil_cd_m2 : float
+    known_share : float
+        Part of the time in which the camera's flare is known; all that follows is of it, and None where there is none.
+    mean_veil_cd_m2 : float or None
         Over time.
-    worst : int
+    worst : int or None
         Which time has the brightest veil.
-    worst_veil_cd_m2 : float
-    worst_constellation_deg : float
+    worst_veil_cd_m2 : float or None
+    worst_constellation_deg : float or None
     contrast_left : float or None
         At that time.
     seen_share : float or None
@@ -135,13 +140,14 @@ class Ranked:
 
     camera: int
     light: int
-    mean_veil_cd_m2: float
-    worst: int
-    worst_veil_cd_m2: float
-    worst_constellation_deg: float
-    contrast_left: float | None
-    seen_share: float | None
-    brightest_stops: float | None
+    known_share: float
+    mean_veil_cd_m2: float | None = None
+    worst: int | None = None
+    worst_veil_cd_m2: float | None = None
+    worst_constellation_deg: float | None = None
+    contrast_left: float | None = None
+    seen_share: float | None = None
+    brightest_stops: float | None = None
 
 
 def tables_of(
@@ -267,11 +273,12 @@ def draw_ahead(tables: Sequence[Sequence[FlareTable]], seen: Sequence[Sequence[S
 
 def _measured(table: FlareTable, sighting: Sighting) -> Pair:
     angles, lux = sighting.constellation_deg, sighting.illuminance_lx
-    inside = (angles >= table.flare.least_deg) & (angles <= table.flare.reach_deg)
-    values = np.zeros((len(angles), len(NAMES)))
+    inside = table.flare.covers(angles)
+    known = inside | table.flare.dark_beyond | (lux == 0.0)
+    values = np.where(known[:, None], np.zeros(len(NAMES)), np.nan)
     for t in np.flatnonzero(inside & (lux > 0.0)):
         values[t] = table.between(float(angles[t]), float(sighting.roll_deg[t])).values * lux[t]
-    return Pair(sighting, values, inside | table.flare.dark_beyond | (lux == 0.0))
+    return Pair(sighting, values, known)
 
 
 def _doubts(camera: SceneCamera, light: SceneLight, flare: Flare, pair: Pair) -> list[str]:
@@ -280,7 +287,7 @@ def _doubts(camera: SceneCamera, light: SceneLight, flare: Flare, pair: Pair) ->
     if unknown > 0.0:
         told.append(
             f"{camera.name} was measured from {flare.least_deg:g} to {flare.reach_deg:g} degrees; {light.name} stands "
-            f"elsewhere in {unknown:.0%} of the times, which count as without flare"
+            f"elsewhere in {unknown:.0%} of the times, in which its flare is not known"
         )
     drawn = rounded_distance(pair.sighting, flare.efl)
     lit = pair.sighting.distance_m[pair.sighting.illuminance_lx > 0.0]
@@ -302,26 +309,35 @@ def ranking(plan: Plan) -> list[Ranked]:
     Returns
     -------
     list of Ranked
+        Those of which nothing is known stand behind all others, for nobody can rank them.
     """
     out = []
     for c, camera in enumerate(plan.scene.cameras):
         for k, pair in enumerate(plan.pairs[c]):
+            if not pair.known.any():
+                out.append(Ranked(c, k, 0.0))
+                continue
             veil = plan.veil(c, k)
-            worst = int(np.argmax(veil))
+            worst = int(np.nanargmax(veil))
             left = plan.contrast_left(veil)
-            peak = float(pair.column("maximum").max())
+            peak = float(pair.column("maximum")[pair.known].max())
             level = exposure_level(peak, camera.iso, camera.exposure_s) if camera.model is None else 0.0
             out.append(
                 Ranked(
                     camera=c,
                     light=k,
-                    mean_veil_cd_m2=float(veil.mean()),
+                    known_share=float(pair.known.mean()),
+                    mean_veil_cd_m2=float(veil[pair.known].mean()),
                     worst=worst,
                     worst_veil_cd_m2=float(veil[worst]),
                     worst_constellation_deg=float(pair.sighting.constellation_deg[worst]),
                     contrast_left=None if left is None else float(left[worst]),
-                    seen_share=None if left is None else float(np.mean(left < WASHED)),
+                    seen_share=None if left is None else float(np.mean(left[pair.known] < WASHED)),
                     brightest_stops=log2(level) if level > 0.0 else None,
                 )
             )
-    return sorted(out, key=lambda one: (-one.mean_veil_cd_m2, one.camera, one.light))
+    return sorted(out, key=lambda one: (-_or(one.mean_veil_cd_m2, -inf), one.camera, one.light))
+
+
+def _or(value: float | None, otherwise: float) -> float:
+    return otherwise if value is None else value

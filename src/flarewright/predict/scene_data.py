@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ..render.chart import number
 from ..render.glare import VeilingGlare
 from .plan import Plan, Ranked
 from .search import WORTH, Found
@@ -14,7 +15,7 @@ from .statistics import NAMES
 from .switching import Shot
 from .worst import Worst
 
-__all__ = ["found_words", "scene_data", "time_words"]
+__all__ = ["found_words", "scene_data", "time_words", "unknown_share"]
 
 
 def time_words(plan: Plan, index: int) -> str:
@@ -26,11 +27,27 @@ def time_words(plan: Plan, index: int) -> str:
     return f"{date:%Y-%m-%d %H:%M:%S}" if days else f"{date:%H:%M:%S}"
 
 
+def unknown_share(plan: Plan, shot: Shot) -> float:
+    """Return in which part of a shot's times the camera's flare is not known."""
+    return float(np.isnan(plan.veil(shot.camera)[shot.first : shot.until + 1]).mean())
+
+
 def found_words(plan: Plan, found: Found) -> str:
     """Say in a sentence what a search for a better position came to."""
     name = plan.scene.cameras[found.camera].name
     tried, old = len(found.veils_cd_m2) - 1, float(found.veils_cd_m2[0])
+    if not found.moments:
+        return (
+            f"what flare {name} has where it stands is not known, for its lights stand beyond what was measured, so no "
+            "position can be told to be better"
+        )
+    unknown = int(np.isnan(found.veils_cd_m2).sum())
     about = f"of {tried} positions within {found.radius_m:g} m of {name}"
+    limits = [f"{unknown} of which stand where its flare is not known"] if unknown else []
+    if found.unknown:
+        times = found.moments + found.unknown
+        limits.append(f"at the {found.moments} of {times} times at which it is known where it stands")
+    about += "".join(f", {one}" for one in limits) + ("," if limits else "")
     if old == 0.0:
         return f"{name} has no flare where it stands; none {about} can be better"
     if not found.better:
@@ -40,8 +57,8 @@ def found_words(plan: Plan, found: Found) -> str:
     x, y, z = (float(part) for part in found.offsets_m[found.best])
     level = f", {abs(z):.3g} m {'higher' if z > 0 else 'lower'}" if abs(z) > 0.005 else ""
     return (
-        f"the best {about} lies {x:+.3g} m along x and {y:+.3g} m along y{level}: mean veil {new:.3g} instead of "
-        f"{old:.3g} cd/m², {1.0 - new / old:.0%} less"
+        f"the best {about} lies {x:+.3g} m along x and {y:+.3g} m along y{level}: mean veil {number(new)} instead of "
+        f"{number(old)} cd/m², {1.0 - new / old:.0%} less"
     )
 
 
@@ -77,8 +94,9 @@ def scene_data(
             {
                 "camera": cameras[one.camera].name,
                 "light": lights[one.light].name,
+                "known_share": one.known_share,
                 "mean_veil_cd_m2": one.mean_veil_cd_m2,
-                "worst_at_s": float(plan.times_s[one.worst]),
+                "worst_at_s": None if one.worst is None else float(plan.times_s[one.worst]),
                 "worst_veil_cd_m2": one.worst_veil_cd_m2,
                 "worst_constellation_deg": one.worst_constellation_deg,
                 "contrast_left": one.contrast_left,
@@ -96,6 +114,7 @@ def scene_data(
                 "to_s": float(plan.times_s[shot.until]),
                 "from": time_words(plan, shot.first),
                 "to": time_words(plan, shot.until),
+                "unknown_share": unknown_share(plan, shot),
             }
             for shot in shots
         ],

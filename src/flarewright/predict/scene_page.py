@@ -14,7 +14,7 @@ from ..render.figure import FAINT, INK, Box, Figure, Line, Mark, Text
 from ..render.page import figures, image, page, paragraph, remark_list, section, table
 from .occurrence_page import shown_together
 from .plan import Plan, Ranked
-from .scene_data import found_words, time_words
+from .scene_data import found_words, time_words, unknown_share
 from .search import Found
 from .switching import Shot
 from .tracks import lamp_places
@@ -26,6 +26,8 @@ Floats = NDArray[np.float64]
 LINES, ROWS = 8, 40
 # of 255, and values: a picture with fewer as bright as this shows nothing
 DARKEST_SHOWN, FEWEST_SHOWN = 6, 60
+# tried positions whose flare is not known
+_UNKNOWN = "#c3ccd4"
 
 __all__ = ["scene_page"]
 
@@ -64,7 +66,11 @@ def scene_page(
         parts.append(section("Over time", _over_time(plan)))
     if shots:
         parts.append(section("Which camera when", _shots(plan, shots)))
-    parts.append(section("Plan", figures(_map(plan, found))))
+    tried = "Small squares are positions that were tried: green with little flare, red with much, grey where it is not "
+    tried += "known."
+    parts.append(
+        section("Plan", figures(_map(plan, found)), paragraph(tried) if found is not None and found.moments else "")
+    )
     if found is not None:
         parts.append(section("A better position", paragraph(_sentence(found_words(plan, found)))))
     if worst:
@@ -84,20 +90,33 @@ def _ranking(plan: Plan, ranked: Sequence[Ranked]) -> str:
     head = ["camera", "light", "mean veil, cd/m²" if moving else "veil, cd/m²"]
     head += ["worst, cd/m²", "at"] if moving else []
     head += ["degrees off axis"]
+    doubted = any(one.known_share < 1.0 for one in ranked)
     head += ["contrast left"] if told else []
     head += ["time under 90 %"] if told and moving else []
     head += ["brightest spot, stops from clipping"]
+    head += ["known in"] if doubted else []
     rows = []
     for one in ranked[:ROWS]:
-        row = [scene.cameras[one.camera].name, scene.lights[one.light].name, number(one.mean_veil_cd_m2)]
-        row += [number(one.worst_veil_cd_m2), time_words(plan, one.worst)] if moving else []
-        row += [f"{one.worst_constellation_deg:.1f}"]
-        row += [f"{one.contrast_left:.1%}"] if one.contrast_left is not None else []
-        row += [f"{one.seen_share:.0%}"] if one.seen_share is not None and moving else []
-        row += ["-" if one.brightest_stops is None else f"{one.brightest_stops:+.1f}"]
+        row = [scene.cameras[one.camera].name, scene.lights[one.light].name]
+        if one.worst is None:
+            row += ["not known", *["-"] * (len(head) - 4), "0% of the times"]
+        else:
+            row += [_told(one.mean_veil_cd_m2, number)]
+            row += [_told(one.worst_veil_cd_m2, number), time_words(plan, one.worst)] if moving else []
+            row += [_told(one.worst_constellation_deg, "{:.1f}".format)]
+            row += [_told(one.contrast_left, "{:.1%}".format)] if told else []
+            row += [_told(one.seen_share, "{:.0%}".format)] if told and moving else []
+            row += [_told(one.brightest_stops, "{:+.1f}".format)]
+            row += [f"{one.known_share:.0%} of the times"] if doubted else []
         rows.append(row)
     left = len(ranked) - ROWS
-    return table(head, rows) + (paragraph(f"{left} fainter pairs are left out here.") if left > 0 else "")
+    words = "Numbers are of the times at which the camera's flare is known. " if doubted else ""
+    words += f"{left} fainter pairs are left out here." if left > 0 else ""
+    return table(head, rows) + (paragraph(words) if words else "")
+
+
+def _told(value: float | None, words: Callable[[float], str]) -> str:
+    return "-" if value is None else words(value)
 
 
 def _over_time(plan: Plan) -> str:
@@ -160,11 +179,16 @@ def _shots(plan: Plan, shots: Sequence[Shot]) -> str:
     _, ticks, _ = _time_axis(plan)
     for at, words in ticks or [(float(t), f"{t:.4g} s") for t in np.linspace(0.0, span, 7)]:
         marks.append(Text(left + at * across, height - 8.0, words, 10.0, FAINT, "middle"))
-    timetable = table(
-        ("camera", "from", "to"),
-        [(cameras[shot.camera].name, time_words(plan, shot.first), time_words(plan, shot.until)) for shot in shots],
-    )
-    return figures(Figure(width, height, "Which camera when", tuple(marks))) + timetable
+    rows = [(cameras[shot.camera].name, time_words(plan, shot.first), time_words(plan, shot.until)) for shot in shots]
+    head: tuple[str, ...] = ("camera", "from", "to")
+    unknown = [unknown_share(plan, shot) for shot in shots]
+    drawn = figures(Figure(width, height, "Which camera when", tuple(marks)))
+    doubted = any(np.isnan(plan.veil(c)).any() for c in range(len(cameras)))
+    if not doubted:
+        return drawn + table(head, rows)
+    told = [(*row, f"{share:.0%} of the times") for row, share in zip(rows, unknown, strict=True)]
+    words = "A camera whose flare is not known is taken only where no other is known either."
+    return drawn + table((*head, "flare not known in"), told) + paragraph(words)
 
 
 def _map(plan: Plan, found: Found | None) -> Figure:
@@ -244,14 +268,14 @@ def _tried(plan: Plan, found: Found, place: Callable[[Floats], tuple[float, floa
     marks: list[Mark] = []
     start = plan.tracks[found.camera].position_m[0]
     finite = found.veils_cd_m2[np.isfinite(found.veils_cd_m2)]
-    low, high = float(finite.min()), float(finite.max())
+    low, high = float(finite.min(initial=np.inf)), float(finite.max(initial=-np.inf))
     for offset, veil in zip(found.offsets_m[1:], found.veils_cd_m2[1:], strict=True):
-        if not np.isfinite(veil):
+        if np.isinf(veil):
             continue
         part = (float(veil) - low) / (high - low) if high > low else 0.0
-        red, green = round(70 + 150 * part), round(170 - 110 * part)
+        colour = _UNKNOWN if np.isnan(veil) else f"#{round(70 + 150 * part):02x}{round(170 - 110 * part):02x}60"
         x, y = place(start + offset)
-        marks.append(Box(x - 2.0, y - 2.0, 4.0, 4.0, f"#{red:02x}{green:02x}60"))
+        marks.append(Box(x - 2.0, y - 2.0, 4.0, 4.0, colour))
     if found.better:
         x, y = place(start + found.offsets_m[found.best])
         marks += [
@@ -276,6 +300,8 @@ def _worst(plan: Plan, worst: Sequence[Worst]) -> str:
     for found, pixels in zip(worst, shown, strict=True):
         one, mean = found.ranked, found.veil_cd_m2
         camera, light = scene.cameras[one.camera].name, scene.lights[one.light].name
+        assert one.worst is not None
+        assert one.worst_veil_cd_m2 is not None
         words = f"{light} in {camera}, {time_words(plan, one.worst)}, {one.worst_constellation_deg:.1f} degrees"
         if np.count_nonzero(pixels >= DARKEST_SHOWN) >= FEWEST_SHOWN:
             images += image(pixels, words, 232)

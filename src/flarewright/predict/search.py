@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import inf, nan
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,10 +36,14 @@ class Found:
     offsets_m : ndarray, shape (N, 3)
         Tried, the first is 0: the position as it is.
     veils_cd_m2 : ndarray, shape (N,)
-        Mean over time of the veil of all lights; infinite where the camera cannot stand.
+        Mean over these times of the veil of all lights; infinite where the camera cannot stand, NaN where its flare is
+        not known in one of them.
     best : int
+        Of those that are known; 0 where none is.
     moments : int
         Times that were looked at.
+    unknown : int
+        Times that were left out: what flare the camera has where it stands is not known then.
     """
 
     camera: int
@@ -48,6 +53,7 @@ class Found:
     veils_cd_m2: Floats
     best: int
     moments: int
+    unknown: int = 0
 
     @property
     def better(self) -> bool:
@@ -86,6 +92,8 @@ def best_position(
     dates = None if plan.dates is None else tuple(plan.dates[t] for t in chosen)
     one = scene.cameras[camera]
     track = camera_track(one, times, one.name)
+    # positions are compared while it is known what flare there is now
+    known = np.all([pair.known[chosen] for pair in plan.pairs[camera]], axis=0)
 
     def veil(offset: Floats) -> float:
         try:
@@ -93,17 +101,21 @@ def best_position(
             seen = sightings(scene, [moved], times, dates)[0]
         except ProjectError:
             # on a lamp, or where it aims
-            return float("inf")
+            return inf
         total = 0.0
         for table, sighting in zip(plan.tables[camera], seen, strict=True):
-            inside = sighting.constellation_deg <= table.flare.reach_deg
-            for t in np.flatnonzero(inside & (sighting.illuminance_lx > 0.0)):
-                angle = max(float(sighting.constellation_deg[t]), table.flare.least_deg)
-                mean = table.mean_between(angle, float(sighting.roll_deg[t]))
+            lit = known & (sighting.illuminance_lx > 0.0)
+            inside = table.flare.covers(sighting.constellation_deg)
+            if not table.flare.dark_beyond and (lit & ~inside).any():
+                return nan
+            for t in np.flatnonzero(lit & inside):
+                mean = table.mean_between(float(sighting.constellation_deg[t]), float(sighting.roll_deg[t]))
                 total += mean * float(sighting.illuminance_lx[t])
-        return total / plan.scene_scale(camera) / len(times)
+        return total / plan.scene_scale(camera) / int(known.sum())
 
     offsets = [np.zeros(3)]
+    if not known.any():
+        return Found(camera, radius_m, height_m, np.array(offsets), np.array([nan]), 0, 0, len(times))
     veils = [veil(offsets[0])]
     count = FIRST + ROUNDS * LATER
     centre, reach, high = np.zeros(3), radius_m, height_m
@@ -117,9 +129,16 @@ def best_position(
             veils.append(veil(offset))
             if progress is not None:
                 progress((len(veils) - 1) / count, f"position {len(veils) - 1} of {count}")
-        best = int(np.argmin(veils))
+        best = _least(veils)
         centre, reach, high = offsets[best], SMALLER * reach, SMALLER * high
-    return Found(camera, radius_m, height_m, np.array(offsets), np.array(veils), int(np.argmin(veils)), len(times))
+    looked = int(known.sum())
+    return Found(
+        camera, radius_m, height_m, np.array(offsets), np.array(veils), _least(veils), looked, len(times) - looked
+    )
+
+
+def _least(veils: list[float]) -> int:
+    return int(np.argmin(np.where(np.isnan(veils), inf, veils)))
 
 
 def _sunflower(count: int, radius: float, height: float) -> Floats:

@@ -34,6 +34,7 @@ def shots_of(veil: Floats, times_s: Floats, shortest_s: float) -> tuple[Shot, ..
     Parameters
     ----------
     veil : ndarray, shape (C, T)
+        NaN where it is not known.
     times_s : ndarray, shape (T,)
     shortest_s : float
         No shot is shorter, rounded up to whole steps.
@@ -42,11 +43,18 @@ def shots_of(veil: Floats, times_s: Floats, shortest_s: float) -> tuple[Shot, ..
     -------
     tuple of Shot
         None for one camera or one time.
+
+    Notes
+    -----
+    What is not known counts as worse than all that is: a camera is on the air unknown only where no other order is.
     """
     if len(veil) < 2 or len(times_s) < 2:
         return ()
     steps = np.diff(times_s)
     cost = 0.5 * (veil[:, 1:] + veil[:, :-1]) * steps
+    unknown = np.isnan(cost)
+    if unknown.any():
+        cost = np.where(unknown, (2.0 * float(np.nansum(cost)) or 1.0) * steps / steps.min(), cost)
     return switching(cost, int(np.ceil(shortest_s / steps[0] - 1e-9)))
 
 

@@ -56,14 +56,14 @@ def render_worst(plan: Plan, ranked: Sequence[Ranked], maker: FlareMaker, progre
     list of Worst
     """
     scene = plan.scene
-    chosen = [one for one in ranked if one.worst_veil_cd_m2 > 0.0][:PICTURES]
+    chosen = [(one, one.worst) for one in ranked if one.worst is not None and one.worst_veil_cd_m2][:PICTURES]
     out = []
-    for k, one in enumerate(chosen):
+    for k, (one, worst) in enumerate(chosen):
         seen = plan.pairs[one.camera][one.light].sighting
         camera, light = scene.cameras[one.camera], scene.lights[one.light]
         flare, _ = near_or_far(maker, camera, light, seen)
-        factor = float(seen.illuminance_lx[one.worst]) / flare.scene_scale
-        drawn = flare.picture(float(seen.constellation_deg[one.worst]), float(seen.roll_deg[one.worst]))
+        factor = float(seen.illuminance_lx[worst]) / flare.scene_scale
+        drawn = flare.picture(float(seen.constellation_deg[worst]), float(seen.roll_deg[worst]))
         picture = (drawn * factor).astype(np.float32)
         bright = luminance(picture)
         washed = None

@@ -14,9 +14,14 @@ from .figure import FAINT, INK, Box, Figure, Line, Mark, Text
 Floats = NDArray[np.float64]
 Place = Callable[[float, float], tuple[float, float]]
 
-COLOURS = ("#1d5fa8", "#c8413b", "#2d8a5f", "#b06d10", "#7a4fb0", "#2b8f9c", "#8a3f6d", "#5d6b78")
+COLOURS = (
+    "#1d5fa8", "#c8413b", "#2d8a5f", "#b06d10", "#7a4fb0", "#2b8f9c", "#8a3f6d", "#5d6b78", "#c9a400", "#e0559b",
+    "#4fb3e8", "#7f8c1f",
+)  # fmt: skip
 _GRID = "#e3e8ed"
 _LEFT, _RIGHT, _TOP, _BOTTOM = 64.0, 14.0, 34.0, 44.0
+# of a legend
+_ROW = 14.0
 
 __all__ = ["COLOURS", "Series", "chart", "number"]
 
@@ -77,7 +82,7 @@ def chart(
     logarithmic : bool
         The vertical axis; at most `decades` below the largest value are shown.
     size : tuple of int
-        Pixels.
+        Pixels; a legend of several rows adds to the height.
     bands : sequence of float
         Values at which bins meet, as lines across.
     x_ticks : sequence of (float, str), optional
@@ -90,7 +95,9 @@ def chart(
     """
     width, height = size
     named = [one for one in series if one.label]
-    top = _TOP + (16.0 if len(named) > 1 else 0.0)
+    legend, rows = _legend(named, width) if len(named) > 1 else ([], 0)
+    top = _TOP + (2.0 + _ROW * rows if rows else 0.0)
+    height += round(_ROW * max(rows - 1, 0))
     box = (_LEFT, width - _RIGHT, top, height - _BOTTOM)
     x_range = _range([np.asarray(one.x, dtype=np.float64) for one in series])
     values = [np.asarray(one.y, dtype=np.float64) for one in series]
@@ -111,9 +118,7 @@ def chart(
         marks.append(Line([(box[0], level), (box[1], level)], "#f0c27a", 0.8))
     for one, y in zip(series, values, strict=True):
         marks += _curve(np.asarray(one.x, dtype=np.float64), y, one, place)
-    if len(named) > 1:
-        marks += _legend(named, width)
-    return Figure(width, height, title, tuple(marks))
+    return Figure(width, height, title, (*marks, *legend))
 
 
 def _curve(x: Floats, y: Floats, one: Series, place: Place) -> list[Mark]:
@@ -179,12 +184,15 @@ def _round_ticks(low: float, high: float, count: int = 7) -> list[float]:
     return [round(k * step, 12) for k in range(first, floor(high / step + 1e-9) + 1)]
 
 
-def _legend(named: Sequence[Series], width: int) -> list[Mark]:
+def _legend(named: Sequence[Series], width: int) -> tuple[list[Mark], int]:
+    """Return the legend and how many rows it takes."""
     marks: list[Mark] = []
-    x = _LEFT
+    x, row = _LEFT, 0
     for one in named:
-        if x > width - 60.0:
-            break
-        marks += [Line([(x, 34.0), (x + 14.0, 34.0)], one.colour, 2.0), Text(x + 18.0, 38.0, one.label, 10.0)]
-        x += 30.0 + 5.6 * len(one.label)
-    return marks
+        wide = 30.0 + 5.6 * len(one.label)
+        if x > _LEFT and x + wide > width:
+            x, row = _LEFT, row + 1
+        y = _TOP + _ROW * row
+        marks += [Line([(x, y), (x + 14.0, y)], one.colour, 2.0), Text(x + 18.0, y + 4.0, one.label, 10.0)]
+        x += wide
+    return marks, row + 1

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import html
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..io.atomic import write_atomically
-from ..io.png import write_png
+from ..io.png import encode_png, write_png
 
 INK, FAINT, PAPER = "#22313f", "#8796a5", "#fbfcfd"
 
@@ -52,7 +53,18 @@ class Text:
     anchor: Literal["start", "middle", "end"] = "start"
 
 
-Mark = Line | Box | Text
+@dataclass(frozen=True)
+class Picture:
+    """Pixels over a rectangle; shape (H, W, 3), uint8."""
+
+    x: float
+    y: float
+    width: float
+    height: float
+    pixels: NDArray[np.uint8]
+
+
+Mark = Line | Box | Text | Picture
 
 
 @dataclass(frozen=True)
@@ -102,6 +114,11 @@ def to_svg(figure: Figure) -> str:
     )
 
 
+def png_address(pixels: NDArray[np.uint8]) -> str:
+    """Return a picture as an address that holds it, for a page that needs nothing else."""
+    return f"data:image/png;base64,{base64.b64encode(encode_png(pixels, {})).decode('ascii')}"
+
+
 def _svg_mark(mark: Mark) -> str:
     if isinstance(mark, Line):
         points = " ".join(f"{x:.2f},{y:.2f}" for x, y in mark.points)
@@ -113,6 +130,11 @@ def _svg_mark(mark: Mark) -> str:
         return (
             f'<rect x="{mark.x:.2f}" y="{mark.y:.2f}" width="{mark.width:.2f}" height="{mark.height:.2f}" '
             f'fill="{mark.colour}"/>'
+        )
+    if isinstance(mark, Picture):
+        return (
+            f'<image x="{mark.x:.2f}" y="{mark.y:.2f}" width="{mark.width:.2f}" height="{mark.height:.2f}" '
+            f'preserveAspectRatio="none" href="{png_address(mark.pixels)}"/>'
         )
     return (
         f'<text x="{mark.x:.2f}" y="{mark.y:.2f}" font-size="{mark.size:g}" text-anchor="{mark.anchor}" '
@@ -135,6 +157,9 @@ def to_pixels(figure: Figure) -> NDArray[np.uint8]:
             # Pillow's boxes hold their last pixel too
             right, low = (mark.x + mark.width) * s - 1, (mark.y + mark.height) * s - 1
             draw.rectangle([mark.x * s, mark.y * s, max(right, mark.x * s), max(low, mark.y * s)], fill=mark.colour)
+        elif isinstance(mark, Picture):
+            held = Image.fromarray(mark.pixels).resize((round(mark.width * s), round(mark.height * s)))
+            sheet.paste(held, (round(mark.x * s), round(mark.y * s)))
         else:
             font = ImageFont.load_default(mark.size * s)
             anchor = {"start": "ls", "middle": "ms", "end": "rs"}[mark.anchor]

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-import base64
 import html
 from collections.abc import Iterable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..io.png import encode_png
-from .figure import Figure, to_svg
+from .figure import Figure, png_address, to_svg
 
 __all__ = ["figures", "image", "page", "paragraph", "remark_list", "section", "table"]
 
+# pixels that words below a narrow picture may take
+_CAPTION = 240
 _STYLE = (
     "body{font:15px/1.45 Helvetica,Arial,sans-serif;max-width:66em;margin:2em auto;padding:0 1em;color:#22313f;"
     "background:#fff}h1{font-size:1.6em;margin-bottom:.2em}h2{font-size:1.2em;margin-top:2em;border-bottom:1px solid "
@@ -21,7 +21,7 @@ _STYLE = (
     "td,th{padding:.15em .7em;text-align:right;border-bottom:1px solid #edf1f4}td:first-child,th:first-child"
     "{text-align:left}td{white-space:nowrap}"
     "th{color:#5d6b78;font-weight:600;vertical-align:bottom}figure{display:inline-block;margin:0 .5em "
-    ".6em 0;vertical-align:top}figcaption{font-size:.8em;color:#5d6b78;max-width:22em}img{display:block;max-width:100%}"
+    ".6em 0;vertical-align:top}figcaption{font-size:.8em;color:#5d6b78}img{display:block;max-width:100%}"
     "svg{max-width:100%;height:auto}.scroll{overflow-x:auto}.good{color:#1d7a4b}.bad{color:#b3372e}"
     "ul{padding-left:1.2em;color:#5d6b78;font-size:.9em}"
 )
@@ -82,9 +82,8 @@ def image(rgb_uint8: NDArray[np.uint8], caption: str, width: int | None = None) 
     width : int, optional
         In which it is shown; None: its own.
     """
-    data = base64.b64encode(encode_png(rgb_uint8, {})).decode("ascii")
     shown = rgb_uint8.shape[1] if width is None else width
     return (
-        f'<figure><img width="{shown}" src="data:image/png;base64,{data}" alt="{html.escape(caption)}">'
-        f"<figcaption>{html.escape(caption)}</figcaption></figure>"
+        f'<figure><img width="{shown}" src="{png_address(rgb_uint8)}" alt="{html.escape(caption)}">'
+        f'<figcaption style="max-width:{max(shown, _CAPTION)}px">{html.escape(caption)}</figcaption></figure>'
     )

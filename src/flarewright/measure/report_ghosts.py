@@ -1,0 +1,112 @@
+"""The part of a measurement's report about ghosts: where each goes over the constellation, how much light it holds."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..model.ghost_model import GhostModel
+from ..render.chart import COLOURS, Series, chart, number
+from ..render.page import figures, paragraph, remark_list, section, table
+from .report_frames import bare, ghosts_alone
+
+Floats = NDArray[np.float64]
+
+# constellations at which every ghost is drawn by itself, and how wide
+_STEPS, _WIDTH = 32, 240
+# a ghost is in the picture while so much of its most light is
+_THERE = 1e-3
+
+
+@dataclass(frozen=True)
+class Paths:
+    """Ghosts over the constellation, those with most light first.
+
+    Attributes
+    ----------
+    names : tuple of str
+    constellation_deg : ndarray, shape (T,)
+    place_px : ndarray, shape (G, T)
+        Middle of the light inside the picture, from the axis towards the light; NaN outside.
+    light : ndarray, shape (G, T)
+        Radiance times pixels inside the picture; NaN outside.
+    """
+
+    names: tuple[str, ...]
+    constellation_deg: Floats
+    place_px: Floats
+    light: Floats
+
+    def colours(self) -> dict[str, str]:
+        """Return a colour for each of the brightest ghosts, as many as can be told apart."""
+        return dict(zip(self.names, COLOURS, strict=False))
+
+
+def paths_of(model: GhostModel) -> Paths:
+    """Follow every ghost of a model, drawn small and alone, with the light on the right of the axis.
+
+    Parameters
+    ----------
+    model : GhostModel
+
+    Returns
+    -------
+    Paths
+    """
+    low, high = model.constellation_deg
+    steps = np.linspace(low, high, _STEPS)
+    size = _WIDTH, max(1, round(_WIDTH * model.size_px[1] / model.size_px[0]))
+    scale = model.size_px[0] / size[0]
+    names = [ghost.name for ghost in model.ghosts]
+    place = np.full((len(names), steps.size), np.nan)
+    light = np.full((len(names), steps.size), np.nan)
+    alone = bare(model)
+    for k, angle in enumerate(steps):
+        drawn = ghosts_alone(alone, float(angle), 0.0, size)
+        for row, name in enumerate(names):
+            if name in drawn:
+                columns = drawn[name].pixels.mean(axis=2, dtype=np.float64).sum(axis=0)
+                total = float(columns.sum())
+                middle = drawn[name].window[0] + float(columns @ (np.arange(columns.size) + 0.5)) / total
+                place[row, k], light[row, k] = middle * scale - model.axis_px[0], total * scale**2
+    most = np.nan_to_num(light).max(axis=1, initial=0.0)
+    gone = np.isfinite(light) & ~(light >= _THERE * most[:, None])
+    place[gone] = light[gone] = np.nan
+    order = np.argsort(-most, kind="stable")
+    return Paths(tuple(names[k] for k in order), steps, place[order], light[order])
+
+
+def ghosts_section(paths: Paths, model: GhostModel, colours: Mapping[str, str]) -> str:
+    """Return a report's section about ghosts, as HTML."""
+    angles = paths.constellation_deg
+    drawn = [(k, name) for k, name in enumerate(paths.names) if name in colours]
+    place = [Series(name, angles, paths.place_px[k], colours[name]) for k, name in drawn]
+    light = [Series(name, angles, paths.light[k], colours[name]) for k, name in drawn]
+    charts = [
+        chart("Where the ghosts' light is", place, x_label="constellation, degrees", y_label="pixels from the axis"),
+        chart("How much light they hold", light, x_label="constellation, degrees", y_label="radiance x pixels",
+              logarithmic=True),
+    ]  # fmt: skip
+    rows = [_row(name, angles, paths.place_px[k], paths.light[k]) for k, name in enumerate(paths.names)]
+    head = ("ghost", "in the picture, degrees", "from", "to, pixels from the axis", "most light")
+    words = "Light inside the picture only: a ghost that the border cuts is drawn by what is left of it."
+    if len(drawn) < len(paths.names):
+        words += f" The charts show the {len(drawn)} of {len(paths.names)} ghosts that hold most light."
+    return section("Ghosts", paragraph(words), figures(*charts), table(head, rows), remark_list(model.remarks))
+
+
+def _row(name: str, angles: Floats, place: Floats, light: Floats) -> tuple[str, ...]:
+    there = np.isfinite(light)
+    if not there.any():
+        return name, "never", "", "", ""
+    at = angles[there]
+    return (name, f"{at[0]:.1f} to {at[-1]:.1f}", _whole(place[there][0]), _whole(place[there][-1]),
+            number(float(np.nanmax(light))))  # fmt: skip
+
+
+def _whole(value: float) -> str:
+    # no -0
+    return f"{round(value):d}"
