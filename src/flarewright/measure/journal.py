@@ -87,9 +87,7 @@ class Journal:
 
 def _unwritten(name: str | Path, error: OSError) -> OutputError:
     reason = (error.strerror or str(error)).lower()
-    return OutputError(
-        f"cannot write {name}: {reason}; check the free space, and begin again: what is done is kept"
-    )
+    return OutputError(f"cannot write {name}: {reason}; check the free space, and begin again: what is done is kept")
 
 
 @contextmanager

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ..kernels.measure_pupil import FIRST_G, FIRST_I
 from ..model.ghost_model import Blades
 from .find import Candidate, candidates, slopes_of
-from .fit import Shape, brightens, cost_of, light_of, patches_of, presence
+from .fit import Shape, brightens, cost_of, light_of, patches_of, presence, render
 from .found import Found, darkened, rest_of
 from .grow import Growth, grow
 from .journal import Journal
@@ -37,6 +37,9 @@ LEFT_BEHIND = 0.08
 LEFT_AS_SPECKS, _BESIDE = 0.2, 3
 # a candidate no larger than this is looked at with what is this far around it, pixels
 SPECK, BESIDE_SPECK = 3.5, 3.0
+# part of what either covers that a fit shares with the circle it began at, where it is brighter than this part of its
+# brightest place; so many views tell
+COVERS, LIT, _LOOKED = 0.35, 0.1, 4
 # who was refused is tried again when twice as many ghosts are known, and so many more
 _SOON = 2
 # views that a first fit looks at
@@ -121,16 +124,18 @@ def pursue(
         votes = steps.step(partial(_candidates, shown, rest, masks, 12 + len(refused), iris, pool))
         trials = _open([each for each in votes if each.score > SCORE], refused, len(found))
         fallen(trials[0].score if trials else SCORE, len(found))
-        taken = 0
+        taken: list[Candidate] = []
         trials, waiting = [*waiting[:4], *trials], waiting[4:]
         for trial in trials[:4]:
             if taken and trial.score < 0.6 * trials[0].score:
                 break
+            if any(_stale(trial, other) for other in taken):
+                continue
             ghost = steps.step(partial(_try, trial, shown, rest, pool))
             if ghost is None:
                 refused = [*((one, then) for one, then in refused if not _same(one, trial)), (trial, len(found))]
                 continue
-            taken += 1
+            taken.append(trial)
             found.append(ghost)
             rest = _take_off(ghost, shown, rest)
             numbers = ghost.shapes[1].numbers
@@ -209,6 +214,12 @@ def _same(a: Candidate, b: Candidate) -> bool:
     return abs(a.speed - b.speed) < near and abs(a.radius - b.radius) < 0.6 * near and overlap >= 0
 
 
+def _stale(trial: Candidate, taken: Candidate) -> bool:
+    """Tell whether a candidate had its votes from the borders of one that was taken off since."""
+    larger = max(trial.radius, taken.radius)
+    return abs(trial.speed - taken.speed) < 0.5 * larger and abs(trial.radius - taken.radius) < 0.5 * larger
+
+
 def _alone(views: Sequence[View], rest: Sequence[Pixels], keep: Sequence[int]) -> list[View]:
     """Return some views with one channel's rest as their green."""
     return [views[k].showing(np.broadcast_to(rest[k][..., None], views[k].pixels.shape)) for k in keep]
@@ -229,6 +240,7 @@ def _try(
             starts.append(replace(trial, radius=RADII[0]))
     fits = [grow(beginning(one, shown, [rest[k] for k in few]), shown, 1, most=_FIRST, pool=pool) for one in starts]
     kept = [fit for fit in fits if fit is not None and brightens(fit.shape, shown) and _stays(trial, fit.shape, shown)]
+    kept = [fit for fit in kept if trial.radius <= SPECK or _covers(trial, fit.shape, shown)]
     if not kept:
         return None
     shape = min(kept, key=lambda fit: fit.cost).shape
@@ -248,6 +260,18 @@ def _stays(trial: Candidate, shape: Shape, views: Sequence[View]) -> bool:
     """Tell whether a fit of a speck is no larger than what it looked at; larger ghosts may grow."""
     sizes = [abs(shape.numbers[FIRST_G] + shape.numbers[FIRST_G + 3] * view.sigma**2) for view in views]
     return trial.radius > SPECK or max(sizes) <= trial.radius + BESIDE_SPECK
+
+
+def _covers(trial: Candidate, shape: Shape, views: Sequence[View]) -> bool:
+    """Tell whether a fit is about where its candidate was seen, and as large: elsewhere nobody voted for it."""
+    shared = covered = 0
+    for view in views[:: max(1, len(views) // _LOOKED)]:
+        disc = distances(view, view.sigma * (trial.speed + trial.bend * view.sigma**2)) <= trial.radius
+        light = render(shape, view)
+        lit = light > LIT * float(light.max(initial=0.0))
+        shared += int(np.count_nonzero(disc & lit))
+        covered += int(np.count_nonzero(disc | lit))
+    return shared > COVERS * covered
 
 
 def _near(speck: Candidate, view: View) -> View:
