@@ -47,7 +47,7 @@ _FEW = 16
 # two views tell place and size, and nothing of whether it goes along with the light
 _LEAST_VIEWS = 3
 # how far a candidate grows: most of what lies beside it is not known yet, so its misfit tells nothing of it
-_FIRST = Growth(order=1, discs=1, error=0.05, soft=False)
+_FIRST = Growth(order=1, discs=1, error=0.05, soft=False, alike=False)
 
 
 def beginning(candidate: Candidate, views: Sequence[View], pixels: Sequence[Pixels]) -> Shape:

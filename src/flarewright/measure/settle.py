@@ -209,7 +209,7 @@ def _touched(
     if not patches:
         return None
     free = free_numbers(1, shape.discs, 1)
-    return improve(shape, patches, free, width=views[0].size_px[0], steps=steps, pool=pool)[0]
+    return improve(shape, patches, free, width=views[0].size_px[0], steps=steps, alike=False, pool=pool)[0]
 
 
 def _like(green: Shape, own: Shape, alone: Sequence[View], channel: int) -> Shape:
