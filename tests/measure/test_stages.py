@@ -163,3 +163,22 @@ def test_fitting_needs_finding_first(tmp_path, capsys):
     assert "measure find" in capsys.readouterr().err
     assert command(["measure", "find", str(tmp_path), "--every", "9"]) == 2
     assert "too few" in capsys.readouterr().err
+
+
+def test_more_than_every_constellation_left_out_is_told(folder, capsys):
+    assert command(["measure", "find", str(folder), "--every", "50"]) == 2
+    told = capsys.readouterr().err
+    assert "--every 50 leaves 1 of 12 constellations" in told
+    assert "at most --every 5" in told
+    assert len(read_views(folder, read_run(folder), 5)) == 3
+
+
+def test_a_frame_of_another_size_is_named(tmp_path, capsys):
+    write(tmp_path, ())
+    info = read_run(tmp_path).frames[3]
+    small = np.zeros((20, 30, 3), np.float32)
+    write_frame(tmp_path, MergedFrame(info, small, small + 1.0))
+    assert command(["measure", "find", str(tmp_path)]) == 2
+    told = capsys.readouterr().err
+    assert info.file in told
+    assert "30x20" in told

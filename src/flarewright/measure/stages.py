@@ -72,6 +72,11 @@ def read_views(folder: Path, run: MergedRun, every: int = 1) -> tuple[View, ...]
     for each in sorted(run.frames, key=lambda one: (one.nominal_deg, one.constellation_deg)):
         rolls.setdefault(each.nominal_roll_deg, []).append(each)
     frames = [each for turned in rolls.values() for each in turned[::every]]
+    if len(frames) < 3 <= len(run.frames):
+        raise FlarewrightError(
+            f"{folder}: --every {every} leaves {len(frames)} of {len(run.frames)} constellations, too few to follow a "
+            f"ghost; use at most --every {max(1, (len(run.frames) - 1) // 2)}"
+        )
     frames.sort(key=lambda each: (each.constellation_deg, each.roll_deg))
     return views_of([read_frame(folder, info) for info in frames], largest)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -83,10 +84,16 @@ def views_of(frames: Sequence[MergedFrame], largest_deg: float | None = None) ->
         When there are fewer than three frames, sizes differ, or all are at one constellation.
     """
     if len(frames) < 3:
-        raise FlarewrightError(f"{len(frames)} constellations are too few to follow a ghost; photograph at least 3")
-    shapes = {frame.radiance.shape for frame in frames}
-    if len(shapes) > 1:
-        raise FlarewrightError(f"the merged frames have {len(shapes)} different sizes; capture all at one size")
+        few = "1 constellation is" if len(frames) == 1 else f"{len(frames)} constellations are"
+        raise FlarewrightError(f"{few} too few to follow a ghost; photograph at least 3")
+    shapes = Counter(frame.radiance.shape for frame in frames)
+    (height, width, _), _ = shapes.most_common(1)[0]
+    odd = next((frame for frame in frames if frame.radiance.shape[:2] != (height, width)), None)
+    if odd is not None:
+        raise FlarewrightError(
+            f"{odd.info.file} has {odd.radiance.shape[1]}x{odd.radiance.shape[0]} pixels, most frames have "
+            f"{width}x{height}; remove it and merge again"
+        )
     largest = largest_deg or max(abs(each.constellation_deg) for each in frames)
     if not largest > 0.0:
         raise FlarewrightError("all frames have the light on the axis; turn the camera between the captures")
