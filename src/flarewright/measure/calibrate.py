@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from ..errors import FlarewrightError
 from ..io.photo import Photo, open_photo
 from ..model.capture import CameraNoise, Capture, Matrix3
-from .merge import Exposure, refuse_contradiction
+from .contradiction import refuse_contradiction
+from .merge import Exposure
 from .noise import LEVEL_SIDE, Band, Noise, Transfer, common_black, fit_transfer, noise_of, smooth, transfers
 
 # so many constellations and bands of rows are looked at

@@ -14,6 +14,8 @@ from math import hypot, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import FlarewrightError
+
 Floats = NDArray[np.float64]
 Band = NDArray[np.float32]
 
@@ -57,7 +59,7 @@ class Sighting:
     clipped_share : float
         Part of the pixels that every exposure clipped.
     other_px : tuple of float or None
-        The brightest spot far from it, a light or a ghost: which shows in the run (`geometry.refuse_second_light`).
+        The brightest spot far from it, a light or a ghost: which shows in the run (`second_light`).
     """
 
     position_px: tuple[float, float]
@@ -107,6 +109,15 @@ def find_light(radiance: Band, variance: Band) -> Sighting:
     flux = float(light[row : row + 15, column : column + 15].sum())
     rival = rivals[0] if rivals else None
     return Sighting((x, y), error, flux, contrast, at_border, rival, float(clipped.mean()), other)
+
+
+def two_lights(sighting: Sighting, other: tuple[float, float] | None, where: str) -> FlarewrightError:
+    """Return what to say of two lights: `where` both are."""
+    (x, y), (other_x, other_y) = sighting.position_px, other or (0.0, 0.0)
+    return FlarewrightError(
+        f"two lights were found, at ({x:.0f}, {y:.0f}) and ({other_x:.0f}, {other_y:.0f}) of {where}: cover one of "
+        "them, or give light_x_px and light_y_px in captures.csv"
+    )
 
 
 @dataclass(frozen=True)

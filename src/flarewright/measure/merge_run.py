@@ -25,10 +25,12 @@ from ..io.merged import read_frame, read_run, write_frame, write_run
 from ..io.photo import open_photo
 from ..model.capture import CameraNoise, Capture, FrameInfo, Matrix3, MergedFrame, MergedRun
 from .calibrate import Calibration, calibrate
+from .contradiction import refuse_contradiction
 from .drift import without_drift
-from .geometry import Geometry, Seen, believable, refuse_second_light, solve_geometry
+from .geometry import Geometry, Seen, believable, solve_geometry
 from .light import Sighting, find_light
-from .merge import exposure_ratios, merge, refuse_contradiction, refuse_damage, without_idle_digits
+from .merge import exposure_ratios, merge, refuse_damage, without_idle_digits
+from .second_light import refuse_second_light
 from .symmetry import axis_beside_path, reduced
 from .upright import UPRIGHT, make_upright
 
