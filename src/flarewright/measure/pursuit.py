@@ -240,7 +240,6 @@ def _try(
             starts.append(replace(trial, radius=RADII[0]))
     fits = [grow(beginning(one, shown, [rest[k] for k in few]), shown, 1, most=_FIRST, pool=pool) for one in starts]
     kept = [fit for fit in fits if fit is not None and brightens(fit.shape, shown) and _stays(trial, fit.shape, shown)]
-    kept = [fit for fit in kept if trial.radius <= SPECK or _covers(trial, fit.shape, shown)]
     if not kept:
         return None
     shape = min(kept, key=lambda fit: fit.cost).shape
@@ -257,13 +256,11 @@ def _try(
 
 
 def _stays(trial: Candidate, shape: Shape, views: Sequence[View]) -> bool:
-    """Tell whether a fit of a speck is no larger than what it looked at; larger ghosts may grow."""
-    sizes = [abs(shape.numbers[FIRST_G] + shape.numbers[FIRST_G + 3] * view.sigma**2) for view in views]
-    return trial.radius > SPECK or max(sizes) <= trial.radius + BESIDE_SPECK
-
-
-def _covers(trial: Candidate, shape: Shape, views: Sequence[View]) -> bool:
     """Tell whether a fit is about where its candidate was seen, and as large: elsewhere nobody voted for it."""
+    if trial.radius <= SPECK:
+        # a speck is no larger than what was looked at
+        sizes = [abs(shape.numbers[FIRST_G] + shape.numbers[FIRST_G + 3] * view.sigma**2) for view in views]
+        return bool(max(sizes) <= trial.radius + BESIDE_SPECK)
     shared = covered = 0
     for view in views[:: max(1, len(views) // _LOOKED)]:
         disc = distances(view, view.sigma * (trial.speed + trial.bend * view.sigma**2)) <= trial.radius
