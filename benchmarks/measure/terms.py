@@ -20,7 +20,7 @@ from benchmarks.measure.truth import project_of, rays_of
 from numpy.typing import NDArray
 from synthetic_camera import Setup, poses
 
-from flarewright.measure.numbers import field
+from flarewright.measure.numbers import field, ten_terms
 from flarewright.optics.paths import ghost_paths
 from flarewright.render.prepare import settle
 from flarewright.render.shot import make_opening, make_shots
@@ -77,7 +77,7 @@ def _solved(seen: list[_Seen]) -> Floats | None:
     p = np.concatenate([each.pupil[:, at] for each in whole])
     s = np.concatenate([np.full(len(each.pupil), each.s) for each in whole])
     u, v, w = (p**2).sum(axis=1), p[:, 1] * s, s * s
-    ten = np.stack([np.ones_like(u), u, v, w, u * u, u * v, v * v, u * w, v * w, w * w], axis=1)
+    ten = ten_terms(u, v, w).T
     along = np.concatenate([s[:, None] * ten, p[:, 1:] * ten], axis=1)
     across = np.concatenate([np.zeros_like(ten), p[:, :1] * ten], axis=1)
     places = np.concatenate([each.places for each in whole])

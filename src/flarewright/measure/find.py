@@ -55,6 +55,10 @@ class Candidate:
     blades: Blades | None = None
     bend: float = 0.0
 
+    def place(self, sigma: float) -> float:
+        """Return where its centre is at a field, from the axis towards the light, pixels."""
+        return sigma * (self.speed + self.bend * sigma**2)
+
 
 @dataclass(frozen=True)
 class Slopes:

@@ -82,6 +82,11 @@ def bezier_numbers(ghost: BezierGhost, constellation_deg: float) -> Floats:
     return np.array(numbers)
 
 
+def ten_terms(u: Floats, v: Floats, w: Floats) -> Floats:
+    """Return the terms of a ghost's polynomials, shape (10, N), in the order of its numbers; see `measure_pupil`."""
+    return np.stack([np.ones_like(u), u, v, w, u * u, u * v, v * v, u * w, v * w, w * w])
+
+
 def field(constellation_deg: float, largest_deg: float) -> float:
     """Return the length of the field s, with the constellation's sign."""
     return float(np.tan(np.radians(constellation_deg)) / np.tan(np.radians(largest_deg)))

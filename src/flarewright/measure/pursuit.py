@@ -263,7 +263,7 @@ def _stays(trial: Candidate, shape: Shape, views: Sequence[View]) -> bool:
         return bool(max(sizes) <= trial.radius + BESIDE_SPECK)
     shared = covered = 0
     for view in views[:: max(1, len(views) // _LOOKED)]:
-        disc = distances(view, view.sigma * (trial.speed + trial.bend * view.sigma**2)) <= trial.radius
+        disc = distances(view, trial.place(view.sigma)) <= trial.radius
         light = render(shape, view)
         lit = light > LIT * float(light.max(initial=0.0))
         shared += int(np.count_nonzero(disc & lit))
@@ -273,8 +273,7 @@ def _stays(trial: Candidate, shape: Shape, views: Sequence[View]) -> bool:
 
 def _near(speck: Candidate, view: View) -> View:
     """Return a view of what is next to a speck: all that lies farther off is more than it, and fits run off to that."""
-    place = view.sigma * (speck.speed + speck.bend * view.sigma**2)
-    far = distances(view, place) > speck.radius + BESIDE_SPECK
+    far = distances(view, speck.place(view.sigma)) > speck.radius + BESIDE_SPECK
     return replace(view, variance=np.where(far[..., None], np.inf, view.variance).astype(np.float32))
 
 

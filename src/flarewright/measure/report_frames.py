@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import log10
 from pathlib import Path
@@ -18,15 +18,13 @@ from ..render.figure import Figure, Mark, Picture, Text
 from ..render.page import figures, image, paragraph, section
 from .overview import frame_of
 from .replay import replay
+from .stages import AROUND_LIGHT
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 # about as wide pictures of frames are, alone and three to a row, and decades of light from black to white
 _WIDE, _WIDTH, _DECADES = 480, 310, 4.0
-# where replay and frame are compared: farther than this part of the width from the light, as Walch 2017 leaves out the
-# star
-_AROUND_LIGHT = 40.0 / 720.0
 # a ghost's rim is where this part of its usual light is; what counts for that is brighter than so much of its brightest
 _RIM, _LIT = 0.25, 0.02
 # rims of fewer pixels are not seen; so wide a ring is
@@ -101,6 +99,16 @@ def place_of(info: FrameInfo, model: GhostModel) -> tuple[float, float] | None:
     return (-info.constellation_deg, info.roll_deg + 180.0) if low <= -info.constellation_deg <= high else None
 
 
+def _placed(
+    folder: Path, run: MergedRun, chosen: Sequence[FrameInfo], model: GhostModel
+) -> Iterator[tuple[MergedFrame, tuple[float, float]]]:
+    """Read the frames that a model knows, one at a time, each with its place."""
+    for info in chosen:
+        place = place_of(info, model)
+        if place is not None:
+            yield frame_of(folder, run, info), place
+
+
 def bare(model: GhostModel) -> GhostModel:
     """Return a model's ghosts without all that is beside them."""
     return cast(GhostModel, model.replace(sprites=(), halo=None, star=None))
@@ -133,11 +141,7 @@ def outlines_section(
         Of ghosts by name, as in the charts; the others are grey.
     """
     ghosts = bare(model)
-    drawn = []
-    for info in chosen:
-        place = place_of(info, model)
-        if place is not None:
-            drawn.append(_outlined(frame_of(folder, run, info), ghosts, place, colours))
+    drawn = [_outlined(frame, ghosts, place, colours) for frame, place in _placed(folder, run, chosen, model)]
     words = f"Rims are where a quarter of a ghost's usual light is. {_TONE_WORDS}"
     if len(colours) < len(model.ghosts):
         words += f" In colour are the {len(colours)} ghosts that the charts show."
@@ -234,14 +238,10 @@ def _free_place(
 def replays_section(folder: Path, run: MergedRun, chosen: Sequence[FrameInfo], model: GhostModel) -> str:
     """Return a report's section with frames, their replays and the differences, as HTML."""
     ghosts = bare(model)
-    rows = []
-    for info in chosen:
-        place = place_of(info, model)
-        if place is not None:
-            rows.append(_compared(frame_of(folder, run, info), model, ghosts, place))
+    rows = [_compared(frame, model, ghosts, place) for frame, place in _placed(folder, run, chosen, model)]
     words = (
         f"{_TONE_WORDS} Decibels: squares of the measured light over squares of the difference, farther than "
-        f"{_AROUND_LIGHT * run.size_px[0]:.3g} pixels (1/18 of the width) from the light. Noise is part of the "
+        f"{AROUND_LIGHT * run.size_px[0]:.3g} pixels (1/18 of the width) from the light. Noise is part of the "
         "difference. Differences are linear: middle grey is none, and nothing is told where every exposure was clipped."
     )
     return section("Replay", paragraph(words), *(f"<div>{row}</div>" for row in rows))
@@ -253,7 +253,8 @@ def _compared(frame: MergedFrame, model: GhostModel, ghosts: GhostModel, place: 
     drawn = layers[0].pixels.astype(np.float64) + np.array(model.background)
     x, y = np.arange(width) + 0.5 - frame.light_px[0], (np.arange(height) + 0.5 - frame.light_px[1])[:, None]
     off = frame.radiance - drawn
-    counted = frame.valid & (np.hypot(x, y) > _AROUND_LIGHT * width)[..., None]
+    # as Walch 2017 leaves out the star
+    counted = frame.valid & (np.hypot(x, y) > AROUND_LIGHT * width)[..., None]
     squares = float(np.square(frame.radiance[counted], dtype=np.float64).sum())
     off_db = 10.0 * log10(max(squares, 1e-300) / max(float(np.square(off[counted]).sum()), 1e-300))
     shown = _Shown.of(frame, _WIDTH)

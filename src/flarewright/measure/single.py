@@ -17,7 +17,7 @@ from ..kernels.measure_hough import search
 from ..model.ghost_model import AberrationGhost, GhostModel
 from .curves import pose_at
 from .find import LEVEL, Slopes, candidates, rim_outline, slopes_of
-from .numbers import Floats, bezier_numbers, field, frame, visible
+from .numbers import Floats, bezier_numbers, field, frame, ten_terms, visible
 from .views import Pixels, View, distances
 
 # of the best possible vote, what a circle needs to be proposed, and how far above chance
@@ -208,7 +208,7 @@ def _disc(ghost: AberrationGhost, model: GhostModel, constellation_deg: float) -
     rings, turns = np.sqrt((np.arange(8) + 0.5) / 8.0), 2.0 * np.pi * np.arange(24) / 24.0
     px, py = (np.outer(rings, part(turns)).ravel() for part in (np.cos, np.sin))
     u, v, w = px * px + py * py, px * s, np.full(px.size, s * s)
-    terms = np.stack([np.ones_like(u), u, v, w, u * u, u * v, v * v, u * w, v * w, w * w])
+    terms = ten_terms(u, v, w)
     # green tells the shape, every colour its light
     f, g = (np.array(numbers) @ terms for numbers in (ghost.green.f, ghost.green.g))
     radius = float(((px * (s * f + px * g) + py * py * g).sum()) / u.sum())

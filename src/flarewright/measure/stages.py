@@ -251,13 +251,14 @@ def fit_ghosts(
         When frames cannot be read, or a ghost is none that is fitted here.
     """
     views = read_views(folder, run, every)
-    if not all(isinstance(ghost, AberrationGhost) for ghost in (*rough.ghosts, *rough.removed)):
+    given = (*rough.ghosts, *rough.removed)
+    # without those that were removed the search for more would find them again, and the others would share their light
+    found = [
+        replace(_found(ghost, views), unwanted=k >= len(rough.ghosts))
+        for k, ghost in enumerate(given) if isinstance(ghost, AberrationGhost)
+    ]  # fmt: skip
+    if len(found) < len(given):
         raise FlarewrightError("a Bezier ghost cannot be fitted over all constellations; take it out of the model")
-    found = [_found(ghost, views) for ghost in rough.ghosts if isinstance(ghost, AberrationGhost)]
-    # else the search for more would find them again, and the others would share their light
-    found += [
-        replace(_found(ghost, views), unwanted=True) for ghost in rough.removed if isinstance(ghost, AberrationGhost)
-    ]
     settling = how or Settling(rounds=1)
     dim = _dimmed_beside(found, views, _star_of(views))
     iris = iris_of(dim.star)
