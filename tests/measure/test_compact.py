@@ -13,6 +13,7 @@ from flarewright.measure.compact import compact, curves_of, held_error, numbers_
 from flarewright.measure.curves import Pose, posed, spline_basis, value_at
 from flarewright.measure.fit import Shape, free_numbers, misfit, patches_of, refine, render
 from flarewright.measure.found import Found
+from flarewright.measure.glow import offsets
 from flarewright.measure.numbers import NUMBERS, channel_of
 from flarewright.measure.orders import needed_numbers, parabola
 from flarewright.measure.replay import replay
@@ -125,6 +126,25 @@ def test_a_small_model_replays_what_curves_it_needs_and_drops_what_nobody_sees(t
         )
         assert missed < 0.06 * np.sqrt((view.pixels**2).mean())
         assert missed < 0.5 * without
+
+
+@pytest.mark.parametrize("wide", [60.0, 100.0, 300.0])
+def test_a_ghost_over_the_whole_picture_stays_as_bright_as_it_was_seen(wide):
+    # beside an even background, which every view may have, hardly anything tells how bright it is
+    rng = np.random.default_rng(1)
+    seen, true = [], []
+    for view in views((), angles=ANGLES[2::3]):
+        x, y = offsets((view.frame[0] + 20.0 * view.sigma, view.frame[1]), SIZE, 1.0)
+        light = 0.2 / (1.0 + (x**2 + y**2) / wide**2)
+        seen.append(view.showing((light[..., None] + rng.normal(0.0, 0.01, view.pixels.shape)).astype(np.float32)))
+        true.append(light)
+    start = shape(20.0, 200.0, 0.15)
+    fit = refine(start, patches_of(start, seen, 1), free_numbers(2, 0, 2), width=SIZE[0], offset=False)
+    every = thrice((fit.shape,))
+    told = compact(model_of((fit.shape,), "a"), follow("a", every, seen), seen)
+    for view, light in zip(seen, true, strict=True):
+        mine = replay(told, view.constellation_deg)[0].pixels[..., 1]
+        assert np.median(mine / light) == pytest.approx(1.0, abs=0.05)
 
 
 def test_numbers_are_written_as_exactly_as_they_are_known():

@@ -28,8 +28,8 @@ Tell = Callable[[float, str], None]
 
 # views that one ghost's numbers are judged by, at most
 _VIEWS = 48
-# fewer numbers may cost so much of what the views hold
-_WORSE = 0.002
+# fewer numbers may cost so much of what the views hold, and so much with an even background held at none
+_WORSE, _UNEVEN = 0.002, 0.05
 # numbers are written to this part of the standard deviation that they have with all others held
 _DIGITS = 0.05
 
@@ -155,15 +155,19 @@ def _smaller(
     best: list[Fit | None] = [None, None, None]
     shapes = list(ghost.shapes)
     for m in range(CHANNELS):
-        before = cost_of(ghost.shapes[m], patches[m])
+        before, level = (cost_of(ghost.shapes[m], patches[m], offset=offset) for offset in (True, False))
         for numbers in (fewer, free):
             start = ghost.shapes[m].numbers.copy()
             start[np.setdiff1d(free, numbers)] = 0.0
             fit = refine(replace(ghost.shapes[m], numbers=start), patches[m], numbers, width=width, steps=10, pool=pool)
-            best[m], shapes[m] = fit, fit.shape
             # the parabola may have been too far off: then all numbers stay
-            if cost_of(fit.shape, patches[m]) <= before + _WORSE * before + 2.0 * numbers.size:
+            even = cost_of(fit.shape, patches[m], offset=False) <= (1.0 + _UNEVEN) * level
+            if even and cost_of(fit.shape, patches[m]) <= before + _WORSE * before + 2.0 * numbers.size:
                 break
+        if not even:
+            # of a ghost that fills every picture only an even background tells how bright it is
+            fit = refine(ghost.shapes[m], patches[m], free, width=width, steps=10, offset=False, pool=pool)
+        best[m], shapes[m] = fit, fit.shape
     return replace(ghost, shapes=(shapes[0], shapes[1], shapes[2]), fits=(best[0], best[1], best[2]))
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..kernels.measure_pupil import BLADES, DISC_NUMBERS, FIRST_DISC, FIRST_G, FIRST_I, LATERAL, SOFT, TURN
-from ..model.ghost_model import AberrationGhost, BezierGhost, Blades, Channel, Disc, Ten
+from ..model.ghost_model import AberrationGhost, BezierGhost, Blades, Channel, Disc, GhostModel, Ten
 
 Floats = NDArray[np.float64]
 
@@ -99,6 +99,20 @@ def frame(axis_px: tuple[float, float], roll_deg: float, constellation_deg: floa
     """
     turn = np.radians(roll_deg + (180.0 if constellation_deg < 0.0 else 0.0))
     return np.array([axis_px[0] * scale, axis_px[1] * scale, np.cos(turn), np.sin(turn), scale])
+
+
+def fit_in(model: GhostModel, size_px: tuple[int, int]) -> tuple[float, float]:
+    """Return a picture's pixels per pixel of a model, and by how many rows it is shifted to keep its middle."""
+    scale = size_px[0] / model.size_px[0]
+    return scale, 0.5 * (size_px[1] - scale * model.size_px[1])
+
+
+def frame_in(model: GhostModel, constellation_deg: float, roll_deg: float, size_px: tuple[int, int]) -> Floats:
+    """Return `frame` of a model's flare in a picture of another size."""
+    scale, top = fit_in(model, size_px)
+    placed = frame(model.axis_px, roll_deg, constellation_deg, scale)
+    placed[1] += top
+    return placed
 
 
 def visible(ghosts: Sequence[AberrationGhost | BezierGhost], constellation_deg: float) -> Floats:

@@ -16,25 +16,18 @@ from ..kernels.measure_edges import sum_into
 from ..kernels.measure_mesh import draw_ghosts
 from ..model.ghost_model import AberrationGhost, BezierGhost, GhostModel
 from ..model.layer import Layer
-from ..model.sprite import Sprite
 from ..render.compose import beauty
-from .carried import carried
-from .detail import detail_at
 from .glow import halo_at, offsets, star_at
 from .held import held
-from .numbers import bezier_numbers, field, frame, visible
+from .numbers import bezier_numbers, field, fit_in, frame_in, visible
 from .packed import Packed, pack, posed_numbers
-from .specks_drawn import draw_specks
-from .sprites import Pixels, draw_sprites, interval, roll_at, sprite_at
+from .rest_drawn import draw_rest
+from .sprites import interval
 
 Floats = NDArray[np.float64]
 
 # farther beyond the measured range than this, degrees, nothing is replayed
 BEYOND_DEG = 1.0
-# where the light is within this part of the picture's width of the axis, not all that is left turns with it
-_NEAR_AXIS = 0.04
-# most cells of detail to a pixel
-_CELLS = 1.5
 # of all of a ghost's light, in one pixel: less is none
 _ROUNDING = 1e-12
 _NOTHING = np.empty((0, 0, 3, 19))
@@ -139,7 +132,7 @@ def _held(
         return parts
     before, after = (_photographed(model, angle, roll_deg, size) for angle in angles[k : k + 2])
     whole = _sum(parts)
-    placed = _frame(model, constellation_deg, roll_deg, size)
+    placed = frame_in(model, constellation_deg, roll_deg, size)
     parts["residual"] = parts["residual"] + held(whole, before, after, sprite, k, placed) - whole
     return parts
 
@@ -164,7 +157,7 @@ def _parts(
 ) -> dict[str, Floats]:
     """Draw ghosts, star, halo and sprites as far as a model has them, by their layers' names."""
     parts: dict[str, Floats] = {"ghosts": draw_packed(packed, model, constellation_deg, roll_deg, size)}
-    scale, top = _fit(model, size)
+    scale, top = fit_in(model, size)
     at = light_px(model, constellation_deg, roll_deg)
     place = at[0] * scale, at[1] * scale + top
     x, y = offsets(place, size, scale)
@@ -173,45 +166,8 @@ def _parts(
     if model.halo is not None:
         parts["halo"] = np.asarray(halo_at(model.halo, constellation_deg, x, y))
     if model.sprites:
-        specks = [one for one in model.sprites if one.follows == "speck"]
-        standing = [one for one in model.sprites if one.follows != "speck"]
-        placed = _frame(model, constellation_deg, roll_deg, size)
-        pictures = [
-            carried(one, packed, model, constellation_deg)
-            if one.follows == "ghosts"
-            else sprite_at(one, constellation_deg)
-            for one in standing
-        ]
-        # what is narrower than a pixel is not seen, and would shimmer
-        fine = [one for one in standing if one.detail and one.detail.parts <= _CELLS * scale * one.grain_px]
-        pictures += [detail_at(one, one.detail, constellation_deg) for one in fine if one.detail]
-        alike: dict[tuple[float, float], list[tuple[Sprite, Pixels]]] = {}
-        for pair in zip([*standing, *fine], pictures, strict=True):
-            for how in _rolls(pair[0], model, constellation_deg, roll_deg):
-                alike.setdefault(how, []).append(pair)
-        rest = np.zeros((size[1], size[0], 3))
-        for (share, roll), pairs in alike.items():
-            ax, ay, cosine, sine, _ = map(float, _frame(model, constellation_deg, roll, size))
-            sprites, cells = zip(*pairs, strict=True)
-            rest += share * draw_sprites(sprites, cells, place, (ax, ay), (cosine, sine), size, scale)
-        parts["residual"] = rest + draw_specks(specks, packed, model, constellation_deg, placed, size)
+        parts["residual"] = draw_rest(packed, model, constellation_deg, roll_deg, place, size, _sum(parts))
     return parts
-
-
-def _rolls(
-    sprite: Sprite, model: GhostModel, constellation_deg: float, roll_deg: float
-) -> tuple[tuple[float, float], ...]:
-    """Return in which directions a sprite is drawn, and the share of each.
-
-    Next to the axis a flare hardly knows from where the light comes: what is left there, of polygons above all, lies as
-    it was photographed, and turns with the light from there on.
-    """
-    photographed = roll_at(sprite, constellation_deg)
-    off = abs(np.tan(np.radians(constellation_deg))) * model.focal_px / (_NEAR_AXIS * model.size_px[0])
-    if photographed is None or photographed == roll_deg or off >= 1.0:
-        return ((1.0, roll_deg),)
-    turned = float(off * off * (3.0 - 2.0 * off))
-    return (turned, roll_deg), (1.0 - turned, photographed)
 
 
 def _in_rec709(layer: Layer, model: GhostModel) -> Layer:
@@ -221,19 +177,6 @@ def _in_rec709(layer: Layer, model: GhostModel) -> Layer:
         )
     pixels = layer.pixels @ np.array(model.to_rec709, dtype=np.float32).T
     return replace(layer, pixels=np.asarray(pixels, dtype=np.float32))
-
-
-def _fit(model: GhostModel, size: tuple[int, int]) -> tuple[float, float]:
-    """Return pixels per pixel of the model, and by how many rows the picture is shifted to keep its middle."""
-    scale = size[0] / model.size_px[0]
-    return scale, 0.5 * (size[1] - scale * model.size_px[1])
-
-
-def _frame(model: GhostModel, constellation_deg: float, roll_deg: float, size: tuple[int, int]) -> Floats:
-    scale, top = _fit(model, size)
-    placed = frame(model.axis_px, roll_deg, constellation_deg, scale)
-    placed[1] += top
-    return placed
 
 
 def draw(model: GhostModel, constellation_deg: float, roll_deg: float, size_px: tuple[int, int]) -> Floats:
@@ -266,7 +209,7 @@ def draw_packed(
     meshes, numbers, counts, curves = packed
     width, height = size_px
     pixels = np.zeros((height, width, 3))
-    placed = _frame(model, constellation_deg, roll_deg, size_px)
+    placed = frame_in(model, constellation_deg, roll_deg, size_px)
     sigma = abs(field(constellation_deg, model.largest_deg))
     if meshes:
         there = _there(model, meshes, constellation_deg)

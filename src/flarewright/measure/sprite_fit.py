@@ -14,13 +14,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..model.sprite import Sprite, packed
-from .numbers import Floats
-from .sprites import between, draw_sprites, samples, sprite_at
+from .numbers import Floats, frame
+from .sprites import between, draw_sprites, samples, sprite_at, turned_ways, ways
 from .views import Pixels, View
 
 # cells of the coarsest pictures that go with the light, across a picture, and how many there are to each side of it:
 # far from the light they would learn ghosts' borders, which do not go with it
 _COARSE, _AROUND = 44, 24
+# how far a star's core reaches, part of the picture's width
+_CORE = 0.07
 # of what follows ghosts: pixels a cell; cells across a large picture, whose cells are larger, and across a small one
 _CELL_PX, _MOST_CELLS, _LEAST_CELLS = 3.0, 240, 90
 # cells that reading between cells looks beyond the last one that was seen; they are as that one
@@ -40,7 +42,7 @@ DIGIT = 0.3
 _CHUNK = 20000
 
 
-def light_sprites(views: Sequence[View], pixels: Sequence[Pixels]) -> tuple[Sprite, ...]:
+def light_sprites(views: Sequence[View], pixels: Sequence[Pixels], starry: bool) -> tuple[Sprite, ...]:
     """Learn what goes with the light.
 
     Parameters
@@ -49,6 +51,9 @@ def light_sprites(views: Sequence[View], pixels: Sequence[Pixels]) -> tuple[Spri
         By rising constellation.
     pixels : sequence of ndarray, shape (H, W, 3)
         What they show beside everything known; not a number where nothing was measured.
+    starry : bool
+        There is a star: it stands still when the light rolls, and so do the pictures that reach no farther than its
+        core. All others turn with the light, as ghosts do.
 
     Returns
     -------
@@ -60,10 +65,12 @@ def light_sprites(views: Sequence[View], pixels: Sequence[Pixels]) -> tuple[Spri
     left = list(pixels)
     found: list[Sprite] = []
     angles = even_knots(views, min(_MOST_LIGHT, len(views) // VIEWS))
+    usual = float(np.median(np.unwrap([view.roll_deg for view in views], period=360.0)))
     for level in range(finest, -1, -1):
         grain = 2.0**level
         side = _AROUND * grain
-        sprite = _fitted(views, left, grain, side, angles)
+        turns = not starry or (level > 0 and side > _CORE * width)
+        sprite = _fitted(views, left, grain, side, angles, usual if turns else None)
         found.append(sprite)
         left = [each - drawn((sprite,), view) for each, view in zip(left, views, strict=True)]
     return tuple(found)
@@ -163,10 +170,22 @@ def _placed(view: View, along: Floats, down: Floats) -> tuple[Floats, Floats]:
 
 def drawn(sprites: Sequence[Sprite], view: View) -> Pixels:
     """Draw sprites as a view shows them, shape (H, W, 3)."""
-    ax, ay, cosine, sine, _ = view.frame
+    ax, ay, _, _, _ = view.frame
     axis = float(ax), float(ay)
-    pictures = [sprite_at(one, view.constellation_deg) for one in sprites]
-    return draw_sprites(sprites, pictures, view.light_px, axis, (cosine, sine), view.size_px)
+    out = np.zeros_like(view.pixels)
+    for one in sprites:
+        picture = [sprite_at(one, view.constellation_deg)]
+        for way in ways(one, view.constellation_deg, view.roll_deg, _off_axis(view)):
+            _, _, cosine, sine, _ = frame(axis, way.roll_deg, view.constellation_deg, 1.0)
+            toward = float(cosine), float(sine)
+            light = draw_sprites([one], picture, view.light_px, axis, toward, view.size_px, turned_deg=way.turned_deg)
+            out += np.float32(way.share) * light
+    return out
+
+
+def _off_axis(view: View) -> float:
+    """Return how far a view's light is from the axis, part of the picture's width."""
+    return float(np.hypot(*np.subtract(view.light_px, view.frame[:2]))) / view.size_px[0]
 
 
 def darkest_noise(views: Sequence[View]) -> float:
@@ -195,15 +214,24 @@ def _middles(left: float, top: float, grain: float, rows: int, columns: int) -> 
 
 
 def _fitted(
-    views: Sequence[View], pixels: Sequence[Pixels], grain: float, side: float, angles: tuple[float, ...]
+    views: Sequence[View],
+    pixels: Sequence[Pixels],
+    grain: float,
+    side: float,
+    angles: tuple[float, ...],
+    roll_deg: float | None,
 ) -> Sprite:
-    """Fit the pictures of one grain, cell by cell, as far as `side` to each side of the light."""
+    """Fit the pictures of one grain, cell by cell, as far as `side` to each side of the light.
+
+    They turn with the light from `roll_deg` on, or stay upright.
+    """
+    rolls = () if roll_deg is None else (roll_deg,) * len(angles)
     columns = rows = 2 * round(side / grain)
     right, down = _middles(-side, -side, grain, rows, columns)
     values = np.zeros((len(views), rows, columns, 3), np.float32)
     weights, noise = np.zeros_like(values), np.zeros_like(values[0])
     for k, (view, picture) in enumerate(zip(views, pixels, strict=True)):
-        x, y = view.light_px[0] + right, view.light_px[1] + down
+        x, y = _beside_light(view, right, down, roll_deg)
         values[k], variance, weights[k] = _cells(picture, view, x, y, grain)
         noise += weights[k] ** 2 * variance
     pictures = pictures_over(angles, views, values, weights, noise)
@@ -211,9 +239,18 @@ def _fitted(
     pictures *= np.outer(_window(rows), _window(columns))[..., None]
     unit, cells = packed(pictures, DIGIT * darkest_noise(views) / grain)
     return Sprite(
-        follows="light", grain_px=grain, corner_px=(-side, -side), constellation_deg=angles, rows=rows,
-        columns=columns, unit=unit, cells=cells,
+        follows="light", grain_px=grain, corner_px=(-side, -side), rolls_deg=rolls, constellation_deg=angles,
+        rows=rows, columns=columns, unit=unit, cells=cells,
     )  # fmt: skip
+
+
+def _beside_light(view: View, right: Floats, down: Floats, roll_deg: float | None) -> tuple[Floats, Floats]:
+    """Return columns and rows of places beside the light, turned as `ways` has most of what turns with it."""
+    turned = 0.0
+    if roll_deg is not None:
+        turned = max(turned_ways(roll_deg, view.roll_deg, _off_axis(view)), key=lambda way: way.share).turned_deg
+    cosine, sine = np.cos(np.radians(turned)), np.sin(np.radians(turned))
+    return view.light_px[0] + cosine * right + sine * down, view.light_px[1] - sine * right + cosine * down
 
 
 def pictures_over(

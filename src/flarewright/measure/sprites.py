@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,20 @@ Pixels = NDArray[np.float32]
 
 # one photograph is compared with the one before and the one after
 _FEWEST = 3
+# where the light is within this part of the picture's width of the axis, not all that is left turns with it
+_NEAR_AXIS = 0.04
+
+
+@dataclass(frozen=True)
+class Way:
+    """How a sprite is drawn: which share of it, the light's direction, and by how much what goes with the light turns.
+
+    Directions are degrees, counterclockwise from the right in the upright picture.
+    """
+
+    share: float
+    roll_deg: float
+    turned_deg: float = 0.0
 
 
 def where_foretold(model: GhostModel, learn: Callable[[Sprite], Sprite]) -> GhostModel:
@@ -64,12 +79,40 @@ def sprite_at(sprite: Sprite, constellation_deg: float) -> Pixels:
     return np.asarray((1.0 - part) * pictures[k] + part * pictures[k + 1], dtype=np.float32)
 
 
-def roll_at(sprite: Sprite, constellation_deg: float) -> float | None:
-    """Return the light's direction in which a sprite's picture was photographed; None where that is not known."""
+def ways(sprite: Sprite, constellation_deg: float, roll_deg: float, off: float) -> tuple[Way, ...]:
+    """Tell in which directions a sprite is drawn.
+
+    Parameters
+    ----------
+    sprite : Sprite
+    constellation_deg, roll_deg : float
+    off : float
+        How far the light's image is from the axis, part of the picture's width.
+
+    Returns
+    -------
+    tuple of Way
+        Their shares add up to 1.
+
+    Notes
+    -----
+    Next to the axis a flare hardly knows from where the light comes: what is left there, of polygons above all, lies as
+    it was photographed, and turns with the light from there on (docs/adr/0021).
+    """
     if not sprite.rolls_deg:
-        return None
+        return (Way(1.0, roll_deg),)
     angles, rolls = np.array(sprite.constellation_deg), np.unwrap(sprite.rolls_deg, period=360.0)
-    return float(np.interp(constellation_deg, angles, rolls))
+    photographed = float(np.interp(constellation_deg, angles, rolls))
+    return turned_ways(photographed, roll_deg, off)
+
+
+def turned_ways(photographed_deg: float, roll_deg: float, off: float) -> tuple[Way, ...]:
+    """Tell in which directions what was photographed with the light in one direction is drawn with it in another."""
+    far, turned_deg = off / _NEAR_AXIS, roll_deg - photographed_deg
+    if far >= 1.0 or turned_deg == 0.0:
+        return (Way(1.0, roll_deg, turned_deg),)
+    turned = float(far * far * (3.0 - 2.0 * far))
+    return Way(turned, roll_deg, turned_deg), Way(1.0 - turned, photographed_deg)
 
 
 def draw_sprites(
@@ -80,6 +123,7 @@ def draw_sprites(
     direction: tuple[float, float],
     size_px: tuple[int, int],
     scale: float = 1.0,
+    turned_deg: float = 0.0,
 ) -> Pixels:
     """Draw sprites into one picture.
 
@@ -96,6 +140,8 @@ def draw_sprites(
         Width and height.
     scale : float
         Pixels of the picture per pixel of the sprites.
+    turned_deg : float
+        By how much what goes with the light is turned against its photographs, counterclockwise.
 
     Returns
     -------
@@ -105,7 +151,7 @@ def draw_sprites(
     width, height = size_px
     out = np.zeros((height, width, 3), np.float32)
     for sprite, cells in zip(sprites, pictures, strict=True):
-        turn = np.radians(sprite.turn_deg)
+        turn = np.radians(sprite.turn_deg + turned_deg)
         goes = sprite.follows == "light"
         cosine, sine = (float(np.cos(turn)), float(np.sin(turn))) if goes else direction
         x0, y0 = light_px if goes else axis_px

@@ -304,7 +304,7 @@ def with_rest(model: GhostModel, views: Sequence[View], threads: int | None = No
     left = _beside_sprites(left, spikes, placed)
     # coarse pictures overshoot beside the light's image, which finer ones only mend where something is known
     around = [around_light(view, each) for view, each in zip(placed, _all_hidden(left, masks), strict=True)]
-    going = light_sprites(placed, around)
+    going = light_sprites(placed, around, model.star is not None)
     left = _beside_sprites(left, going, placed)
     # next to the light a pixel's error is brighter than all that turns about the axis
     next_to_light = [_off_light(view) < NEXT_TO_LIGHT * view.size_px[0] for view in placed]

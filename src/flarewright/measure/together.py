@@ -27,6 +27,8 @@ WIDTH = 240
 PER_GHOST = 3
 # how far a ghost is looked for from where it is foretold: brightness, shift (of its radius and of the picture), size
 _BRIGHTNESS, _RADII, _WIDTHS, _SIZE = 3.0, 0.3, 0.01, 0.2
+# of a view's pixels so many, percent, are darker than an even background may be bright
+_DARK = 10.0
 # a step that gains less than this part of the cost is the last
 _GAIN = 1e-3
 # the derivatives that make a shift and a change of size
@@ -107,6 +109,8 @@ def measure_together(
     size = PER_GHOST * len(ghosts)
     prior = np.zeros(size + CHANNELS)
     prior[:size] = 1.0 / spread.ravel() ** 2
+    # or it would stand in for a ghost that fills the picture, and be far below 0 beside one that is far too bright
+    prior[size:] = 1.0 / _evenness(view) ** 2
     # a ghost far from where it is foretold looks like an outlier: these count less only near the end
     for doubting in (False, True) if sure else (False,):
         matrix, side, cost, count = _normal(ghosts, poses, view, sure, doubting)
@@ -145,6 +149,15 @@ def _difference(a: Pose, b: Pose) -> tuple[float, float, float]:
 def _spreads(shape: Shape, view: View) -> tuple[float, float, float]:
     radius = abs(float(shape.numbers[FIRST_G]))
     return _BRIGHTNESS, _RADII * radius + _WIDTHS * view.size_px[0], _SIZE
+
+
+def _evenness(view: View) -> Floats:
+    """Return how bright an even background may be, by colour: about as bright as the darkest places."""
+    known = np.where(np.isfinite(view.variance), view.pixels, np.nan).reshape(-1, CHANNELS)
+    shown = np.isfinite(known).any(axis=0)
+    dark = np.where(shown, np.nanpercentile(np.where(shown, known, 0.0), _DARK, axis=0), 0.0)
+    least = view.darkest_noise if np.isfinite(view.darkest_noise) else 0.0
+    return np.asarray(np.maximum(dark, max(least, 1e-12)), dtype=np.float64)
 
 
 def _stepped(pose: Pose, step: Floats, limit: Floats) -> Pose:

@@ -39,8 +39,10 @@ class Sprite(Frozen):
     turn_deg : float
         "light" only: direction in which rows run, counterclockwise from the right in the upright picture.
     rolls_deg : tuple of float
-        "axis" and "ghosts" only: direction of the light in each picture, counterclockwise from the right when upright.
-        Next to the axis what is left lies as it was photographed; without rolls it turns with the light everywhere.
+        Direction of the light in each picture, counterclockwise from the right when upright; not of a "speck". "light":
+        the picture turns with the light from there on, about it; without rolls it stays upright. "axis" and "ghosts":
+        without rolls they turn as well next to the axis, where with them what is left lies as it was photographed. What
+        has rolls goes on where no photograph showed it.
     stretch : float
         Length of a cell along its row over `grain_px`.
     constellation_deg : tuple of float
@@ -101,10 +103,8 @@ class Sprite(Frozen):
             if self.moves is None or self.detail.block != self.moves.block:
                 raise ValueError("the detail of a sprite must come with moves of the same blocks")
             self.detail.check(self.rows, self.columns)
-        if self.rolls_deg and (
-            self.follows not in ("axis", "ghosts") or len(self.rolls_deg) != len(self.constellation_deg)
-        ):
-            raise ValueError("the rolls of a sprite are one for each picture, and only of one about the axis")
+        if self.rolls_deg and (self.follows == "speck" or len(self.rolls_deg) != len(self.constellation_deg)):
+            raise ValueError('the rolls of a sprite are one for each picture, and of none that follows "speck"')
         read_bytes(self.cells, self._size, "the cells of a sprite")
         return self
 

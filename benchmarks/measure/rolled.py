@@ -1,0 +1,93 @@
+"""Judge a replay with the light in other directions than it was photographed in.
+
+Ghosts of a lens of revolution turn with the light; the blades of its iris stand still, and corners come into the
+picture that no photograph showed. The truth is rendered anew there. What anyone can do without a model is to turn the
+photograph: that is what a replay is compared with.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from benchmarks.measure.judge import AROUND_LIGHT
+from numpy.typing import NDArray
+from synthetic_camera import Setup, poses, scale_of, truth_of
+
+from flarewright.io.merged import read_frame
+from flarewright.measure.glow import offsets
+from flarewright.measure.replay import replay
+from flarewright.measure.sprites import samples
+from flarewright.model.capture import MergedFrame, MergedRun
+from flarewright.model.ghost_model import GhostModel
+
+Pixels = NDArray[np.float32]
+
+# constellations of the hundred, and directions of the light
+AT, ROLLS_DEG = (20, 50, 80), (30.0, 90.0, 180.0)
+
+
+def shoot_rolled(setup: Setup, folder: Path) -> None:
+    """Write `rolled.npz`: the noise-free picture at a few constellations and rolls. What is there is kept."""
+    if (folder / "rolled.npz").is_file():
+        return
+    scale = scale_of(setup)
+    angles = [setup.angles_deg[min(k, len(setup.angles_deg) - 1)] for k in AT]
+    told: list[tuple[float, float, float, float]] = []
+    pictures = []
+    for roll in ROLLS_DEG:
+        still = replace(setup.steady, haze=setup.haze, veil=setup.veil, angles_deg=tuple(angles), roll_deg=roll)
+        for pose in poses(still):
+            truth = truth_of(still, pose, scale)
+            told.append((pose.constellation_deg, roll, *truth.light_px))
+            pictures.append(truth.total)
+    np.savez(folder / "rolled.npz", told=np.array(told), pictures=np.stack(pictures))
+
+
+def judge_rolled(model: GhostModel, folder: Path, run_folder: Path, run: MergedRun) -> dict[str, Any]:
+    """Return a replay's errors against a turned photograph's, dB, where a photograph shows the place and elsewhere.
+
+    Parameters
+    ----------
+    model, folder, run_folder, run
+        As of `judge`.
+    """
+    with np.load(folder / "rolled.npz") as held:
+        told, pictures = held["told"], held["pictures"]
+    sums: dict[str, list[tuple[float, float]]] = {}
+    rows = []
+    for (constellation, roll, *light), true in zip(told, pictures, strict=True):
+        frame = read_frame(run_folder, min(run.frames, key=lambda info: abs(info.constellation_deg - constellation)))
+        turned, shown = _turned(frame, float(roll))
+        mine = replay(model, float(constellation), roll_deg=float(roll))[0].pixels
+        far = np.hypot(*offsets((light[0], light[1]), run.size_px, 1.0)) > AROUND_LIGHT * run.size_px[0]
+        floor = float(np.sqrt(np.median(frame.variance[np.isfinite(frame.variance)])))
+        logs = [np.log(np.maximum(each, 0.0) + floor) for each in (mine, turned, true)]
+        row: dict[str, Any] = {"constellation": float(constellation), "roll": float(roll)}
+        for place, mask in (("shown", far & shown), ("beyond", far & ~shown)):
+            if not mask.any():
+                continue
+            for name, (a, b, c) in {"linear": (mine, turned, true), "log": tuple(logs)}.items():
+                errors = [float(((each - c)[mask].astype(np.float64) ** 2).sum()) for each in (a, b)]
+                sums.setdefault(f"{place}, {name}", []).append((errors[0], errors[1]))
+                row[f"{place}, {name}"] = round(float(10.0 * np.log10(errors[0] / errors[1])), 2)
+            row[f"{place}, log rms"] = round(float(np.sqrt(((logs[0] - logs[2])[mask] ** 2).mean())), 3)
+        rows.append(row)
+    gains = {name: float(10.0 * np.log10(np.divide(*np.sum(pairs, axis=0)))) for name, pairs in sums.items()}
+    return {"rolled, dB": gains, "rolled": rows}
+
+
+def _turned(frame: MergedFrame, roll_deg: float) -> tuple[Pixels, NDArray[np.bool_]]:
+    """Turn a photograph about the axis so that its light lies in a direction; beyond its border it is as there."""
+    height, width = frame.radiance.shape[:2]
+    turn = np.radians(roll_deg - frame.info.roll_deg)
+    y, x = np.mgrid[:height, :width] + 0.5
+    dx, dy = x - frame.info.axis_px[0], y - frame.info.axis_px[1]
+    column = np.cos(turn) * dx - np.sin(turn) * dy + frame.info.axis_px[0] - 0.5
+    row = np.sin(turn) * dx + np.cos(turn) * dy + frame.info.axis_px[1] - 0.5
+    shown = (column >= 0.0) & (column <= width - 1.0) & (row >= 0.0) & (row <= height - 1.0)
+    column, row = np.clip(column, 0.0, width - 1.0), np.clip(row, 0.0, height - 1.0)
+    known = np.where(np.isfinite(frame.variance), frame.radiance, 0.0).astype(np.float32)
+    return samples(known, column.ravel(), row.ravel()).reshape(height, width, 3), shown
