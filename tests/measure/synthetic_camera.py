@@ -38,9 +38,11 @@ from flarewright.render.shot import make_opening, make_shots
 Floats = NDArray[np.float64]
 Pixels = NDArray[np.float32]
 
-VERSION = 2
+VERSION = 3
 """Raise when the same `Setup` gives other pixels, so that old caches are not taken."""
 
+# a direct image of less than this part of the brightest one's light tells no place
+_SHOWN = 0.6
 # the sensor's red, green and blue from X, Y, Z: no weight is negative, so no light gives a negative count
 _FROM_XYZ = np.array([[0.9, 0.1, 0.0], [0.0, 1.0, 0.0], [0.0, 0.1, 0.85]])
 _FROM_REC709 = _FROM_XYZ @ np.linalg.inv(xyz_to_rgb_matrix("rec709"))
@@ -209,32 +211,36 @@ def truth_of(setup: Setup, pose: Pose, scale: float) -> Truth:
 
 def _light_px(setup: Setup, pose: Pose, rendering: fw.Rendering) -> tuple[float, float]:
     told = rendering.summary["lights"][0]
-    x, y = told["direct_position_mm"] if any(told["direct_throughput_mm2"]) else dark_mm(setup, pose)
+    _, _, most = _law(replace(setup.steady, roll_deg=0.0))
+    # the last rays that rims let pass land anywhere
+    shown = max(told["direct_throughput_mm2"]) > _SHOWN * most
+    x, y = told["direct_position_mm"] if shown else dark_mm(setup, pose)
     per_mm = setup.size_px[0] / setup.sensor_width_mm
     return setup.axis_px[0] + x * per_mm, setup.axis_px[1] - y * per_mm
 
 
 def dark_mm(setup: Setup, pose: Pose) -> tuple[float, float]:
     """Return where the light's image would be if the rims let it pass, on the sensor, mm: the lens' law goes on."""
-    focal, bent = _law(replace(setup.steady, roll_deg=0.0))
+    focal, bent, _ = _law(replace(setup.steady, roll_deg=0.0))
     x, y = (np.tan(np.radians(angle)) for angle in pose.field_deg)
     stretch = focal * (1.0 + bent * (x * x + y * y))
     return float(stretch * x), float(stretch * y)
 
 
 @cache
-def _law(setup: Setup) -> tuple[float, float]:
-    """Return focal length (mm) and distortion by the direct images that are not dark."""
-    seen = []
+def _law(setup: Setup) -> tuple[float, float, float]:
+    """Return focal length (mm) and distortion by the direct images that are not dark, and the brightest's mm2."""
+    seen, most = [], 0.0
     for pose in poses(setup):
         settled = settle(project_of(setup, pose, "passes"))
         image = direct_image(settled.lens, make_shots(settled, make_opening(settled, None))[0])
         t = abs(float(np.tan(np.radians(pose.constellation_deg))))
+        most = max(most, float(image.throughput_mm2.max()))
         if image.throughput_mm2.any() and t > 0.0:
             seen.append((t, t**3, hypot(*image.position_mm)))
     table = np.array(seen)
     focal, third = np.linalg.lstsq(table[:, :2], table[:, 2], rcond=None)[0]
-    return float(focal), float(third / focal)
+    return float(focal), float(third / focal), most
 
 
 def _seen(setup: Setup, layer: fw.Layer) -> Floats:

@@ -43,8 +43,9 @@ _AROUND_PX = 1.0
 # views for each picture
 _VIEWS = 3
 # how stiff cells are against what one view tells of them: over the constellation, towards 0, and against their
-# neighbours, for a pixel tells nothing of waves that are as long as it is wide
-_BEND, _DAMP, _ROUGH = 0.1, 0.05, 0.2
+# neighbours, for a pixel tells nothing of waves that are as long as it is wide. Over the constellation stiff: where a
+# speck moves by whole pixels, many views in a row show the same of it, and others far off tell what lies between pixels
+_BEND, _DAMP, _ROUGH = 1.0, 0.05, 0.2
 # part of its light by which a pixel may be off beside its noise
 _OFF = 0.01
 # steps of the solver, and the part of the first residual at which it ends
