@@ -80,7 +80,18 @@ def pictures_of(setup: Setup) -> tuple[list[Pose], dict[str, list[Floats | None]
         for name, image in ghost_layers(setup, pose, scale):
             if _clean(image[..., 1], forms.get(name), setup.size_px):
                 found[name][pose.number] = image[..., 1].astype(np.float32)
-    return every, found
+    return every, {name: _longest(pictures) for name, pictures in found.items()}
+
+
+def _longest(pictures: list[Floats | None]) -> list[Floats | None]:
+    """Return pictures with those alone that are there most times in a row: what comes after a gap is another part."""
+    runs, begin = [(0, 0)], 0
+    for k, picture in enumerate([*pictures, None]):
+        if picture is None:
+            runs.append((begin, k))
+            begin = k + 1
+    first, end = max(runs, key=lambda run: run[1] - run[0])
+    return [picture if first <= k < end else None for k, picture in enumerate(pictures)]
 
 
 def view_of(setup: Setup, pose: Pose, green: Floats | None, noise: float) -> View:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -38,6 +38,13 @@ CorrectionsFile = Annotated[
         help="JSON: ghosts to add and to remove (docs/ghost-model.md); those given before hold until others are given.",
     ),
 ]  # fmt: skip
+By = Annotated[
+    Literal["joint", "walch"],
+    typer.Option(
+        help="joint: all constellations and ghosts at once. walch: his primitive by his gradient descent, picture by "
+        "picture (2017), for comparison; slower by far, and what it writes is not tracked or compressed again."
+    ),
+]
 Threads = Annotated[int | None, typer.Option(min=1, help="All cores when left out.")]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
 
@@ -53,9 +60,9 @@ def find(
     _one("find", folder, every, corrections, threads, as_json)
 
 
-def fit(folder: Folder, every: Every = 1, threads: Threads = None, as_json: Json = False) -> None:
+def fit(folder: Folder, every: Every = 1, by: By = "joint", threads: Threads = None, as_json: Json = False) -> None:
     """Fit the ghosts of DIR/found.json to all merged frames at once, and write DIR/model.json; goes on when stopped."""
-    _one("fit", folder, every, None, threads, as_json)
+    _one("fit", folder, every, None, threads, as_json, by)
 
 
 def track(folder: Folder, every: Every = 1, threads: Threads = None, as_json: Json = False) -> None:
@@ -68,8 +75,16 @@ def compress(folder: Folder, every: Every = 1, threads: Threads = None, as_json:
     _one("compress", folder, every, None, threads, as_json)
 
 
-def _one(stage: str, folder: Path, every: int, corrections: Path | None, threads: int | None, as_json: bool) -> None:
-    facts = run_stages(folder, [stage], every, corrections, threads, not as_json)
+def _one(
+    stage: str,
+    folder: Path,
+    every: int,
+    corrections: Path | None,
+    threads: int | None,
+    as_json: bool,
+    by: str = "joint",
+) -> None:
+    facts = run_stages(folder, [stage], every, corrections, threads, not as_json, by)
     if as_json:
         print_json(facts)
 
@@ -82,6 +97,7 @@ class _Job:
     run: MergedRun
     every: int
     corrections: Corrections | None
+    by: str
     threads: int | None
     told: Callable[[str], None]
     progress: Callable[[float, str], None]
@@ -114,7 +130,13 @@ class _Stage:
 
 
 def run_stages(
-    folder: Path, stages: Sequence[str], every: int, corrections: Path | None, threads: int | None, talk: bool
+    folder: Path,
+    stages: Sequence[str],
+    every: int,
+    corrections: Path | None,
+    threads: int | None,
+    talk: bool,
+    by: str = "joint",
 ) -> dict[str, Any]:
     """Run stages in a run's folder; one is not repeated while what it is made from is the same.
 
@@ -146,7 +168,7 @@ def run_stages(
         stage = _STAGES[name]
         made = folder / stage.file
         with progress_bar() as begin:
-            job = _Job(folder, run, every, told_of, threads, told, begin(name))
+            job = _Job(folder, run, every, told_of, by, threads, told, begin(name))
             digest = run_digest(folder, run, stage.given(job))
             kept = is_current(folder, name, digest, made)
             if not kept:
@@ -205,15 +227,18 @@ def _find(job: _Job, made: Path, steps: Journal) -> None:
 
 
 def _fit_given(job: _Job) -> dict[str, object]:
-    return {"every": job.every, "found": _model(job.needed(FOUND, "find")).model_dump_json()}
+    given = {"every": job.every, "found": _model(job.needed(FOUND, "find")).model_dump_json()}
+    return given if job.by == "joint" else {**given, "by": job.by}
 
 
 def _fit(job: _Job, made: Path, steps: Journal) -> None:
     from ..io.ghost_model_file import write_ghost_model
     from ..measure.stages import fit_ghosts
+    from ..measure.walch_fit import fit_as_walch
 
     rough = _model(job.folder / FOUND)
-    model = fit_ghosts(
+    way = fit_ghosts if job.by == "joint" else fit_as_walch
+    model = way(
         job.folder, job.run, rough, every=job.every, threads=job.threads, tell=job.told, progress=job.progress,
         journal=steps,
     )  # fmt: skip

@@ -1,0 +1,199 @@
+"""Fit a run's ghosts in Walch's way, for comparison (2017, chapters 7 and 8).
+
+Every ghost is fitted in one picture after the other, each from where the one before ended, by online gradient descent
+of his primitive; then each of its numbers becomes a polynomial over the constellation. He had grey pictures, so green
+tells the shape, and the other colours their brightness.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+from typing import cast
+
+import numpy as np
+
+from ..kernels.measure_bezier import BORDER, INNER, NUMBERS
+from ..model.capture import MergedRun
+from ..model.ghost_model import BezierGhost, GhostModel
+from .compress import compress
+from .journal import Journal
+from .numbers import Floats
+from .replay import draw
+from .single import Spot, spots_of_model
+from .stages import beside, coarse, read_views, with_rest
+from .views import View
+from .walch import circle, descend, window_of
+from .walch import draw as drawn
+
+Tell = Callable[[str], None]
+Progress = Callable[[float, str], None]
+
+# a ghost is fitted in pictures halved until it is no wider, pixels
+_WIDE = 96
+# room around a ghost, part of its radius and pixels
+_AROUND, _ROOM = 0.25, 8
+# part of the window that must have been measured
+_MEASURED = 0.7
+# pictures without which a ghost has no life, and the radius of the smallest, pixels
+_FEWEST, _SMALLEST = 3, 0.5
+# so many numbers are lengths, the first ones
+_LENGTHS = 11
+
+
+@dataclass(frozen=True)
+class _Life:
+    """A ghost's numbers where it was fitted, shape (K, 19), and at which constellations, shape (K,)."""
+
+    constellation_deg: Floats
+    numbers: Floats
+
+
+def fit_as_walch(
+    folder: Path,
+    run: MergedRun,
+    rough: GhostModel,
+    *,
+    every: int = 1,
+    rounds: int = 60,
+    threads: int | None = None,
+    tell: Tell = lambda _: None,
+    progress: Progress = lambda _part, _words: None,
+    journal: Journal | None = None,
+) -> GhostModel:
+    """Fit the ghosts that were found with Walch's primitive and in his way.
+
+    Parameters
+    ----------
+    folder : Path
+    run : MergedRun
+    rough : GhostModel
+        From `find_ghosts`: where each ghost is to begin with, and what lies over it.
+    every : int
+        As for `find_ghosts`.
+    rounds : int
+        Of `walch.descend`, for each picture.
+    threads : int, optional
+    tell, progress, journal
+        As for `find_ghosts`.
+
+    Returns
+    -------
+    GhostModel
+        Of Bezier ghosts, with halo, star and what is left as any other. A ghost that too few pictures show is left out.
+
+    Raises
+    ------
+    FlarewrightError
+        When frames cannot be read or are too few.
+    """
+    views = read_views(folder, run, every)
+    seen = beside(views, rough.halo, rough.star)
+    bare = cast(GhostModel, rough.replace(sprites=(), removed=()))
+    whole = [draw(bare, view.constellation_deg, view.roll_deg, view.size_px) for view in seen]
+    spots = [{spot.name: spot for spot in _spots(bare, view)} for view in seen]
+    steps, found = journal or Journal(), []
+    count = threads or os.cpu_count() or 1
+    names = [ghost.name for ghost in rough.ghosts]
+
+    def follow(name: str) -> list[Floats]:
+        life = _followed(name, bare, seen, whole, spots, rounds)
+        return [life.constellation_deg, life.numbers]
+
+    with ThreadPoolExecutor(count) as pool:
+        for begin in range(0, len(names), count):
+            some = names[begin : begin + count]
+
+            def look(some: Sequence[str] = some) -> list[list[Floats]]:
+                return list(pool.map(follow, some))
+
+            for name, (angles, numbers) in zip(some, steps.step(look), strict=True):
+                if len(angles) < _FEWEST:
+                    tell(f"ghost {name}: too few pictures show it, left out")
+                    continue
+                found.append(_compressed(name, _Life(angles, numbers)))
+                tell(f"ghost {name}: {len(angles)} pictures")
+            progress(min(begin + count, len(names)) / len(names), f"ghost {some[-1]}")
+    told = "fitted with Walch's primitive and by his gradient descent (2017), for comparison"
+    model = cast(GhostModel, bare.replace(ghosts=tuple(found), remarks=(*rough.remarks, told)))
+    return with_rest(model, views, threads)
+
+
+def _spots(model: GhostModel, view: View) -> tuple[Spot, ...]:
+    low, high = model.constellation_deg
+    return spots_of_model(model, min(max(view.constellation_deg, low), high))
+
+
+def _followed(
+    name: str,
+    model: GhostModel,
+    views: Sequence[View],
+    whole: Sequence[Floats],
+    spots: Sequence[dict[str, Spot]],
+    rounds: int,
+) -> _Life:
+    """Fit one ghost from picture to picture."""
+    ghost = next(one for one in model.ghosts if one.name == name)
+    alone = cast(GhostModel, model.replace(ghosts=(ghost,)))
+    angles, fitted = [], []
+    before: tuple[Floats, Spot] | None = None
+    for view, light, there in zip(views, whole, spots, strict=True):
+        spot, numbers = there.get(name), None
+        if spot is not None and spot.radius_px > _SMALLEST and max(spot.rgb) > 0.0:
+            own = draw(alone, view.constellation_deg, view.roll_deg, view.size_px)
+            numbers = _one(view.showing((view.pixels - light + own).astype(np.float32)), spot, before, rounds)
+        before = None if spot is None or numbers is None else (numbers, spot)
+        if numbers is not None:
+            angles.append(view.constellation_deg)
+            fitted.append(numbers)
+    return _Life(np.array(angles), np.array(fitted).reshape(-1, NUMBERS))
+
+
+def _one(view: View, spot: Spot, before: tuple[Floats, Spot] | None, rounds: int) -> Floats | None:
+    """Fit one ghost in one picture; None where too little of it was measured."""
+    times = max(0, int(np.ceil(np.log2(2.0 * spot.radius_px / _WIDE))))
+    small, side = coarse(view, times), 0.5**times
+    start = circle(spot.place_px, spot.radius_px, np.array(spot.rgb), np.array(spot.rgb))
+    if before is not None:
+        # as it was in the picture before, where the search saw it go
+        start = before[0].copy()
+        start[0] += spot.place_px - before[1].place_px
+    start[:_LENGTHS] *= side
+    margin = _ROOM + int(_AROUND * side * spot.radius_px)
+    left, top, width, height = window_of(start, small.frame, small.size_px, margin)
+    if min(width, height) < _ROOM:
+        return None
+    part = np.s_[top : top + height, left : left + width]
+    known = np.asarray(np.isfinite(small.variance[part]).all(axis=2))
+    if known.mean() < _MEASURED:
+        return None
+    window = left, top, width, height
+    # where nothing was measured he is right to begin with
+    wanted = np.where(known[..., None], small.pixels[part], drawn(start, small.frame, window))
+    numbers = descend(start, wanted[..., 1], small.frame, window, rounds=rounds).numbers
+    numbers = _coloured(numbers, wanted, drawn(numbers, small.frame, window)[..., 1])
+    numbers[:_LENGTHS] /= side
+    return numbers
+
+
+def _coloured(numbers: Floats, wanted: Floats, green: Floats) -> Floats:
+    """Return numbers whose red and blue are as bright as a picture tells; shaped as green."""
+    out = numbers.copy()
+    power = max(float((green**2).sum()), 1e-300)
+    for m in (0, 2):
+        times = max(float((green * wanted[..., m]).sum()) / power, 0.0)
+        out[BORDER + m], out[INNER + m] = times * numbers[BORDER + 1], times * numbers[INNER + 1]
+    return out
+
+
+def _compressed(name: str, life: _Life) -> BezierGhost:
+    """Turn each number into a polynomial over the constellation."""
+    span = float(life.constellation_deg.min()), float(life.constellation_deg.max())
+    curves = [compress(life.constellation_deg, values, np.ones(values.size), span) for values in life.numbers.T]
+    return BezierGhost(
+        name=name, numbers=tuple(curve.coefficients for curve in curves), visible_deg=span,
+        uncertainty=tuple(curve.deviation for curve in curves),
+    )  # fmt: skip
