@@ -6,7 +6,8 @@
 
 A synthetic camera (`tests/measure/synthetic_camera.py`) photographs each lens at the even ones of 100 constellations;
 the model is found, fitted, tracked and compressed from those alone, as `flarewright measure run` does, and judged at
-the odd ones against the noise-free truth, outside 40 (of 720) pixels around the light.
+the odd ones against the noise-free truth, outside 40 (of 720) pixels around the light; and at three of them with the
+light in other directions, against a turned photograph (`rolled`).
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from typing import Any
 
 from benchmarks.measure.isolated import isolated, summary
 from benchmarks.measure.judge import judge
+from benchmarks.measure.rolled import judge_rolled, shoot_rolled
 from benchmarks.measure.shoot import setup_of, shoot
 from benchmarks.measure.speed import replay_speed
 
@@ -33,7 +35,9 @@ from flarewright.measure.track_stage import compress_ghosts, track_ghosts
 
 def prove(lens: str, folder: Path, given: argparse.Namespace) -> dict[str, Any]:
     """Photograph one lens, go through all stages and judge it."""
-    shoot(setup_of(lens, given.width, given.count, given.f_number), folder)
+    setup = setup_of(lens, given.width, given.count, given.f_number)
+    shoot(setup, folder)
+    shoot_rolled(setup, folder)
     run_folder = folder / given.merge
     start, cpu = time.perf_counter(), time.process_time()
 
@@ -64,7 +68,8 @@ def prove(lens: str, folder: Path, given: argparse.Namespace) -> dict[str, Any]:
         "merge": merged - cpu, "find": found - merged, "fit": fitted - found, "track": tracked - fitted,
         "compress": compressed - tracked, "wall": wall,
     }  # fmt: skip
-    return {"lens": lens, "merge": given.merge, "ghosts": len(model.ghosts), "CPU s": times, **scores}
+    facts = {"lens": lens, "merge": given.merge, "ghosts": len(model.ghosts), "CPU s": times}
+    return {**facts, **scores, **judge_rolled(model, folder, run_folder, run)}
 
 
 def main() -> None:
