@@ -42,7 +42,7 @@ VERSION = 3
 """Raise when the same `Setup` gives other pixels, so that old caches are not taken."""
 
 # a direct image of less than this part of the brightest one's light tells no place
-_SHOWN = 0.6
+_SHOWN = 0.1
 # the sensor's red, green and blue from X, Y, Z: no weight is negative, so no light gives a negative count
 _FROM_XYZ = np.array([[0.9, 0.1, 0.0], [0.0, 1.0, 0.0], [0.0, 0.1, 0.85]])
 _FROM_REC709 = _FROM_XYZ @ np.linalg.inv(xyz_to_rgb_matrix("rec709"))
