@@ -100,7 +100,7 @@ def _checked(model: GhostModel) -> list[AberrationGhost]:
     ghosts = [ghost for ghost in model.ghosts if isinstance(ghost, AberrationGhost)]
     if len(ghosts) < len(model.ghosts):
         raise FlarewrightError(
-            "a Bezier ghost has its numbers over the constellation already: replay the model as it is, or take the ghost out"
+            "a Bezier ghost has its numbers over the constellation already: replay the model as it is, or take it out"
         )
     return ghosts
 
