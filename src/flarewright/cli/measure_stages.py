@@ -41,8 +41,9 @@ CorrectionsFile = Annotated[
 By = Annotated[
     Literal["joint", "walch"],
     typer.Option(
+        metavar="joint|walch",
         help="joint: all constellations and ghosts at once. walch: his primitive by his gradient descent, picture by "
-        "picture (2017), for comparison; slower by far, and what it writes is not tracked or compressed again."
+        "picture (2017), for comparison; slower by far, and what it writes is not tracked or compressed again.",
     ),
 ]
 Threads = Annotated[int | None, typer.Option(min=1, help="All cores when left out.")]

@@ -44,7 +44,7 @@ COVERS, LIT, _LOOKED = 0.35, 0.1, 4
 _SOON = 2
 # so many refused one after the other, the best votes first, end a search: ghosts that nobody can tell apart have
 # borders without end
-_FRUITLESS = 40
+_FRUITLESS = 24
 # views that a first fit looks at
 _FEW = 16
 # two views tell place and size, and nothing of whether it goes along with the light
