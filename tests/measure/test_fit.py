@@ -7,7 +7,8 @@ import pytest
 from planted_run import GHOSTS, LARGEST, NOISE, SIZE, shape, views
 
 from flarewright.kernels.measure_mesh import parting_of
-from flarewright.kernels.measure_pupil import FIRST_I, LATERAL, SOFT
+from flarewright.kernels.measure_pupil import FIRST_DISC, FIRST_I, LATERAL, SOFT
+from flarewright.measure import grow as growing
 from flarewright.measure import pursuit
 from flarewright.measure.compress import compress
 from flarewright.measure.find import Candidate, candidates, slopes_of
@@ -371,3 +372,20 @@ def test_in_whatever_order_ghosts_come_the_fit_is_the_same():
         replays.append(np.stack([sum(render(one.shapes[1], view) for one in settled) for view in shown]))
     # sums of light differ in their last digits; fits go by the light
     assert np.sqrt(np.mean((replays[1] - replays[0]) ** 2)) < 1e-3 * np.sqrt(np.mean(replays[0] ** 2))
+
+
+def test_a_rim_that_leaves_nothing_to_fit_is_none(monkeypatch):
+    """It had been tried again and again, for ever."""
+    seen = views(GHOSTS[1:2], angles=np.linspace(2.0, LARGEST, 6))
+    gone = Shape(GHOSTS[1].numbers.copy(), 1)
+    gone.numbers[:4] = 1e5, 0.0, 0.0, 0.0
+    gone.numbers[FIRST_DISC : FIRST_DISC + 3] = 0.0, 0.0, 1.0
+    assert not patches_of(gone, seen, 1)
+    real = growing.cost_of
+    monkeypatch.setattr(growing, "_with_rim", lambda *_: gone)
+    monkeypatch.setattr(
+        growing, "cost_of", lambda shape, *told, **how: 0.0 if shape is gone else real(shape, *told, **how)
+    )
+    fit = grow(GHOSTS[1], seen, 1, most=Growth(order=1, discs=1))
+    assert fit is not None
+    assert fit.shape.discs == 0

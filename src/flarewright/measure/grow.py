@@ -93,8 +93,11 @@ def grow(
             grown = _with_rim(fit.shape, patches, free_numbers(order, 0, min(order, 1)), width, most, pool)
             before = cost_of(fit.shape, patches, error=most.error)
             if grown is not None and cost_of(grown, patches, error=most.error) < (1.0 - RIM_PAYS) * before:
-                found = polish(grown, order, min(order, most.intensity_order), 6) or found
-                continue
+                # a rim may leave too little to fit: then it is none
+                rimmed = polish(grown, order, min(order, most.intensity_order), 6)
+                if rimmed is not None:
+                    found = rimmed
+                    continue
         if order >= most.order:
             break
         higher = polish(fit.shape, order + 1, min(order + 1, most.intensity_order), 10)

@@ -42,9 +42,6 @@ SPECK, BESIDE_SPECK = 3.5, 3.0
 COVERS, LIT, _LOOKED = 0.35, 0.1, 4
 # who was refused is tried again when twice as many ghosts are known, and so many more
 _SOON = 2
-# so many refused one after the other, the best votes first, end a search: ghosts that nobody can tell apart have
-# borders without end
-_FRUITLESS = 24
 # views that a first fit looks at
 _FEW = 16
 # two views tell place and size, and nothing of whether it goes along with the light
@@ -121,10 +118,9 @@ def pursue(
     # each with how many ghosts were known when it was
     refused: list[tuple[Candidate, int]] = []
     waiting = list(first)
-    fruitless = 0
     steps = journal or Journal()
     fallen = _Fallen(progress)
-    while len(found) < most and (waiting or fruitless < _FRUITLESS):
+    while len(found) < most:
         votes = steps.step(partial(_candidates, shown, rest, masks, 12 + len(refused), iris, pool))
         trials = _open([each for each in votes if each.score > SCORE], refused, len(found))
         fallen(trials[0].score if trials else SCORE, len(found))
@@ -138,9 +134,7 @@ def pursue(
             ghost = steps.step(partial(_try, trial, shown, rest, pool))
             if ghost is None:
                 refused = [*((one, then) for one, then in refused if not _same(one, trial)), (trial, len(found))]
-                fruitless += 1
                 continue
-            fruitless = 0
             taken.append(trial)
             found.append(ghost)
             rest = _take_off(ghost, shown, rest)
