@@ -85,12 +85,15 @@ def draw_rest(
             light = gone_on(light, _shown(model, axis, scale, way.turned_deg, size_px), axis)
         rest += way.share * light
     rest += draw_specks(specks, packed, model, constellation_deg, placed, size_px)
-    least = np.zeros_like(rest)
+    least: Floats | float = 0.0
     turns = [way for one in standing if one.follows == "ghosts" for way in ways(one, constellation_deg, roll_deg, off)]
     if turns:
         mask = _shown(model, axis, scale, max(turns, key=lambda way: way.share).turned_deg, size_px)
-        least = np.where(mask[..., None], 0.0, _DARKEST * gone_on(known + rest, mask, axis))
-    return np.maximum(rest, np.maximum(least, 0.0) - known)
+        # at the photographs' own roll and sides they show all there is
+        if not mask.all():
+            onward = np.maximum(_DARKEST * gone_on(known + rest, mask, axis), 0.0)
+            least = np.where(mask[..., None], 0.0, onward)
+    return np.asarray(np.maximum(rest, least - known))
 
 
 def _shown(

@@ -10,7 +10,6 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
 from pathlib import Path
 from typing import cast
 
@@ -42,14 +41,6 @@ _MEASURED = 0.7
 _FEWEST, _SMALLEST = 3, 0.5
 # so many numbers are lengths, the first ones
 _LENGTHS = 11
-
-
-@dataclass(frozen=True)
-class _Life:
-    """A ghost's numbers where it was fitted, shape (K, 19), and at which constellations, shape (K,)."""
-
-    constellation_deg: Floats
-    numbers: Floats
 
 
 def fit_as_walch(
@@ -100,8 +91,7 @@ def fit_as_walch(
     names = [ghost.name for ghost in rough.ghosts]
 
     def follow(name: str) -> list[Floats]:
-        life = _followed(name, bare, seen, whole, spots, rounds)
-        return [life.constellation_deg, life.numbers]
+        return list(_followed(name, bare, seen, whole, spots, rounds))
 
     with ThreadPoolExecutor(count) as pool:
         for begin in range(0, len(names), count):
@@ -114,7 +104,7 @@ def fit_as_walch(
                 if len(angles) < _FEWEST:
                     tell(f"ghost {name}: too few pictures show it, left out")
                     continue
-                found.append(_compressed(name, _Life(angles, numbers)))
+                found.append(_compressed(name, angles, numbers))
                 tell(f"ghost {name}: {len(angles)} pictures")
             progress(min(begin + count, len(names)) / len(names), f"ghost {some[-1]}")
     told = "fitted with Walch's primitive and by his gradient descent (2017), for comparison"
@@ -134,8 +124,8 @@ def _followed(
     whole: Sequence[Floats],
     spots: Sequence[dict[str, Spot]],
     rounds: int,
-) -> _Life:
-    """Fit one ghost from picture to picture."""
+) -> tuple[Floats, Floats]:
+    """Fit one ghost from picture to picture; return at which constellations, shape (K,), and its numbers, (K, 19)."""
     ghost = next(one for one in model.ghosts if one.name == name)
     alone = cast(GhostModel, model.replace(ghosts=(ghost,)))
     angles, fitted = [], []
@@ -149,7 +139,7 @@ def _followed(
         if numbers is not None:
             angles.append(view.constellation_deg)
             fitted.append(numbers)
-    return _Life(np.array(angles), np.array(fitted).reshape(-1, NUMBERS))
+    return np.array(angles), np.array(fitted).reshape(-1, NUMBERS)
 
 
 def _one(view: View, spot: Spot, before: tuple[Floats, Spot] | None, rounds: int) -> Floats | None:
@@ -189,10 +179,10 @@ def _coloured(numbers: Floats, wanted: Floats, green: Floats) -> Floats:
     return out
 
 
-def _compressed(name: str, life: _Life) -> BezierGhost:
+def _compressed(name: str, constellation_deg: Floats, numbers: Floats) -> BezierGhost:
     """Turn each number into a polynomial over the constellation."""
-    span = float(life.constellation_deg.min()), float(life.constellation_deg.max())
-    curves = [compress(life.constellation_deg, values, np.ones(values.size), span) for values in life.numbers.T]
+    span = float(constellation_deg.min()), float(constellation_deg.max())
+    curves = [compress(constellation_deg, values, np.ones(values.size), span) for values in numbers.T]
     return BezierGhost(
         name=name, numbers=tuple(curve.coefficients for curve in curves), visible_deg=span,
         uncertainty=tuple(curve.deviation for curve in curves),
