@@ -3,6 +3,7 @@
     python -m benchmarks.measure LENS ... [--width 720] [--merge real|ideal] [--keep FOLDER] [--json FILE]
     python -m benchmarks.measure LENS ... --isolated [--width 360]
     python -m benchmarks.measure --speed
+    python -m benchmarks.measure --planted 25 [--count 100]
 
 A synthetic camera (`tests/measure/synthetic_camera.py`) photographs each lens at the even ones of 100 constellations;
 the model is found, fitted, tracked and compressed from those alone, as `flarewright measure run` does, and judged at
@@ -21,6 +22,7 @@ from typing import Any
 
 from benchmarks.measure.isolated import isolated, summary
 from benchmarks.measure.judge import judge
+from benchmarks.measure.planted import planted_time
 from benchmarks.measure.rolled import judge_rolled, shoot_rolled
 from benchmarks.measure.shoot import setup_of, shoot
 from benchmarks.measure.speed import replay_speed
@@ -77,6 +79,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.measure", description=__doc__)
     parser.add_argument("lens", nargs="*")
     parser.add_argument("--speed", action="store_true", help="how fast a model replays")
+    parser.add_argument("--planted", type=int, metavar="GHOSTS", help="how long so many take, all constellations seen")
     parser.add_argument("--isolated", action="store_true", help="ghosts one by one, and Walch's way for comparison")
     parser.add_argument("--width", type=int, default=720)
     parser.add_argument("--count", type=int, default=100, help="constellations, both kinds")
@@ -86,6 +89,8 @@ def main() -> None:
     parser.add_argument("--json", type=Path, help="also write the scores here")
     given = parser.parse_args()
     rows = [replay_speed()] if given.speed else []
+    if given.planted:
+        rows.append(planted_time(given.planted, given.count, lambda text: print(text, flush=True)))
     for row in rows:
         print(json.dumps(row), flush=True)
     if given.isolated:

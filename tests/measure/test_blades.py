@@ -11,6 +11,7 @@ from flarewright.kernels.measure_pupil import FIRST_DISC
 from flarewright.measure.find import rims_of
 from flarewright.measure.fit import render
 from flarewright.measure.found import Found
+from flarewright.measure.fragments import joined
 from flarewright.measure.grow import Growth
 from flarewright.measure.numbers import blades_of, with_blades
 from flarewright.measure.pursuit import pursue
@@ -83,7 +84,7 @@ def test_each_ghost_gets_the_rim_that_it_has():
     planted = [bladed(IRIS, -110.0, 26.0, 1.0), bladed(None, 60.0, 20.0, 0.6), bladed(kinds[2], 95.0, 30.0, 0.4)]
     shown = views(planted, angles=np.linspace(2.0, 24.0, 12), roll_deg=20.0)
     masks = [np.ones(shown[0].variance.shape[:2], bool)] * len(shown)
-    found = pursue(shown, masks, iris=IRIS, most=6)
+    found = joined(pursue(shown, masks, iris=IRIS, most=6), shown)
     ghosts = to_model(settle(found, shown, iris=IRIS), shown)
     assert len(ghosts) == 3
     told = {round(ghost.green.f[0]): ghost.blades for ghost in ghosts}

@@ -1,5 +1,6 @@
 """A model made small keeps what foretells left-out constellations, and gets curves only where they are needed."""
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
@@ -171,7 +172,8 @@ def test_wide_pictures_are_asked_in_small_and_shifts_told_in_full_pixels():
         light = render(replace(ghost, numbers=posed(ghost.numbers, view.sigma, pose)), view)
         seen.append(view.showing(np.repeat(light[..., None], 3, axis=2).astype(np.float32)))
     found = Found((ghost, ghost, ghost), 0, len(seen) - 1)
-    (curves,) = curves_of([found], [(0.0, LARGEST)], seen, lambda *_: None)
+    with ThreadPoolExecutor(2) as pool:
+        (curves,) = curves_of([found], [(0.0, LARGEST)], seen, pool, lambda *_: None)
     assert value_at(curves.along_px, 12.0, (0.0, LARGEST)) == pytest.approx(4.0, abs=0.05)
     assert value_at(curves.brightness, 12.0, (0.0, LARGEST)) == pytest.approx(1.3, abs=0.01)
 

@@ -258,7 +258,7 @@ def test_what_was_refused_is_tried_again_when_more_is_known(monkeypatch):
         return Found((GHOSTS[0],) * 3, 0, 1)
 
     def left(*_):
-        return [each for each in votes if each not in tried or (each is votes[0] and tried[-1] is not each)]
+        return [each for each in votes if each not in tried or (each is votes[0] and tried[-1] is not each)], []
 
     monkeypatch.setattr(pursuit, "_try", trial)
     monkeypatch.setattr(pursuit, "_candidates", left)

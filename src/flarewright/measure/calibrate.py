@@ -15,6 +15,7 @@ from ..errors import FlarewrightError
 from ..io.photo import Photo, open_photo
 from ..model.capture import CameraNoise, Capture, Matrix3
 from .contradiction import refuse_contradiction
+from .evenly import evenly
 from .merge import Exposure
 from .noise import LEVEL_SIDE, Band, Noise, Transfer, common_black, fit_transfer, noise_of, smooth, transfers
 
@@ -161,8 +162,7 @@ def _some_groups(lights: Sequence[Capture]) -> list[list[Capture]]:
     for one in lights:
         groups.setdefault((one.roll_deg, one.constellation_deg or 0.0), []).append(one)
     every = [sorted(group, key=lambda one: one.exposure_s) for group in groups.values()]
-    chosen = np.unique(np.linspace(0, len(every) - 1, min(_GROUPS, len(every))).round().astype(int))
-    return [every[k] for k in chosen]
+    return evenly(every, _GROUPS)
 
 
 def _bands(photo: Photo) -> Iterator[tuple[int, int]]:

@@ -21,7 +21,7 @@ from .numbers import NUMBERS, Floats, channel_numbers, channel_of
 from .orders import needed_numbers, parabola
 from .smooth import smooth_curve
 from .stages import coarse, enlarged
-from .together import Shapes, halvings, measure_together
+from .together import Measured, Shapes, halvings, measure_together
 from .views import Pixels, View
 
 Tell = Callable[[float, str], None]
@@ -75,7 +75,7 @@ def compact(
     tell(0.0, f"{len(kept)} ghosts")
     with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
         found = _fewer(found, kept, views, pool, lambda part, words: tell(0.7 * part, words))
-    curves = curves_of(found, spans, views, lambda part, words: tell(0.7 + 0.3 * part, words))
+        curves = curves_of(found, spans, views, pool, lambda part, words: tell(0.7 + 0.3 * part, words))
     ghosts = tuple(
         _written(ghost, each, span, curve)
         for ghost, each, span, curve in zip(kept, found, spans, curves, strict=True)
@@ -120,7 +120,7 @@ def _fewer(
 ) -> list[Found]:
     """Drop numbers that do not help and fit the others, each ghost against all others, brightest first."""
     out = list(ghosts)
-    rest = [rest_of(out, views, m) for m in range(CHANNELS)]
+    rest = [rest_of(out, views, m, pool) for m in range(CHANNELS)]
     for done, k in enumerate(by_light(out)):
         old = out[k]
         new = _smaller(old, _fitted_numbers(kept[k]), views, rest, pool)
@@ -181,7 +181,11 @@ class _Said:
 
 
 def curves_of(
-    ghosts: Sequence[Found], spans: Sequence[tuple[float, float]], views: Sequence[View], tell: Tell
+    ghosts: Sequence[Found],
+    spans: Sequence[tuple[float, float]],
+    views: Sequence[View],
+    pool: ThreadPoolExecutor,
+    tell: Tell,
 ) -> list[Curves]:
     """Ask every frame again and turn what differs over the constellation into curves.
 
@@ -191,6 +195,7 @@ def curves_of(
     spans : sequence of tuple of float
         Where each is drawn, degrees.
     views : sequence of View
+    pool : executor
     tell : callable
 
     Returns
@@ -201,10 +206,14 @@ def curves_of(
     times = halvings(views[0].size_px[0])
     factor = 2.0**times
     shapes = [_sized(ghost, 1.0 / factor) for ghost in ghosts]
-    for k, full in enumerate(views):
-        view = coarse(full, times)
-        there = [g for g, span in enumerate(spans) if span[0] <= view.constellation_deg <= span[1]]
-        here = measure_together([shapes[g] for g in there], [Pose()] * len(there), view)
+    alive = [
+        [g for g, span in enumerate(spans) if span[0] <= view.constellation_deg <= span[1]] for view in views
+    ]  # fmt: skip
+
+    def one(view: View, there: list[int]) -> Measured:
+        return measure_together([shapes[g] for g in there], [Pose()] * len(there), coarse(view, times))
+
+    for k, (view, there, here) in enumerate(zip(views, alive, pool.map(one, views, alive), strict=True)):
         for g, pose, error, inside in zip(there, here.poses, here.error, here.inside, strict=True):
             if inside > 0.0 and isfinite(error[0]):
                 values = (pose.brightness, factor * pose.along_px, pose.size)

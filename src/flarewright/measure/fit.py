@@ -16,9 +16,11 @@ from ..kernels.measure_mesh import window_of
 from ..kernels.measure_misfit import weigh_misfit
 from ..kernels.measure_normal import normal_equations
 from ..kernels.measure_pupil import DISC_NUMBERS, FIRST_DISC, FIRST_G, FIRST_I, LATERAL, SOFT
-from .normal import inverse, solution
+from .marquardt import NEAR, descend
+from .normal import inverse
 from .numbers import NUMBERS, Floats
 from .room import Room
+from .shared_out import shared_out
 from .views import View, halved
 
 Indices = NDArray[np.int64]
@@ -346,6 +348,7 @@ def refine(
     error: float = MODEL_ERROR,
     tails: bool = True,
     alike: bool = True,
+    damping: float = NEAR,
     pool: ThreadPoolExecutor | None = None,
 ) -> Fit:
     """Fit one ghost's numbers to patches by Levenberg-Marquardt.
@@ -369,6 +372,8 @@ def refine(
         False: they count as all do.
     alike : bool
         Neighbours miss the model alike, see `witness`. False while most ghosts are unknown: the misfit is theirs then.
+    damping : float
+        See `marquardt.descend`.
     pool : executor, optional
         Runs the patches; sums are taken in their order.
 
@@ -378,11 +383,11 @@ def refine(
 
     Notes
     -----
-    Marquardt (1963): the damping scales with the diagonal. The Jacobian is the drawn picture's own derivative.
+    See `marquardt`; the Jacobian is the drawn picture's own derivative.
     """
     alike = alike and error > 0.0
     search = _Search(patches, free, width, offset, error, tails, alike, pool)
-    last, matrix = search.descend(shape, steps)
+    last, matrix = search.descend(shape, steps, damping)
     covariance = inverse(search.slopes(last)[0] if matrix is None else matrix)
     cost, count = sum(one.cost for one in last.missed), sum(one.count for one in last.missed)
     return Fit(last.shape, free, covariance, cost, count, witness(cost, count - free.size) if alike else 1.0)
@@ -428,31 +433,14 @@ class _Search:
     alike: bool
     pool: ThreadPoolExecutor | None
 
-    def descend(self, shape: Shape, steps: int) -> tuple[_State, Floats | None]:
-        """Go down step by step; return the last state, and its normal matrix when it is known.
-
-        Most steps that are tried are not taken, and derivatives cost many times what the picture does: they are drawn
-        only where a step begins.
-        """
-        at = self.look(shape)
-        damping = 1e-3
-        for _ in range(steps):
-            at = self.anew(at)
-            matrix, side = self.slopes(at)
-            for _retry in range(8):
-                step = solution(matrix + damping * np.diag(np.diag(matrix)), side)
-                trial = self.look(stepped(at.shape, self.free, step), at.prior)
-                if trial.cost < at.cost:
-                    break
-                damping = max(damping, 1e-4) * 6.0
-            else:
-                return at, matrix
-            gained, at = at.cost - trial.cost, trial
-            damping *= 0.2
+    def descend(self, shape: Shape, steps: int, damping: float = NEAR) -> tuple[_State, Floats | None]:
+        """Go down step by step; return the last state, and its normal matrix when it is known."""
+        return descend(
+            self.look(shape), steps, slopes=self.slopes, anew=self.anew,
+            moved=lambda at, step: self.look(stepped(at.shape, self.free, step), at.prior),
             # a search needs no more than its model is worth; a measurement ends where noise hides every step
-            if gained < (1e-4 if self.error > 0.0 else 1e-7) * at.cost:
-                break
-        return at, None
+            enough=1e-4 if self.error > 0.0 else 1e-7, damping=damping,
+        )  # fmt: skip
 
     def look(self, shape: Shape, prior: Floats | None = None) -> _State:
         """Return the state of a shape."""
@@ -483,7 +471,7 @@ class _Search:
 
     def each(self, work: Callable[..., Made], *given: Sequence[object]) -> list[Made]:
         """Return what is made of every patch, in their order."""
-        return list(map(work, *given) if self.pool is None else self.pool.map(work, *given))
+        return shared_out(work, *given, pool=self.pool)
 
 
 def stepped(shape: Shape, free: Indices, step: Floats) -> Shape:

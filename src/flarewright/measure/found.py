@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..kernels.measure_pupil import FIRST_DISC, FIRST_I
+from .evenly import evenly
 from .fit import Fit, Shape, light_of
+from .shared_out import shared_out
 from .views import Pixels, View
 
 CHANNELS = 3
@@ -42,17 +45,31 @@ def by_light(ghosts: Sequence[Found]) -> list[int]:
     return sorted(range(len(ghosts)), key=lambda k: -float(ghosts[k].shapes[1].numbers[FIRST_I]))
 
 
-def rest_of(ghosts: Sequence[Found], views: Sequence[View], channel: int) -> list[Pixels]:
+def rest_of(
+    ghosts: Sequence[Found], views: Sequence[View], channel: int, pool: ThreadPoolExecutor | None = None
+) -> list[Pixels]:
     """Return what the views show of a channel beside all ghosts, shape (H, W) each."""
-    out = []
-    for k, view in enumerate(views):
-        left = view.pixels[..., channel].astype(float)
+    return left_beside([view.pixels[..., channel] for view in views], ghosts, views, channel, pool)
+
+
+def left_beside(
+    pixels: Sequence[Pixels],
+    ghosts: Sequence[Found],
+    views: Sequence[View],
+    channel: int,
+    pool: ThreadPoolExecutor | None = None,
+) -> list[Pixels]:
+    """Return pictures of a channel, shape (H, W) each, without the ghosts that their views show."""
+
+    def one(k: int) -> Pixels:
+        left = pixels[k].astype(float)
         for ghost in ghosts:
             if ghost.first <= k <= ghost.last:
-                part, light = light_of(ghost.shapes[channel], view)
+                part, light = light_of(ghost.shapes[channel], views[k])
                 left[part] -= light
-        out.append(left.astype(np.float32))
-    return out
+        return left.astype(np.float32)
+
+    return shared_out(one, range(len(views)), pool=pool)
 
 
 def alone(ghost: Found, channel: int, views: Sequence[View], rest: Sequence[Pixels], most: int) -> list[View]:
@@ -67,10 +84,8 @@ def alone(ghost: Found, channel: int, views: Sequence[View], rest: Sequence[Pixe
         Of the channel.
     most : int
     """
-    run = np.arange(ghost.first, ghost.last + 1)
-    few = run[np.unique(np.linspace(0, run.size - 1, min(run.size, most)).round().astype(int))]
     out = []
-    for k in few:
+    for k in evenly(range(ghost.first, ghost.last + 1), most):
         own = rest[k].copy()
         part, light = light_of(ghost.shapes[channel], views[k])
         own[part] += light

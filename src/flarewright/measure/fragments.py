@@ -15,7 +15,7 @@ from .numbers import Floats
 from .views import Pixels, View
 
 # part of the squares explained by the smaller of two ghosts that one ghost may lose
-_LOST = 0.15
+_LOST = 0.08
 # centres may part by this much of the larger one's size, at the largest field; and the views that both must share
 _APART, _SHARED = 0.4, 0.5
 # how wide the pupil's middle is drawn where fits of one ghost begin: 1 is even, little is a bright core
@@ -55,14 +55,14 @@ def joined(
     is where g is little in the middle of the pupil, and no fit that began with an even disc gets there by itself.
     """
     out = list(ghosts)
-    rest = rest_of(out, views, 1)
+    rest = rest_of(out, views, 1, pool)
     for ghost in [out[k] for k in reversed(by_light(out))]:
         for other in _hosts(ghost, out):
             one = _as_one(other, ghost, views, rest, pool)
             if one is None:
                 continue
             out = [each for each in out if each is not ghost and each is not other] + [one]
-            rest = rest_of(out, views, 1)
+            rest = rest_of(out, views, 1, pool)
             size = abs(other.shapes[1].numbers[FIRST_G])
             tell(f"a ghost at speed {ghost.shapes[1].numbers[0]:.0f} px is a part of one of size {size:.0f} px")
             break

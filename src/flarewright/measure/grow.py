@@ -76,15 +76,16 @@ def grow(
     """
     width = views[0].size_px[0]
 
-    def polish(start: Shape, order: int, light: int, steps: int) -> tuple[Fit, list[Patch]] | None:
-        patches = patches_of(start, views, channel)
-        if not patches:
+    def polish(start: Shape, order: int, light: int, steps: int, old: Shape | None) -> tuple[Fit, list[Patch]] | None:
+        # a ghost that shrinks shall not forget the light that it leaves
+        patches = patches_of(start, views, channel, beside=old)
+        if not patches or (old is not None and not patches_of(start, views, channel)):
             return None
         free = free_numbers(order, start.discs, light, most.soft and order > 0)
         fit = refine(start, patches, free, width=width, steps=steps, error=most.error, alike=most.alike, pool=pool)
         return fit, patches
 
-    found = polish(shape, 0, 0, 8)
+    found = polish(shape, 0, 0, 8, None)
     order = 0
     while found is not None:
         fit, patches = found
@@ -94,13 +95,13 @@ def grow(
             before = cost_of(fit.shape, patches, error=most.error)
             if grown is not None and cost_of(grown, patches, error=most.error) < (1.0 - RIM_PAYS) * before:
                 # a rim may leave too little to fit: then it is none
-                rimmed = polish(grown, order, min(order, most.intensity_order), 6)
+                rimmed = polish(grown, order, min(order, most.intensity_order), 6, fit.shape)
                 if rimmed is not None:
                     found = rimmed
                     continue
         if order >= most.order:
             break
-        higher = polish(fit.shape, order + 1, min(order + 1, most.intensity_order), 10)
+        higher = polish(fit.shape, order + 1, min(order + 1, most.intensity_order), 10, shape)
         if higher is None:
             break
         before = cost_of(fit.shape, higher[1], error=most.error)

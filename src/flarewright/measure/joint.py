@@ -18,6 +18,7 @@ from ..kernels.measure_changes import draw_with_changes
 from ..kernels.measure_edges import sum_along_rows, sum_changes_along_rows
 from ..kernels.measure_mesh import window_of
 from ..kernels.measure_pupil import FIRST_I
+from .evenly import evenly
 from .fit import ALIKE, MODEL_ERROR, Indices, Shape, priors, scaled, witness
 from .found import CHANNELS, Found
 from .numbers import Floats
@@ -146,7 +147,6 @@ def _pictures(
 ) -> list[_Picture]:
     """Draw what each number of each ghost's light would add to some views."""
     times = max(0, int(np.ceil(np.log2(views[0].size_px[0] / _WIDTH))))
-    few = np.unique(np.linspace(0, len(views) - 1, min(len(views), _VIEWS)).round().astype(int))
 
     def one(k: int) -> _Picture:
         view = views[k]
@@ -168,7 +168,7 @@ def _pictures(
         columns = columns - ((weight @ columns) / total).astype(np.float32)
         return _Picture(shown, columns, light, there, seen - float(weight @ seen) / total, weight)
 
-    return list((map if pool is None else pool.map)(one, [int(k) for k in few]))
+    return list((map if pool is None else pool.map)(one, evenly(range(len(views)), _VIEWS)))
 
 
 def _add(shape: Shape, sigma: float, frame: Floats, basis: NDArray[np.float32]) -> Floats:

@@ -27,6 +27,7 @@ from ..model.capture import CameraNoise, Capture, FrameInfo, Matrix3, MergedFram
 from .calibrate import Calibration, calibrate
 from .contradiction import refuse_contradiction
 from .drift import without_drift
+from .evenly import evenly
 from .geometry import Geometry, Seen, believable, solve_geometry
 from .light import Sighting, find_light
 from .merge import exposure_ratios, merge, refuse_damage, without_idle_digits
@@ -354,8 +355,7 @@ def _geometry(merged: Sequence[_Merged], found: Sequence[bool], output: Path, kn
             if len(far) < 4:
                 far = [one for one, arm in zip(visible, arms, strict=True) if arm > least * known.size_px[0]]
         frames = []
-        for k in np.unique(np.linspace(0, len(far) - 1, min(_MIRRORED, len(far))).round().astype(int)):
-            one = far[int(k)]
+        for one in evenly(far, _MIRRORED):
             info = FrameInfo(file=one.file, constellation_deg=0.0, nominal_deg=0.0, light_px=one.sighting.position_px,
                              axis_px=foot)  # fmt: skip
             frame = read_frame(output, info)

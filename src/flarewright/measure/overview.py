@@ -11,6 +11,7 @@ from ..errors import FlarewrightError
 from ..io.merged import read_frame
 from ..io.png import write_png
 from ..model.capture import FrameInfo, MergedFrame, MergedRun
+from .evenly import evenly
 
 Floats = NDArray[np.float64]
 
@@ -104,8 +105,8 @@ def _laid_over(folder: Path, run: MergedRun) -> tuple[Floats, int]:
     width, height = run.size_px
     block = -(-width // _WIDTH)
     brightest = np.zeros((height // block, width // block, 3))
-    for k in np.unique(np.linspace(0, len(run.frames) - 1, min(_FRAMES, len(run.frames))).round().astype(int)):
-        light = frame_of(folder, run, run.frames[int(k)]).radiance
+    for info in evenly(run.frames, _FRAMES):
+        light = frame_of(folder, run, info).radiance
         part = light[: brightest.shape[0] * block, : brightest.shape[1] * block].astype(np.float64)
         parts = part.reshape(brightest.shape[0], block, brightest.shape[1], block, 3)
         brightest = np.maximum(brightest, parts.mean(axis=(1, 3)))

@@ -13,13 +13,14 @@ from numpy.typing import NDArray
 
 from ..kernels.measure_pupil import FIRST_G, FIRST_I
 from ..model.ghost_model import Blades
+from .evenly import evenly
 from .find import Candidate, candidates, slopes_of
 from .fit import Shape, brightens, cost_of, light_of, patches_of, presence, render
-from .found import Found, darkened, rest_of
+from .found import Found, darkened, left_beside, rest_of
 from .grow import Growth, grow
+from .jointly import fitted_jointly
 from .journal import Journal
 from .numbers import NUMBERS, with_blades
-from .settle import touch_up
 from .specks import RADII, highest_near, specks
 from .views import Pixels, View, distances
 
@@ -42,7 +43,12 @@ SPECK, BESIDE_SPECK = 3.5, 3.0
 COVERS, LIT, _LOOKED = 0.35, 0.1, 4
 # who was refused is tried again when twice as many ghosts are known, and so many more
 _SOON = 2
-# views that a first fit looks at
+# steps of all ghosts at once after some were found
+_TOUCHES = 8
+# candidates that are looked for beside those that were refused, and more, so that not every refusal is a new search
+_TRIALS, _SPARE = 12, 20
+# views that vote, and that a first fit looks at
+VOTERS = 50
 _FEW = 16
 # two views tell place and size, and nothing of whether it goes along with the light
 _LEAST_VIEWS = 3
@@ -113,15 +119,23 @@ def pursue(
         replace(view, variance=np.where(mask[..., None], view.variance, np.inf).astype(np.float32))
         for view, mask in zip(views, masks, strict=True)
     ]
-    rest = rest_of(known, shown, 1)
+    wanted = rest_of(known, shown, 1, pool)
+    rest = list(wanted)
     found: list[Found] = []
     # each with how many ghosts were known when it was
     refused: list[tuple[Candidate, int]] = []
     waiting = list(first)
     steps = journal or Journal()
     fallen = _Fallen(progress)
+    rims: list[Candidate] = []
+    small: list[Candidate] = []
+    known_to = 0
     while len(found) < most:
-        votes = steps.step(partial(_candidates, shown, rest, masks, 12 + len(refused), iris, pool))
+        asked = _TRIALS + len(refused)
+        if asked > known_to:
+            known_to = asked + _SPARE
+            rims, small = steps.step(partial(_candidates, shown, rest, masks, known_to, iris, pool))
+        votes = sorted([*rims[:asked], *small[:asked]], key=lambda each: -each.score)
         trials = _open([each for each in votes if each.score > SCORE], refused, len(found))
         fallen(trials[0].score if trials else SCORE, len(found))
         taken: list[Candidate] = []
@@ -147,7 +161,11 @@ def pursue(
         if not trials:
             break
         if taken:
-            found = touch_up(found, shown, rest, steps=4, pool=pool, journal=steps)
+            shapes = steps.step(partial(fitted_jointly, found, shown, wanted, 1, steps=_TOUCHES, pool=pool))
+            found = [replace(ghost, shapes=(one, one, one)) for ghost, one in zip(found, shapes, strict=True)]
+            rest = left_beside(wanted, found, shown, 1, pool)
+            # who voted for what was there before has to look again
+            known_to = 0
     return found
 
 
@@ -185,11 +203,19 @@ def _candidates(
     most: int,
     iris: Blades | None,
     pool: ThreadPoolExecutor | None,
-) -> list[Candidate]:
-    slopes = slopes_of(_doubted(views, rest), rest, masks, pool=pool)
+) -> tuple[list[Candidate], list[Candidate]]:
+    """Return the best rims and the best specks, best first."""
+    # with more of them a vote costs more and tells no more: `SCORE` is what chance reaches with so many
+    voters = evenly(range(len(views)), VOTERS)
+    seen, left, where = evenly(views, VOTERS), evenly(rest, VOTERS), evenly(masks, VOTERS)
+    slopes = slopes_of(_doubted(seen, left), left, where, pool=pool)
     rims = candidates(slopes, views[0].size_px[0], most=most, iris=iris, pool=pool)
-    small = specks(_doubted(views, rest, beside=True), rest, masks, most=most, pool=pool)
-    return sorted([*rims, *small], key=lambda each: -each.score)
+    small = specks(_doubted(seen, left, beside=True), left, where, most=most, pool=pool)
+
+    def numbered(some: Sequence[Candidate]) -> list[Candidate]:
+        return [replace(each, first=voters[each.first], last=voters[each.last]) for each in some]
+
+    return numbered(rims), numbered(small)
 
 
 def _doubted(views: Sequence[View], rest: Sequence[Pixels], *, beside: bool = False) -> list[View]:
@@ -229,9 +255,8 @@ def _try(
     trial: Candidate, views: Sequence[View], rest: Sequence[Pixels], pool: ThreadPoolExecutor | None
 ) -> Found | None:
     """Fit a candidate and judge it."""
-    run = np.arange(trial.first, trial.last + 1)
-    few = run[np.unique(np.linspace(0, run.size - 1, min(run.size, _FEW)).round().astype(int))]
-    shown = _alone(views, rest, list(few))
+    few = evenly(range(trial.first, trial.last + 1), _FEW)
+    shown = _alone(views, rest, few)
     starts = [trial]
     if trial.radius <= SPECK:
         shown = [_near(trial, view) for view in shown]

@@ -17,6 +17,7 @@ from ..model.ghost_model import GhostModel
 from ..model.ghost_tracks import Tracks
 from ..render.chart import COLOURS, Series, chart, number
 from ..render.page import figures, image, page, remark_list, section, table
+from .evenly import evenly
 from .overview import overview_picture
 from .report_frames import frames_section, outlines_section, place_of, replays_section
 from .report_ghosts import ghosts_section, paths_of
@@ -70,7 +71,7 @@ def write_report(
     lead = f"{len(run.frames)} frames of {run.size_px[0]} x {run.size_px[1]} pixels, the light seen in {seen}; " + (
         "no ghosts were looked for yet" if model is None else f"{len(model.ghosts)} ghosts"
     )
-    chosen = [run.frames[k] for k in _spread(len(run.frames), _FRAMES)]
+    chosen = evenly(run.frames, _FRAMES)
     sections = [remark_list(remarks), _captures(folder, run), _geometry(run)]
     colours: dict[str, str] = {}
     if model is None:
@@ -116,10 +117,6 @@ def strange(run: MergedRun, model: GhostModel) -> str | None:
         low, high_deg = model.constellation_deg
         return f"it was measured from {low:.1f} to {high_deg:.1f} degrees, where there are no frames"
     return None
-
-
-def _spread(count: int, most: int) -> list[int]:
-    return [int(k) for k in np.unique(np.linspace(0, count - 1, min(most, count)).round().astype(int))]
 
 
 def _captures(folder: Path, run: MergedRun) -> str:

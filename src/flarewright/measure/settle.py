@@ -12,16 +12,19 @@ import numpy as np
 from ..kernels.measure_pupil import DISC_NUMBERS, FIRST_DISC, FIRST_I
 from ..model.ghost_model import AberrationGhost, Blades
 from .find import rims_of
-from .fit import Fit, Shape, free_numbers, improve, patches_of, presence, refine
+from .fit import Fit, Shape, cost_of, free_numbers, improve, patches_of, presence, refine
 from .found import CHANNELS, Found, alone, by_light, exchange, rest_of
 from .grow import RIM_PAYS, Growth, grow
 from .joint import lit
+from .jointly import fitted_jointly
 from .journal import Journal
 from .numbers import blades_of, channel_of, with_blades
 from .views import Pixels, View
 
 # views by which the best rim is chosen
 _FEW = 8
+# steps of all ghosts at once
+_STEPS = 10
 
 
 @dataclass(frozen=True)
@@ -81,7 +84,9 @@ def settle(
     steps = journal or Journal()
     for turn in range(how.rounds):
         ghosts = lit(ghosts, views, pool=pool)
-        rest = [rest_of(ghosts, views, m) for m in range(CHANNELS)]
+        # in small pictures, and every ghost in its own after that: what is told of its errors is of these
+        ghosts = _jointly(ghosts, views, pool, steps)
+        rest = [rest_of(ghosts, views, m, pool) for m in range(CHANNELS)]
         for done, k in enumerate(by_light(ghosts)):
             old = ghosts[k]
             ghosts[k] = steps.step(partial(_again, old, views, rest, how, iris, pool))
@@ -92,6 +97,28 @@ def settle(
         ghosts = lit(ghosts, views, pool=pool)
         tell(f"round {turn + 1}: {len(ghosts)} of {before} ghosts are needed")
     return [ghosts[k] for k in by_light(ghosts)]
+
+
+def _jointly(
+    ghosts: Sequence[Found], views: Sequence[View], pool: ThreadPoolExecutor | None, steps: Journal
+) -> list[Found]:
+    """Fit all ghosts at once; before any of them was fitted green speaks for the form of all colours."""
+    out = list(ghosts)
+    first = all(ghost.fits[1] is None for ghost in ghosts)
+    for m in (1,) if first else (1, 0, 2):
+        pixels = [view.pixels[..., m] for view in views]
+        for k, shape in enumerate(steps.step(partial(fitted_jointly, out, views, pixels, m, steps=_STEPS, pool=pool))):
+            shapes = [_like_green(shape, old) if first else old for old in out[k].shapes]
+            shapes[m] = shape
+            out[k] = replace(out[k], shapes=(shapes[0], shapes[1], shapes[2]))
+    return out
+
+
+def _like_green(green: Shape, own: Shape) -> Shape:
+    """Return green's form with the light of another colour."""
+    numbers = green.numbers.copy()
+    numbers[FIRST_I:FIRST_DISC] = own.numbers[FIRST_I:FIRST_DISC]
+    return replace(green, numbers=numbers)
 
 
 def _again(
@@ -108,8 +135,7 @@ def _again(
     for m in (1, 0, 2):
         shown = alone(ghost, m, views, rest[m], how.views)
         if m == 1 and ghost.fits[1] is None:
-            start = _rimmed(shapes[1], shown, m, iris, pool)
-            fits[m] = grow(start, shown, m, most=how.most, pool=pool) or fits[m]
+            fits[m] = _grown(_rimmed(shapes[1], shown, m, iris, pool), shown, m, how.most, pool) or fits[m]
         else:
             start = shapes[m] if ghost.fits[m] is not None or m == 1 else _like(shapes[1], shapes[m], shown, m)
             fits[m] = _refined(start, shown, m, fits[1], pool) or fits[m]
@@ -117,6 +143,21 @@ def _again(
         if fit is not None:
             shapes[m] = fit.shape
     return replace(ghost, shapes=(shapes[0], shapes[1], shapes[2]), fits=(fits[0], fits[1], fits[2]))
+
+
+def _grown(
+    start: Shape, shown: Sequence[View], channel: int, most: Growth, pool: ThreadPoolExecutor | None
+) -> Fit | None:
+    """Fit a ghost for the first time, with the rims that a search gave it and without: others were not known then."""
+    fit = grow(start, shown, channel, most=most, pool=pool)
+    if fit is None or not start.discs:
+        return fit
+    bare = grow(without_discs(start), shown, channel, most=most, pool=pool)
+    if bare is None:
+        return fit
+    patches = patches_of(fit.shape, shown, channel, beside=bare.shape)
+    costs = [cost_of(each.shape, patches, error=most.error) for each in (fit, bare)]
+    return bare if costs[1] * (1.0 - RIM_PAYS) ** (fit.shape.discs - bare.shape.discs) <= costs[0] else fit
 
 
 def _rimmed(
@@ -157,59 +198,15 @@ def kinds_of(shape: Shape, iris: Blades | None) -> list[Shape]:
             numbers = with_blades(shape.numbers, kind)
             found.append(replace(shape, numbers=numbers))
             if shape.discs:
-                bare = numbers.copy()
-                bare[FIRST_DISC : FIRST_DISC + DISC_NUMBERS * shape.discs] = 0.0
-                found.append(replace(shape, numbers=bare, discs=0))
+                found.append(without_discs(replace(shape, numbers=numbers)))
     return found
 
 
-def touch_up(
-    ghosts: list[Found],
-    views: Sequence[View],
-    rest: list[Pixels],
-    *,
-    steps: int,
-    pool: ThreadPoolExecutor | None,
-    journal: Journal,
-) -> list[Found]:
-    """Fit the green of every ghost anew, a few steps each, against the others' newest.
-
-    Parameters
-    ----------
-    ghosts : list of Found
-        All colours alike.
-    views : sequence of View
-    rest : list of ndarray, shape (H, W)
-        Green beside all ghosts; brought up to date.
-    steps : int
-    pool : executor or None
-    journal : Journal
-
-    Returns
-    -------
-    list of Found
-    """
-    out = list(ghosts)
-    for k in by_light(ghosts):
-        ghost = out[k]
-        shape = ghost.shapes[1]
-        new = journal.step(partial(_touched, ghost, views, rest, steps, pool))
-        if new is None:
-            continue
-        exchange(shape, new, ghost, views, rest)
-        out[k] = replace(ghost, shapes=(new, new, new))
-    return out
-
-
-def _touched(
-    ghost: Found, views: Sequence[View], rest: list[Pixels], steps: int, pool: ThreadPoolExecutor | None
-) -> Shape | None:
-    shape = ghost.shapes[1]
-    patches = patches_of(shape, alone(ghost, 1, views, rest, 14), 1)
-    if not patches:
-        return None
-    free = free_numbers(1, shape.discs, 1)
-    return improve(shape, patches, free, width=views[0].size_px[0], steps=steps, alike=False, pool=pool)[0]
+def without_discs(shape: Shape) -> Shape:
+    """Return a shape that no rim cuts but its first."""
+    numbers = shape.numbers.copy()
+    numbers[FIRST_DISC : FIRST_DISC + DISC_NUMBERS * shape.discs] = 0.0
+    return replace(shape, numbers=numbers, discs=0)
 
 
 def _like(green: Shape, own: Shape, alone: Sequence[View], channel: int) -> Shape:

@@ -6,6 +6,7 @@ import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -34,6 +35,7 @@ from .pursuit import pursue
 from .reach import with_reaches
 from .replay import draw, light_px
 from .settle import Settling, settle, to_model
+from .shared_out import shared_out
 from .speck_sprites import covered, hidden, speck_sprites, specks_of
 from .specks_drawn import draw_specks
 from .spike_fit import spike_sprites
@@ -187,7 +189,7 @@ def find_ghosts(
         When frames cannot be read or are too few, or a correction points at nothing.
     """
     views = read_views(folder, run, every)
-    dim = _dimmed_beside([], views, _star_of(views))
+    dim = _dimmed_beside([], views, _star_of(views), None)
     times, small = _for_search(dim.views)
     iris = iris_of(dim.star)
     known = corrections or Corrections()
@@ -260,23 +262,23 @@ def fit_ghosts(
     if len(found) < len(given):
         raise FlarewrightError("a Bezier ghost cannot be fitted over all constellations; take it out of the model")
     settling = how or Settling(rounds=1)
-    dim = _dimmed_beside(found, views, _star_of(views))
-    iris = iris_of(dim.star)
     with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
+        dim = _dimmed_beside(found, views, _star_of(views), pool)
+        iris = iris_of(dim.star)
         parts = iter(_parts(2 * again + 1, progress))
         settled = settle(
             found, dim.views, how=settling, iris=iris, pool=pool, tell=tell, progress=next(parts), journal=journal
         )
         for _ in range(again):
             # with more ghosts known, the glow is better known and leaves more to be found
-            dim = _dimmed_beside(settled, views, dim.star)
+            dim = _dimmed_beside(settled, views, dim.star, pool)
             settled += _more(settled, dim.views, most - len(settled), iris, pool, tell, next(parts), journal)
             settled = _whole(settled, dim.views, pool, tell)
             settled = settle(
                 settled, dim.views, how=settling, iris=iris, pool=pool, tell=tell, progress=next(parts),
                 journal=journal,
             )  # fmt: skip
-    dim = _dimmed_beside(settled, views, dim.star)
+        dim = _dimmed_beside(settled, views, dim.star, pool)
     wanted = [ghost for ghost in settled if not ghost.unwanted]
     return with_rest(_model(run, to_model(wanted, views), dim, views), views, threads)
 
@@ -291,26 +293,23 @@ def with_rest(model: GhostModel, views: Sequence[View], threads: int | None = No
         As photographed.
     threads : int, optional
     """
-    left, placed = [], []
-    for view in views:
-        ghosts = draw(model, view.constellation_deg, view.roll_deg, view.size_px)
-        known = np.where(np.isfinite(view.variance), view.pixels, np.nan)
-        placed.append(replace(view, light_px=_light_of(model, view, view.roll_deg)))
-        left.append((known - ghosts - _light(model.halo, model.star, placed[-1])).astype(np.float32))
-    specks = specks_of(model, placed)
-    # a speck is so much brighter than what is around it that coarse cells would spread its errors over that
-    masks = covered(specks, placed, left)
-    spikes = spike_sprites(placed, _all_hidden(left, masks), model.star)
-    left = _beside_sprites(left, spikes, placed)
-    # coarse pictures overshoot beside the light's image, which finer ones only mend where something is known
-    around = [around_light(view, each) for view, each in zip(placed, _all_hidden(left, masks), strict=True)]
-    going = light_sprites(placed, around, model.star is not None)
-    left = _beside_sprites(left, going, placed)
-    # next to the light a pixel's error is brighter than all that turns about the axis
-    next_to_light = [_off_light(view) < NEXT_TO_LIGHT * view.size_px[0] for view in placed]
-    axis = axis_sprite(placed, _all_hidden(_all_hidden(left, masks), next_to_light))
-    left = _beside_sprites(left, (axis,), placed)
-    small = speck_sprites(specks, placed, left, masks_of(placed))
+    with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
+        placed = [replace(view, light_px=_light_of(model, view, view.roll_deg)) for view in views]
+        left = shared_out(partial(_left_by, model), placed, pool=pool)
+        specks = specks_of(model, placed)
+        # a speck is so much brighter than what is around it that coarse cells would spread its errors over that
+        masks = covered(specks, placed, left)
+        spikes = spike_sprites(placed, _all_hidden(left, masks), model.star)
+        left = _beside_sprites(left, spikes, placed, pool)
+        # coarse pictures overshoot beside the light's image, which finer ones only mend where something is known
+        around = shared_out(around_light, placed, _all_hidden(left, masks), pool=pool)
+        going = light_sprites(placed, around, model.star is not None)
+        left = _beside_sprites(left, going, placed, pool)
+        # next to the light a pixel's error is brighter than all that turns about the axis
+        next_to_light = [_off_light(view) < NEXT_TO_LIGHT * view.size_px[0] for view in placed]
+        axis = axis_sprite(placed, _all_hidden(_all_hidden(left, masks), next_to_light))
+        left = _beside_sprites(left, (axis,), placed, pool)
+        small = speck_sprites(specks, placed, left, masks_of(placed))
     moving = with_moves(model.replace(sprites=(*spikes, *going, axis, *small)), threads)
     packed = pack(moving)
     left = [
@@ -320,14 +319,23 @@ def with_rest(model: GhostModel, views: Sequence[View], threads: int | None = No
     return with_reaches(with_detail(moving, placed, _all_hidden(left, next_to_light), threads), placed, threads)
 
 
+def _left_by(model: GhostModel, view: View) -> Pixels:
+    """Return what a view shows beside a model's ghosts, halo and star; not a number where it was not measured."""
+    known = np.where(np.isfinite(view.variance), view.pixels, np.nan)
+    ghosts = draw(model, view.constellation_deg, view.roll_deg, view.size_px)
+    return np.asarray(known - ghosts - _light(model.halo, model.star, view), dtype=np.float32)
+
+
 def _all_hidden(pictures: Sequence[Pixels], masks: Sequence[NDArray[np.bool_]]) -> list[Pixels]:
     """Return pictures with what is in their masks not measured."""
     return [hidden(each, mask) for each, mask in zip(pictures, masks, strict=True)]
 
 
-def _beside_sprites(left: Sequence[Pixels], sprites: Sequence[Sprite], views: Sequence[View]) -> list[Pixels]:
+def _beside_sprites(
+    left: Sequence[Pixels], sprites: Sequence[Sprite], views: Sequence[View], pool: ThreadPoolExecutor
+) -> list[Pixels]:
     """Take sprites off what is left of views."""
-    return [each - drawn(sprites, view) for each, view in zip(left, views, strict=True)]
+    return shared_out(lambda each, view: each - drawn(sprites, view), left, views, pool=pool)
 
 
 def around_light(view: View, pixels: Pixels) -> Pixels:
@@ -370,11 +378,13 @@ def _light_of(model: GhostModel, view: View, roll_deg: float) -> tuple[float, fl
     return view.light_px if inside and off < _NEAR_LAW * view.size_px[0] else told
 
 
-def _dimmed_beside(ghosts: Sequence[Found], views: Sequence[View], star: Star | None) -> Dimmed:
+def _dimmed_beside(
+    ghosts: Sequence[Found], views: Sequence[View], star: Star | None, pool: ThreadPoolExecutor | None
+) -> Dimmed:
     """Learn the halo, and how strong a star is, from what is left beside known ghosts, and take both off the views."""
-    left = [without(ghosts, view, k) for k, view in enumerate(views)]
+    left = shared_out(partial(without, ghosts), views, range(len(views)), pool=pool)
     halo, star = followed(views, left, masks_of(views), fit_halo(views, left), star)
-    return Dimmed(beside(views, halo, star), halo, star)
+    return Dimmed(beside(views, halo, star, pool), halo, star)
 
 
 def _parts(count: int, progress: Progress) -> list[Progress]:
@@ -382,14 +392,17 @@ def _parts(count: int, progress: Progress) -> list[Progress]:
     return [lambda part, words, k=k: progress((k + part) / count, words) for k in range(count)]  # type: ignore[misc]
 
 
-def beside(views: Sequence[View], halo: Halo | None, star: Star | None) -> list[View]:
+def beside(
+    views: Sequence[View], halo: Halo | None, star: Star | None, pool: ThreadPoolExecutor | None = None
+) -> list[View]:
     """Return what views show beside halo and star, less certain where those are bright; nothing around the light."""
-    out = []
-    for view, mask in zip(views, masks_of(views), strict=True):
+
+    def one(view: View, mask: NDArray[np.bool_]) -> View:
         light = _light(halo, star, view)
         variance = np.where(mask[..., None], view.variance + (LEFT_BEHIND * light) ** 2, np.inf).astype(np.float32)
-        out.append(replace(view, pixels=view.pixels - light, variance=variance))
-    return out
+        return replace(view, pixels=view.pixels - light, variance=variance)
+
+    return shared_out(one, views, masks_of(views), pool=pool)
 
 
 def _light(halo: Halo | None, star: Star | None, view: View) -> Pixels:

@@ -9,14 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..kernels.measure_changes import draw_with_changes
-from ..kernels.measure_edges import sum_along_rows, sum_changes_along_rows
 from ..kernels.measure_mesh import window_of
 from ..kernels.measure_pupil import FIRST_G, FIRST_I
+from ..kernels.measure_together import add_together, ghost_changes
 from .curves import Pose, posed
 from .fit import MODEL_ERROR, OUTLIER, Shape
 from .found import CHANNELS
 from .normal import inverse, solution
 from .numbers import Floats
+from .room import Room
 from .views import View
 
 Shapes = tuple[Shape, Shape, Shape]
@@ -33,6 +34,7 @@ _DARK = 10.0
 _GAIN = 1e-3
 # the derivatives that make a shift and a change of size
 _FREE = np.array([0, *range(FIRST_G, FIRST_I)], dtype=np.int64)
+_PLANES, _CHANGES = Room(), Room()
 
 
 def halvings(width: int) -> int:
@@ -69,12 +71,11 @@ class Measured:
 
 @dataclass(frozen=True)
 class _Drawn:
-    """A ghost with its derivatives inside its window, one colour."""
+    """One colour of all ghosts of a view: their sum, and what each adds and changes, see `kernels.measure_together`."""
 
-    ghost: int
-    part: tuple[slice, slice]
     picture: Floats
-    changes: Floats
+    pixels: Floats
+    windows: NDArray[np.int64]
 
 
 def measure_together(
@@ -112,19 +113,21 @@ def measure_together(
     # or it would stand in for a ghost that fills the picture, and be far below 0 beside one that is far too bright
     prior[size:] = 1.0 / _evenness(view) ** 2
     # a ghost far from where it is foretold looks like an outlier: these count less only near the end
+    drawn = _drawn(ghosts, poses, view)
     for doubting in (False, True) if sure else (False,):
-        matrix, side, cost, count = _normal(ghosts, poses, view, sure, doubting)
+        matrix, side, cost, count = _normal(drawn, view, size, sure, doubting)
         for _ in range(steps):
             off = np.array([_difference(e, p) for e, p in zip(expected, poses, strict=True)]).reshape(-1, PER_GHOST)
             pulled = side.copy()
             pulled[:size] += prior[:size] * off.ravel()
             step = solution(matrix + np.diag(prior + 1e-12), pulled)[:size]
             trial = [_stepped(*each) for each in zip(poses, step.reshape(-1, PER_GHOST), spread, strict=True)]
-            there = _normal(ghosts, trial, view, sure, doubting)
+            redrawn = _drawn(ghosts, trial, view)
+            there = _normal(redrawn, view, size, sure, doubting)
             if there[2] > cost:
                 break
             enough = there[2] > (1.0 - _GAIN) * cost
-            poses, (matrix, side, cost, count) = trial, there
+            poses, drawn, (matrix, side, cost, count) = trial, redrawn, there
             if enough:
                 break
     whole = inverse(matrix + np.diag(prior + 1e-12))[:size, :size]
@@ -167,42 +170,23 @@ def _stepped(pose: Pose, step: Floats, limit: Floats) -> Pose:
 
 
 def _normal(
-    ghosts: Sequence[Shapes], poses: Sequence[Pose], view: View, sure: bool, doubting: bool
+    drawn: Sequence[_Drawn], view: View, size: int, sure: bool, doubting: bool
 ) -> tuple[Floats, Floats, float, int]:
-    """Return the normal matrix, its right side, the cost of a view, and how many numbers it has."""
-    size = PER_GHOST * len(ghosts) + CHANNELS
-    matrix, side, total, count = np.zeros((size, size)), np.zeros(size), 0.0, 0
-    for m in range(CHANNELS):
-        drawn = [_draw(g, shapes[m], pose, view) for g, (shapes, pose) in enumerate(zip(ghosts, poses, strict=True))]
-        there = [one for one in drawn if one is not None]
-        picture = np.zeros(view.pixels.shape[:2])
-        for one in there:
-            picture[one.part] += poses[one.ghost].brightness * one.picture
-        variance = view.variance[..., m].astype(np.float64)
-        weight = _weights(view.pixels[..., m], variance, picture, sure)
-        level = PER_GHOST * len(ghosts) + m
+    """Return the normal matrix, its right side, the cost of a view, and how many numbers it has.
+
+    `size` numbers are the ghosts', those of the even backgrounds come after them.
+    """
+    matrix, side = np.zeros((size + CHANNELS, size + CHANNELS)), np.zeros(size + CHANNELS)
+    total, count = 0.0, 0
+    for m, colour in enumerate(drawn):
+        weight = _weights(view.pixels[..., m], view.variance[..., m].astype(np.float64), colour.picture, sure)
         # the even background is best known without ghosts; it is refitted with them below
-        left = view.pixels[..., m] - picture
-        left = np.where(weight > 0.0, left, 0.0)
+        left = np.where(weight > 0.0, view.pixels[..., m] - colour.picture, 0.0)
         if doubting:
             weight = weight / (1.0 + weight * left**2 / OUTLIER**2)
         total += float((weight * left**2).sum())
         count += int(np.count_nonzero(weight))
-        matrix[level, level] += float(weight.sum())
-        side[level] += float((weight * left).sum())
-        for a, one in enumerate(there):
-            rows = slice(PER_GHOST * one.ghost, PER_GHOST * one.ghost + PER_GHOST)
-            weighted = one.changes * weight[one.part][..., None]
-            side[rows] += np.einsum("ijk,ij->k", weighted, left[one.part])
-            ones = weighted.sum(axis=(0, 1))
-            matrix[rows, level] += ones
-            matrix[level, rows] += ones
-            for other in there[a:]:
-                block = _overlap(one, weighted, other)
-                columns = slice(PER_GHOST * other.ghost, PER_GHOST * other.ghost + PER_GHOST)
-                matrix[rows, columns] += block
-                if other is not one:
-                    matrix[columns, rows] += block.T
+        add_together(colour.pixels, colour.windows, weight, left, size + m, matrix, side)
     return matrix, side, total, count
 
 
@@ -212,36 +196,31 @@ def _weights(pixels: NDArray[np.float32], variance: Floats, picture: Floats, sur
     return np.asarray(np.where(known, 1.0 / (np.where(known, variance, 1.0) + error**2), 0.0))
 
 
-def _draw(ghost: int, shape: Shape, pose: Pose, view: View) -> _Drawn | None:
-    """Draw a ghost as bright as foretold, and what changes with brightness, shift and size."""
-    numbers = posed(shape.numbers, view.sigma, Pose(1.0, pose.along_px, pose.size))
-    left, top, width, height = window_of(numbers, shape.discs, view.sigma, view.frame, *view.size_px)
-    if not width:
-        return None
-    plane, changes = np.zeros((height, width + 1)), np.zeros((height, width + 1, _FREE.size))
-    draw_with_changes(numbers, shape.discs, view.sigma, _FREE, view.frame, left, top, plane, changes)
-    sum_along_rows(plane)
-    sum_changes_along_rows(changes)
-    picture, by = plane[:, :width], changes[:, :width]
-    # a ghost that is not seen has no place either: its light, not below a tenth, scales what place and size change
-    level = max(pose.brightness, 0.1)
-    shift = level * by[..., 0] / view.sigma if view.sigma > 0.0 else np.zeros_like(picture)
-    growth = level * (by[..., 1:] @ shape.numbers[FIRST_G:FIRST_I])
-    part = (slice(top, top + height), slice(left, left + width))
-    return _Drawn(ghost, part, picture, np.stack([picture, shift, growth], axis=-1))
+def _drawn(ghosts: Sequence[Shapes], poses: Sequence[Pose], view: View) -> list[_Drawn]:
+    """Draw every colour of all ghosts as they are foretold, with what changes with brightness, shift and size."""
+    return [_colour([shapes[m] for shapes in ghosts], poses, view) for m in range(CHANNELS)]
 
 
-def _overlap(one: _Drawn, weighted: Floats, other: _Drawn) -> Floats:
-    """Return the products of two ghosts' derivatives where their windows meet, shape (3, 3)."""
-    spans = []
-    for a, b in zip(one.part, other.part, strict=True):
-        low, high = max(a.start, b.start), min(a.stop, b.stop)
-        if high <= low:
-            return np.zeros((PER_GHOST, PER_GHOST))
-        spans.append((slice(low - a.start, high - a.start), slice(low - b.start, high - b.start)))
-    mine = weighted[spans[0][0], spans[1][0]].reshape(-1, PER_GHOST)
-    theirs = other.changes[spans[0][1], spans[1][1]].reshape(-1, PER_GHOST)
-    return np.asarray(mine.T @ theirs, dtype=np.float64)
+def _colour(shapes: Sequence[Shape], poses: Sequence[Pose], view: View) -> _Drawn:
+    picture = np.zeros(view.pixels.shape[:2])
+    windows, pixels, end = [], [np.zeros((0, PER_GHOST))], 0
+    for g, (shape, pose) in enumerate(zip(shapes, poses, strict=True)):
+        numbers = posed(shape.numbers, view.sigma, Pose(1.0, pose.along_px, pose.size))
+        left, top, width, height = window_of(numbers, shape.discs, view.sigma, view.frame, *view.size_px)
+        if not width:
+            continue
+        plane, changes = _PLANES.zeros(height, width + 1), _CHANGES.zeros(height, width + 1, _FREE.size)
+        draw_with_changes(numbers, shape.discs, view.sigma, _FREE, view.frame, left, top, plane, changes)
+        # a ghost that is not seen has no place either: its light, not below a tenth, scales what place and size change
+        level = max(pose.brightness, 0.1)
+        own = np.empty((height * width, PER_GHOST))
+        shift = level / view.sigma if view.sigma > 0.0 else 0.0
+        ghost_changes(plane, changes, shift, level * shape.numbers[FIRST_G:FIRST_I], own)
+        picture[top : top + height, left : left + width] += pose.brightness * own[:, 0].reshape(height, width)
+        windows.append((g, end, top, left, height, width))
+        pixels.append(own)
+        end += height * width
+    return _Drawn(picture, np.concatenate(pixels), np.array(windows, dtype=np.int64).reshape(-1, 6))
 
 
 def _inside(shape: Shape, pose: Pose, view: View) -> float:

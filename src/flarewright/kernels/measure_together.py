@@ -1,0 +1,118 @@
+"""All ghosts of a view at once: what each adds when it changes in brightness, place or size, and their equations.
+
+A view holds dozens of ghosts whose windows meet in hundreds of pairs, most of them small: as arrays each product would
+cost more to set up than to sum.
+"""
+
+from ._jit import compiled, inner
+
+
+@compiled
+def ghost_changes(plane, changes, shift, growth, pixels):
+    """Fill what a ghost adds to each pixel of its window, and how that changes with its place and its size.
+
+    Parameters
+    ----------
+    plane : ndarray, shape (H, W + 1), float64
+        Differences along rows of its picture.
+    changes : ndarray, shape (H, W + 1, 1 + Q), float64
+        And of the picture's derivatives: by the first number of its place, then by those of its size.
+    shift : float
+        Of the derivative by place.
+    growth : ndarray, shape (Q,), float64
+        Of the derivatives by size.
+    pixels : ndarray, shape (H * W, 3), float64
+        Filled: the picture, its change with place, its change with size.
+    """
+    height, width = plane.shape[0], plane.shape[1] - 1
+    for y in range(height):
+        light, moved, grown = 0.0, 0.0, 0.0
+        for x in range(width):
+            light += plane[y, x]
+            moved += shift * changes[y, x, 0]
+            for q in range(growth.size):
+                grown += growth[q] * changes[y, x, 1 + q]
+            at = y * width + x
+            pixels[at, 0], pixels[at, 1], pixels[at, 2] = light, moved, grown
+
+
+@compiled
+def add_together(pixels, windows, weight, left, even, matrix, side):
+    """Add one colour of a view to the normal equations of all ghosts in it.
+
+    Parameters
+    ----------
+    pixels : ndarray, shape (P, 3), float64
+        From `ghost_changes`, one ghost's after the other's.
+    windows : ndarray, shape (G, 6), int64
+        Which ghost, the first of its pixels, and top, left, height and width in the view; none is there twice.
+    weight, left : ndarray, shape (H, W), float64
+        Of the view's pixels, and what they show beside the ghosts.
+    even : int
+        Which number is an even background.
+    matrix : ndarray, shape (N, N), float64
+        Three numbers a ghost, others after them.
+    side : ndarray, shape (N,), float64
+    """
+    for y in range(weight.shape[0]):
+        for x in range(weight.shape[1]):
+            matrix[even, even] += weight[y, x]
+            side[even] += weight[y, x] * left[y, x]
+    for a in range(windows.shape[0]):
+        row, start, top, first, height, width = windows[a]
+        row *= 3
+        s0, s1, s2, m0, m1, m2 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        for y in range(height):
+            for x in range(width):
+                at, w = start + y * width + x, weight[top + y, first + x]
+                lit = w * left[top + y, first + x]
+                s0 += lit * pixels[at, 0]
+                s1 += lit * pixels[at, 1]
+                s2 += lit * pixels[at, 2]
+                m0 += w * pixels[at, 0]
+                m1 += w * pixels[at, 1]
+                m2 += w * pixels[at, 2]
+        side[row] += s0
+        side[row + 1] += s1
+        side[row + 2] += s2
+        matrix[row, even] += m0
+        matrix[row + 1, even] += m1
+        matrix[row + 2, even] += m2
+        for k in range(3):
+            matrix[even, row + k] = matrix[row + k, even]
+        for b in range(a, windows.shape[0]):
+            _add_pair(pixels, windows, weight, a, b, matrix)
+
+
+@inner
+def _add_pair(pixels, windows, weight, a, b, matrix):
+    """Add the products of two ghosts' changes where their windows meet."""
+    row, start_a, top_a, left_a, height_a, width_a = windows[a]
+    column, start_b, top_b, left_b, height_b, width_b = windows[b]
+    top, bottom = max(top_a, top_b), min(top_a + height_a, top_b + height_b)
+    first, end = max(left_a, left_b), min(left_a + width_a, left_b + width_b)
+    if top >= bottom or first >= end:
+        return
+    p00, p01, p02, p10, p11, p12, p20, p21, p22 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for y in range(top, bottom):
+        at_a = start_a + (y - top_a) * width_a - left_a
+        at_b = start_b + (y - top_b) * width_b - left_b
+        for x in range(first, end):
+            w = weight[y, x]
+            a0, a1, a2 = w * pixels[at_a + x, 0], w * pixels[at_a + x, 1], w * pixels[at_a + x, 2]
+            b0, b1, b2 = pixels[at_b + x, 0], pixels[at_b + x, 1], pixels[at_b + x, 2]
+            p00 += a0 * b0
+            p01 += a0 * b1
+            p02 += a0 * b2
+            p10 += a1 * b0
+            p11 += a1 * b1
+            p12 += a1 * b2
+            p20 += a2 * b0
+            p21 += a2 * b1
+            p22 += a2 * b2
+    found = ((p00, p01, p02), (p10, p11, p12), (p20, p21, p22))
+    for j in range(3):
+        for k in range(3):
+            matrix[3 * row + j, 3 * column + k] += found[j][k]
+            if a != b:
+                matrix[3 * column + k, 3 * row + j] += found[j][k]
