@@ -1,4 +1,4 @@
-"""Fit all ghosts at once: every number of every ghost, against all views, by Levenberg and Marquardt's way.
+"""Fit all ghosts at once: place, form and light of each, against all views, by Levenberg and Marquardt's way.
 
 Ghosts that lie over each other share their light and their borders. Fitted one after the other each takes what the
 others, still wrong, have left it, and they settle slowly or never; together each is given what no other explains.
