@@ -19,6 +19,7 @@ from ..kernels.measure_hough import outline, salient_slopes, search
 from ..model.ghost_model import Blades
 from .fit import scaled
 from .numbers import Floats
+from .shared_out import shared_out
 from .views import Pixels, View, halved
 
 # slopes, in standard deviations of their noise, that count half
@@ -99,7 +100,7 @@ def slopes_of(
         salient_slopes(np.where(np.isfinite(variance), small, 0.0), variance, SALIENT, sx, sy)
         return sx, sy
 
-    found = list((map if pool is None else pool.map)(one, views, pixels, masks))
+    found = shared_out(one, views, pixels, masks, pool=pool)
     frames = np.stack([scaled(view.frame, 1) for view in views])
     return Slopes(
         np.stack([each[0] for each in found]), np.stack([each[1] for each in found]),

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..kernels.measure_pupil import FIRST_G, FIRST_I
+from .evenly import evenly
 from .fit import MODEL_ERROR, Patch, Shape, brightens, cost_of, free_numbers, improve, patches_of, render
 from .found import Found, by_light, rest_of
 from .numbers import Floats
@@ -90,7 +91,7 @@ def _as_one(
 ) -> Found | None:
     """Fit one ghost to the light of two; None when it explains the views worse."""
     both = Found(host.shapes, min(host.first, part.first), max(host.last, part.last))
-    few = np.unique(np.linspace(both.first, both.last, _FEW).round().astype(int))
+    few = evenly(range(both.first, both.last + 1), _FEW)
     shape, core = host.shapes[1], part.shapes[1]
     as_two, as_one = [], []
     for k in few:

@@ -22,6 +22,7 @@ from .evenly import evenly
 from .fit import ALIKE, MODEL_ERROR, Indices, Shape, priors, scaled, witness
 from .found import CHANNELS, Found
 from .numbers import Floats
+from .shared_out import shared_out
 from .views import View, halved
 
 # light is solved in pictures halved until they are no wider, of no more constellations than this
@@ -168,7 +169,7 @@ def _pictures(
         columns = columns - ((weight @ columns) / total).astype(np.float32)
         return _Picture(shown, columns, light, there, seen - float(weight @ seen) / total, weight)
 
-    return list((map if pool is None else pool.map)(one, evenly(range(len(views)), _VIEWS)))
+    return shared_out(one, evenly(range(len(views)), _VIEWS), pool=pool)
 
 
 def _add(shape: Shape, sigma: float, frame: Floats, basis: NDArray[np.float32]) -> Floats:

@@ -23,6 +23,7 @@ from .found import Found
 from .marquardt import FAR, descend
 from .numbers import Floats
 from .room import Room
+from .shared_out import shared_out
 from .views import Pixels, View, halved
 
 # ghosts are fitted at once in pictures halved until they are no wider, of so many constellations
@@ -156,9 +157,7 @@ class _Search:
 
     def look(self, shapes: list[Shape], prior: Floats | None) -> _State:
         """Return the state of some shapes."""
-        missed = list(
-            (map if self.pool is None else self.pool.map)(lambda sheet: self.missed(shapes, sheet), self.sheets)
-        )
+        missed = shared_out(lambda sheet: self.missed(shapes, sheet), self.sheets, pool=self.pool)
         return self.weighed(shapes, np.zeros(self.ends[-1]) if prior is None else prior, missed)
 
     def weighed(self, shapes: list[Shape], prior: Floats, missed: list[Misfit]) -> _State:
@@ -189,6 +188,7 @@ class _Search:
         """Return normal matrix and right side."""
         side = -at.prior * self.numbers(at.shapes)
         matrix = np.diag(at.prior)
+        # one at a time, for a matrix is large: they are added as they come
         work = (map if self.pool is None else self.pool.map)(
             lambda sheet, missed: self.equations(at.shapes, sheet, missed), self.sheets, at.missed
         )

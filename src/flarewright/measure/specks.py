@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from .find import Candidate
 from .numbers import Floats
+from .shared_out import shared_out
 from .views import Pixels, View
 
 Kind = TypeVar("Kind", bound=np.floating)
@@ -76,7 +77,7 @@ def specks(
     def one(view: View, picture: Pixels, mask: NDArray[np.bool_]) -> Floats:
         return _votes(view, np.where(mask, picture, np.nan), view.variance[..., channel], places)
 
-    votes = np.stack(list((map if pool is None else pool.map)(one, views, pixels, masks)))
+    votes = np.stack(shared_out(one, views, pixels, masks, pool=pool))
     sigmas = np.array([view.sigma for view in views])
     speeds = np.arange(-reach, reach, 1.0)
     # shape (views, speeds): where among the places a speck of each speed would be
