@@ -189,13 +189,13 @@ def find_ghosts(
         When frames cannot be read or are too few, or a correction points at nothing.
     """
     views = read_views(folder, run, every)
-    dim = _dimmed_beside([], views, _star_of(views), None)
-    times, small = _for_search(dim.views)
-    iris = iris_of(dim.star)
     known = corrections or Corrections()
-    pointed = [candidate(each, small, 2.0**times, run) for each in known.add]
-    measured = [np.asarray(np.isfinite(view.variance).all(axis=2)) for view in small]
     with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
+        dim = _dimmed_beside([], views, _star_of(views), pool)
+        times, small = _for_search(dim.views)
+        iris = iris_of(dim.star)
+        pointed = [candidate(each, small, 2.0**times, run) for each in known.add]
+        measured = [np.asarray(np.isfinite(view.variance).all(axis=2)) for view in small]
         found = pursue(
             small, measured, most=most, first=pointed, iris=iris, pool=pool, tell=tell, progress=progress,
             journal=journal,
@@ -379,7 +379,7 @@ def _light_of(model: GhostModel, view: View, roll_deg: float) -> tuple[float, fl
 
 
 def _dimmed_beside(
-    ghosts: Sequence[Found], views: Sequence[View], star: Star | None, pool: ThreadPoolExecutor | None
+    ghosts: Sequence[Found], views: Sequence[View], star: Star | None, pool: ThreadPoolExecutor
 ) -> Dimmed:
     """Learn the halo, and how strong a star is, from what is left beside known ghosts, and take both off the views."""
     left = shared_out(partial(without, ghosts), views, range(len(views)), pool=pool)
