@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 from planted_run import GHOSTS, shape, views
 
-from flarewright.kernels.measure_pupil import FIRST_G, FIRST_I
+from flarewright.kernels.measure_pupil import FIRST_G, FIRST_I, SOFT
 from flarewright.measure.fit import Shape, free_numbers, improve, patches_of, render
 from flarewright.measure.found import Found, alone, rest_of
 from flarewright.measure.jointly import fitted_jointly
@@ -71,6 +71,19 @@ def test_a_crowd_is_found_at_once_and_not_one_after_the_other():
     assert at_once < 0.03
     # which may step as often
     assert at_once < 0.6 * missed(one_after_the_other(ghosts, seen), true, seen)
+
+
+def test_a_soft_ghost_spreads_no_light_but_its_own():
+    true = [softened(one) for one in crowd()[:4]] + crowd()[4:6]
+    seen = views(true)
+    fitted = fitted_jointly([found(one, seen) for one in true], seen, green(seen), 1, steps=8)
+    assert missed(fitted, true, seen) < 0.005
+
+
+def softened(one):
+    numbers = one.numbers.copy()
+    numbers[SOFT] = 2.0
+    return Shape(numbers)
 
 
 def test_threads_change_nothing():

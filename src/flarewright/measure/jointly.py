@@ -33,7 +33,7 @@ _STAYS = 0.5
 # a step that gains less than this part of the cost is the last
 _ENOUGH = 3e-4
 _NONE, _NO_CHANGES = np.zeros(0, np.int64), np.zeros((0, 0, 0))
-_PLANES = Room()
+_PLANES, _WINDOWS = Room(), Room()
 
 
 def fitted_jointly(
@@ -203,8 +203,14 @@ class _Search:
         plane = _PLANES.zeros(height, width + 1)
         for g in sheet.shown:
             shape = shapes[g]
-            if window_of(shape.numbers, shape.discs, sheet.sigma, sheet.frame, width, height)[2]:
-                draw_with_changes(shape.numbers, shape.discs, sheet.sigma, _NONE, sheet.frame, 0, 0, plane, _NO_CHANGES)
+            left, top, w, h = window_of(shape.numbers, shape.discs, sheet.sigma, sheet.frame, width, height)
+            # each alone, and then laid over the others: a soft one is spread with all that its plane holds
+            own = _WINDOWS.zeros(h, w + 1)
+            if w:
+                draw_with_changes(
+                    shape.numbers, shape.discs, sheet.sigma, _NONE, sheet.frame, left, top, own, _NO_CHANGES
+                )
+                plane[top : top + h, left : left + w] += own[:, :w]
         weight, residual = np.empty((height, width)), np.empty((height, width))
         cost, total, count = weigh_misfit(
             plane, sheet.pixels, sheet.known, self.error, OUTLIER if self.tails else np.inf, True, weight, residual
@@ -220,8 +226,8 @@ class _Search:
             left, top, w, h = window_of(shape.numbers, shape.discs, sheet.sigma, sheet.frame, width, height)
             if not w:
                 continue
-            plane, changes = _PLANES.zeros(h, w + 1), np.zeros((h, w + 1, free.size))
-            draw_with_changes(shape.numbers, shape.discs, sheet.sigma, free, sheet.frame, left, top, plane, changes)
+            own, changes = _WINDOWS.zeros(h, w + 1), np.zeros((h, w + 1, free.size))
+            draw_with_changes(shape.numbers, shape.discs, sheet.sigma, free, sheet.frame, left, top, own, changes)
             drawn.append(changes.ravel())
             windows.append((start, self.ends[g], free.size, top, left, h, w))
             start += changes.size
