@@ -171,3 +171,17 @@ def test_roll_turns_the_ghost_about_the_axis():
     upright = draw(numbers, 1, frame=np.array([*axis, 1.0, 0.0, 1.0]), size=(140, 140))
     quarter = draw(numbers, 1, frame=np.array([*axis, 0.0, 1.0, 1.0]), size=(140, 140))
     assert np.allclose(np.rot90(upright), quarter, atol=1e-12)
+
+
+def test_a_ghost_many_times_larger_than_its_window_is_drawn_as_any():
+    """A search that goes astray may try one: its outline is followed in the window alone, not pixel by pixel."""
+    numbers = np.zeros(NUMBERS)
+    numbers[FIRST_G], numbers[FIRST_I] = 1e13, 2e26
+    plane, changes = np.zeros((20, 31)), np.zeros((20, 31, 2))
+    draw_with_changes(numbers, 0, 0.5, np.array([FIRST_G, FIRST_I]), FRAME, 40, 30, plane, changes)
+    sum_along_rows(plane)
+    sum_changes_along_rows(changes)
+    assert np.allclose(plane[:, :-1], 2.0)
+    # light over the square of the size
+    assert np.allclose(changes[:, :-1, 0], -4e-13, atol=0.0)
+    assert np.allclose(changes[:, :-1, 1], 1e-26, atol=0.0)

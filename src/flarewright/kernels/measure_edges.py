@@ -129,21 +129,34 @@ def add_edge_changes(x0, y0, x1, y1, weight, change, v0, v1, left, top, width, h
     for q in range(change.size):
         sweep[0, q] = weight * (v0[0, q] * dy - v0[1, q] * dx)
         sweep[1, q] = weight * (v1[0, q] * dy - v1[1, q] * dx) - sweep[0, q]
-    # walk from grid line to grid line; t runs from 0 to 1 along the edge
-    t = 0.0
-    row, c = int(floor(y0)), int(floor(x0))
+    # t runs from 0 to 1 along the edge; only what lies in the window's rows, and not right of it, counts
+    t, last = 0.0, 1.0
+    by_row, by_column = 1.0 / dy if dy != 0.0 else 0.0, 1.0 / dx if dx != 0.0 else 0.0
     down, right = dy > 0.0, dx > 0.0
-    if not down and y0 == row:
+    if dy != 0.0:
+        above, below = -y0 * by_row, (height - y0) * by_row
+        t, last = max(t, min(above, below)), min(last, max(above, below))
+    if dx != 0.0:
+        border = (width - x0) * by_column
+        if right:
+            last = min(last, border)
+        else:
+            t = max(t, border)
+    y, x = y0 + t * dy, x0 + t * dx
+    row, c = int(floor(y)), int(floor(max(x, -1.0)))
+    if not down and y == row:
         row -= 1
-    if not right and x0 == c:
+    if not right and x == c:
         c -= 1
-    t_row = ((row + 1.0 if down else float(row)) - y0) / dy if dy != 0.0 else 2.0
-    t_column = ((c + 1.0 if right else float(c)) - x0) / dx if dx != 0.0 else 2.0
-    step_row = abs(1.0 / dy) if dy != 0.0 else 2.0
-    step_column = abs(1.0 / dx) if dx != 0.0 else 2.0
-    while t < 1.0:
-        end = min(min(t_row, t_column), 1.0)
-        if 0 <= row < height and c < width and end > t:
+    row, c = min(max(row, 0), height - 1), min(max(c, -1), width - 1)
+    # walk from grid line to grid line; left of the window from row to row
+    while t < last:
+        t_row = ((row + 1.0 if down else float(row)) - y0) * by_row if dy != 0.0 else 2.0
+        t_column = 2.0
+        if dx != 0.0 and (right or c >= 0):
+            t_column = ((c + 1.0 if right else float(c)) - x0) * by_column
+        end = min(min(t_row, t_column), last)
+        if end > t:
             middle, length = 0.5 * (t + end), end - t
             if c >= 0:
                 part = x0 + middle * dx - c
@@ -151,13 +164,13 @@ def add_edge_changes(x0, y0, x1, y1, weight, change, v0, v1, left, top, width, h
             else:
                 for q in range(change.shape[0]):
                     out[row, 0, q] += change[q] * length * dy
-        t = end
+            t = end
         if t_row <= t:
             row += 1 if down else -1
-            t_row += step_row
         if t_column <= t:
             c += 1 if right else -1
-            t_column += step_column
+        if not (0 <= row < height and -1 <= c < width):
+            break
 
 
 @compiled
