@@ -125,7 +125,7 @@ def _fewer(
         old = out[k]
         new = _smaller(old, _fitted_numbers(kept[k]), views, rest, pool)
         for m in range(CHANNELS):
-            exchange(old.shapes[m], new.shapes[m], old, views, rest[m])
+            exchange(old.shapes[m], new.shapes[m], old, views, rest[m], pool)
         out[k] = new
         fit = new.fits[1]
         tell((done + 1) / len(out), f"ghost {kept[k].name}: {0 if fit is None else fit.free.size} numbers a colour")
@@ -146,7 +146,7 @@ def _smaller(
     ghost: Found, free: Indices, views: Sequence[View], rest: Sequence[list[Pixels]], pool: ThreadPoolExecutor
 ) -> Found:
     width = views[0].size_px[0]
-    shown = [alone(ghost, m, views, rest[m], _VIEWS) for m in range(CHANNELS)]
+    shown = [alone(ghost, m, views, rest[m], _VIEWS, pool) for m in range(CHANNELS)]
     patches = [patches_of(ghost.shapes[m], shown[m], m) for m in range(CHANNELS)]
     if not all(patches):
         return ghost

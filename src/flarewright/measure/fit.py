@@ -229,6 +229,22 @@ def _window(shape: Shape, beside: Shape | None, view: View) -> tuple[int, int, i
     return min(left, x), min(top, y), right - min(left, x), bottom - min(top, y)
 
 
+def shows(shape: Shape, views: Sequence[View]) -> bool:
+    """Tell whether any view reaches a shape."""
+    return any(_window(shape, None, view)[2] for view in views)
+
+
+def coarser(patch: Patch) -> Patch:
+    """Return a patch in a picture of half the resolution."""
+    # whole pixels of that picture
+    part = np.s_[patch.top % 2 :, patch.left % 2 :]
+    with np.errstate(divide="ignore"):
+        variance = (1.0 / patch.weight[part]).astype(np.float32)
+    pixels, variance = halved(patch.pixels[part].astype(np.float32), 1), halved(variance, 1, variance=True)
+    left, top = (patch.left + 1) // 2, (patch.top + 1) // 2
+    return Patch(patch.sigma, scaled(patch.frame, 1), left, top, pixels.astype(float), 1.0 / variance.astype(float))
+
+
 @dataclass(frozen=True)
 class Misfit:
     """How a shape misses a patch.

@@ -72,7 +72,14 @@ def left_beside(
     return shared_out(one, range(len(views)), pool=pool)
 
 
-def alone(ghost: Found, channel: int, views: Sequence[View], rest: Sequence[Pixels], most: int) -> list[View]:
+def alone(
+    ghost: Found,
+    channel: int,
+    views: Sequence[View],
+    rest: Sequence[Pixels],
+    most: int,
+    pool: ThreadPoolExecutor | None = None,
+) -> list[View]:
     """Return at most so many of a ghost's views, holding it alone: the rest and its own light.
 
     Parameters
@@ -83,24 +90,34 @@ def alone(ghost: Found, channel: int, views: Sequence[View], rest: Sequence[Pixe
     rest : sequence of ndarray, shape (H, W)
         Of the channel.
     most : int
+    pool : executor, optional
     """
-    out = []
-    for k in evenly(range(ghost.first, ghost.last + 1), most):
-        own = rest[k].copy()
-        part, light = light_of(ghost.shapes[channel], views[k])
-        own[part] += light
-        out.append(views[k].showing(np.broadcast_to(own[..., None], views[k].pixels.shape)))
-    return out
+
+    def one(k: int) -> View:
+        own = lit_by(ghost.shapes[channel], views[k], rest[k])
+        return views[k].showing(np.broadcast_to(own[..., None], views[k].pixels.shape))
+
+    return shared_out(one, evenly(range(ghost.first, ghost.last + 1), most), pool=pool)
 
 
-def exchange(old: Shape, new: Shape, ghost: Found, views: Sequence[View], rest: list[Pixels]) -> None:
+def exchange(
+    old: Shape, new: Shape, ghost: Found, views: Sequence[View], rest: list[Pixels], pool: ThreadPoolExecutor | None
+) -> None:
     """Put a ghost's new light in the place of the old in the rest."""
-    for k in range(ghost.first, ghost.last + 1):
-        left = rest[k].astype(float)
-        for shape, sign in ((old, 1.0), (new, -1.0)):
-            part, light = light_of(shape, views[k])
-            left[part] += sign * light
-        rest[k] = left.astype(np.float32)
+
+    def one(k: int) -> Pixels:
+        return lit_by(new, views[k], lit_by(old, views[k], rest[k]), -1.0)
+
+    its = range(ghost.first, ghost.last + 1)
+    rest[ghost.first : ghost.last + 1] = shared_out(one, its, pool=pool)
+
+
+def lit_by(shape: Shape, view: View, pixels: Pixels, sign: float = 1.0) -> Pixels:
+    """Return pixels of one channel with a shape's light added to them, or taken off."""
+    out = pixels.copy()
+    part, light = light_of(shape, view)
+    out[part] += sign * light
+    return out
 
 
 def darkened(shape: Shape) -> Shape:

@@ -10,7 +10,20 @@ import numpy as np
 
 from ..kernels.measure_mesh import parting_of
 from ..kernels.measure_pupil import DISC_NUMBERS, FIRST_DISC, FIRST_G, FIRST_I, LATERAL, MOST_DISCS, SOFT
-from .fit import MODEL_ERROR, Fit, Patch, Shape, cost_of, free_numbers, improve, parted, patches_of, refine
+from .fit import (
+    MODEL_ERROR,
+    Fit,
+    Patch,
+    Shape,
+    coarser,
+    cost_of,
+    free_numbers,
+    improve,
+    parted,
+    patches_of,
+    refine,
+    shows,
+)
 from .views import View
 
 # part of the cost by which a rim, or a higher order, or lateral colour, must lower it to stay
@@ -19,6 +32,8 @@ ORDER_PAYS = 0.02
 # where the search for a rim begins: its centre over s, and how far it bites into the first rim at the largest field
 _CENTRES = (-2.4, -1.2, -0.6, 0.6, 1.2, 2.4)
 _BITES = (0.3, 0.9)
+# pixels of a patch that is looked at in half its resolution for where a rim may lie
+_FINE = 1500
 # borders that are sharper, pixels, show no colours that part
 _SOFT = 0.5
 # how far wavelengths may part, one standard deviation over the least radius: of thinner ghosts more than the rim moves
@@ -55,6 +70,7 @@ def grow(
     channel: int,
     *,
     most: Growth = Growth(),
+    order: int = 0,
     pool: ThreadPoolExecutor | None = None,
 ) -> Fit | None:
     """Fit a ghost in stages.
@@ -67,6 +83,8 @@ def grow(
         Their pixels hold this ghost alone, as far as it is known.
     channel : int
     most : Growth
+    order : int
+        Of the first stage: 0 while nothing is known but place and size.
     pool : executor, optional
 
     Returns
@@ -79,14 +97,13 @@ def grow(
     def polish(start: Shape, order: int, light: int, steps: int, old: Shape | None) -> tuple[Fit, list[Patch]] | None:
         # a ghost that shrinks shall not forget the light that it leaves
         patches = patches_of(start, views, channel, beside=old)
-        if not patches or (old is not None and not patches_of(start, views, channel)):
+        if not patches or not shows(start, views):
             return None
         free = free_numbers(order, start.discs, light, most.soft and order > 0)
         fit = refine(start, patches, free, width=width, steps=steps, error=most.error, alike=most.alike, pool=pool)
         return fit, patches
 
-    found = polish(shape, 0, 0, 8, None)
-    order = 0
+    found = polish(shape, order, min(order, most.intensity_order), 8, None)
     while found is not None:
         fit, patches = found
         grown: Shape | None = None
@@ -158,6 +175,7 @@ def _with_rim(
     if shape.discs >= MOST_DISCS:
         return None
     few = patches[:: max(1, len(patches) // 8)]
+    rough = [coarser(patch) if patch.pixels.size > _FINE else patch for patch in few]
     at = FIRST_DISC + DISC_NUMBERS * shape.discs
     largest = max(patch.sigma for patch in patches)
     own = np.concatenate([free[free >= FIRST_I], [at, at + 2]])
@@ -171,7 +189,9 @@ def _with_rim(
             numbers[0] -= 0.5 * away * numbers[FIRST_G] / max(largest, 0.1)
             numbers[FIRST_G] *= 1.0 + 0.25 * bite
             trial = replace(shape, numbers=numbers, discs=shape.discs + 1)
-            trials.append(improve(trial, few, own, width=width, steps=3, error=most.error, alike=most.alike, pool=pool))
+            trials.append(
+                improve(trial, rough, own, width=width, steps=3, error=most.error, alike=most.alike, pool=pool)
+            )
     everything = np.concatenate([free, [at, at + 2]])
     best = [
         improve(trial, few, everything, width=width, steps=6, error=most.error, alike=most.alike, pool=pool)

@@ -15,12 +15,13 @@ from ..kernels.measure_pupil import FIRST_G, FIRST_I
 from ..model.ghost_model import Blades
 from .evenly import evenly
 from .find import Candidate, candidates, slopes_of
-from .fit import Shape, brightens, cost_of, light_of, patches_of, presence, render
-from .found import Found, darkened, left_beside, rest_of
+from .fit import Shape, brightens, cost_of, patches_of, presence, render
+from .found import Found, darkened, left_beside, lit_by, rest_of
 from .grow import Growth, grow
 from .jointly import fitted_jointly
 from .journal import Journal
 from .numbers import NUMBERS, with_blades
+from .spans import LEAST_VIEWS, respanned, span_of
 from .specks import RADII, highest_near, specks
 from .views import Pixels, View, distances
 
@@ -30,8 +31,6 @@ SCORE = 0.9
 EXPLAINS = 0.06
 # standard deviations of its brightness over all views
 SURE = 6.0
-# how bright a ghost must be in a view, by its own measure, to be there
-THERE = 0.35
 # part of the light taken off that may stay behind
 LEFT_BEHIND = 0.08
 # and as specks, so many pixels around the light
@@ -45,13 +44,13 @@ COVERS, LIT, _LOOKED = 0.35, 0.1, 4
 _SOON = 2
 # steps of all ghosts at once after some were found
 _TOUCHES = 8
+# all are asked anew where they are there when by so much more ghosts are known
+_MANY_MORE = 1.1
 # candidates that are looked for beside those that were refused, and more, so that not every refusal is a new search
 _TRIALS, _SPARE = 12, 20
 # views that vote, and that a first fit looks at
 VOTERS = 50
 _FEW = 16
-# two views tell place and size, and nothing of whether it goes along with the light
-_LEAST_VIEWS = 3
 # how far a candidate grows: most of what lies beside it is not known yet, so its misfit tells nothing of it
 _FIRST = Growth(order=1, discs=1, error=0.05, soft=False, alike=False)
 
@@ -129,7 +128,7 @@ def pursue(
     fallen = _Fallen(progress)
     rims: list[Candidate] = []
     small: list[Candidate] = []
-    known_to = 0
+    known_to = asked_at = 0
     while len(found) < most:
         asked = _TRIALS + len(refused)
         if asked > known_to:
@@ -164,9 +163,12 @@ def pursue(
             shapes = steps.step(partial(fitted_jointly, found, shown, wanted, 1, steps=_TOUCHES, pool=pool))
             found = [replace(ghost, shapes=(one, one, one)) for ghost, one in zip(found, shapes, strict=True)]
             rest = left_beside(wanted, found, shown, 1, pool)
+            if len(found) >= _MANY_MORE * asked_at:
+                found, rest = respanned(found, shown, rest, pool)
+                asked_at = len(found)
             # who voted for what was there before has to look again
             known_to = 0
-    return found
+    return respanned(found, shown, rest, pool)[0] if len(found) > asked_at else found
 
 
 def _open(votes: Sequence[Candidate], refused: Sequence[tuple[Candidate, int]], known: int) -> list[Candidate]:
@@ -274,8 +276,8 @@ def _try(
     before, after = cost_of(darkened(shape), patches, error=0.05), cost_of(shape, patches, error=0.05)
     if not (after < (1.0 - EXPLAINS) * before and before - after > SURE**2):
         return None
-    first, last = _span(shape, views, rest, (trial.first + trial.last) // 2)
-    if last - first + 1 < _LEAST_VIEWS:
+    first, last = span_of(shape, views, rest, (trial.first + trial.last) // 2, pool)
+    if last - first + 1 < LEAST_VIEWS:
         return None
     return Found((shape, shape, shape), first, last)
 
@@ -302,26 +304,8 @@ def _near(speck: Candidate, view: View) -> View:
     return replace(view, variance=np.where(far[..., None], np.inf, view.variance).astype(np.float32))
 
 
-def _span(shape: Shape, views: Sequence[View], rest: Sequence[Pixels], middle: int) -> tuple[int, int]:
-    """Return the views, around a middle one, in which a shape is there: its birth and its death."""
-    there = []
-    for k in range(len(views)):
-        seen = presence(shape, _alone(views, rest, [k])[0], 1)
-        # a view that does not reach it, or cannot tell, is no reason for a death
-        unsure = not np.isfinite(seen.error) or seen.error > 0.5
-        there.append(unsure or seen.amplitude > THERE)
-    first = last = middle
-    while first > 0 and (there[first - 1] or (first > 1 and there[first - 2])):
-        first -= 1
-    while last < len(views) - 1 and (there[last + 1] or (last < len(views) - 2 and there[last + 2])):
-        last += 1
-    return first, last
-
-
 def _take_off(ghost: Found, views: Sequence[View], rest: Sequence[Pixels]) -> list[Pixels]:
     out = list(rest)
     for k in range(ghost.first, ghost.last + 1):
-        out[k] = rest[k].copy()
-        part, light = light_of(ghost.shapes[1], views[k])
-        out[k][part] -= light
+        out[k] = lit_by(ghost.shapes[1], views[k], rest[k], -1.0)
     return out

@@ -19,6 +19,8 @@ from .joint import lit
 from .jointly import fitted_jointly
 from .journal import Journal
 from .numbers import blades_of, channel_of, with_blades
+from .shared_out import side_by_side
+from .spans import respanned
 from .views import Pixels, View
 
 # views by which the best rim is chosen
@@ -86,12 +88,13 @@ def settle(
         ghosts = lit(ghosts, views, pool=pool)
         # in small pictures, and every ghost in its own after that: what is told of its errors is of these
         ghosts = _jointly(ghosts, views, pool, steps)
-        rest = [rest_of(ghosts, views, m, pool) for m in range(CHANNELS)]
+        ghosts, green = respanned(ghosts, views, rest_of(ghosts, views, 1, pool), pool)
+        rest = [green if m == 1 else rest_of(ghosts, views, m, pool) for m in range(CHANNELS)]
         for done, k in enumerate(by_light(ghosts)):
             old = ghosts[k]
             ghosts[k] = steps.step(partial(_again, old, views, rest, how, iris, pool))
             for m in range(CHANNELS):
-                exchange(old.shapes[m], ghosts[k].shapes[m], old, views, rest[m])
+                exchange(old.shapes[m], ghosts[k].shapes[m], old, views, rest[m], pool)
             progress((turn + (done + 1) / len(ghosts)) / how.rounds, f"ghost {done + 1} of {len(ghosts)}")
         before = len(ghosts)
         ghosts = lit(ghosts, views, pool=pool)
@@ -132,16 +135,26 @@ def _again(
     """Fit one ghost anew in all colours."""
     fits: list[Fit | None] = list(ghost.fits)
     shapes = list(ghost.shapes)
-    for m in (1, 0, 2):
-        shown = alone(ghost, m, views, rest[m], how.views)
-        if m == 1 and ghost.fits[1] is None:
-            fits[m] = _grown(_rimmed(shapes[1], shown, m, iris, pool), shown, m, how.most, pool) or fits[m]
-        else:
-            start = shapes[m] if ghost.fits[m] is not None or m == 1 else _like(shapes[1], shapes[m], shown, m)
-            fits[m] = _refined(start, shown, m, fits[1], pool) or fits[m]
-        fit = fits[m]
+
+    def green() -> Fit | None:
+        shown = alone(ghost, 1, views, rest[1], how.views, pool)
+        if ghost.fits[1] is None:
+            return _grown(_rimmed(shapes[1], shown, 1, iris, pool), shown, 1, how.most, pool)
+        return _refined(shapes[1], shown, 1, ghost.fits[1], pool)
+
+    def like_green(m: int) -> Fit | None:
+        shown = alone(ghost, m, views, rest[m], how.views, pool)
+        start = shapes[m] if ghost.fits[m] is not None else _like(shapes[1], shapes[m], shown, m)
+        return _refined(start, shown, m, fits[1], pool)
+
+    def keep(m: int, fit: Fit | None) -> None:
         if fit is not None:
-            shapes[m] = fit.shape
+            fits[m], shapes[m] = fit, fit.shape
+
+    keep(1, green())
+    red, blue = side_by_side(partial(like_green, 0), partial(like_green, 2), pool=pool)
+    keep(0, red)
+    keep(2, blue)
     return replace(ghost, shapes=(shapes[0], shapes[1], shapes[2]), fits=(fits[0], fits[1], fits[2]))
 
 
@@ -149,11 +162,14 @@ def _grown(
     start: Shape, shown: Sequence[View], channel: int, most: Growth, pool: ThreadPoolExecutor | None
 ) -> Fit | None:
     """Fit a ghost for the first time, with the rims that a search gave it and without: others were not known then."""
-    fit = grow(start, shown, channel, most=most, pool=pool)
-    if fit is None or not start.discs:
-        return fit
-    bare = grow(without_discs(start), shown, channel, most=most, pool=pool)
-    if bare is None:
+
+    def grown(shape: Shape) -> Fit | None:
+        return grow(shape, shown, channel, most=most, order=1, pool=pool)
+
+    if not start.discs:
+        return grown(start)
+    fit, bare = side_by_side(partial(grown, start), partial(grown, without_discs(start)), pool=pool)
+    if fit is None or bare is None:
         return fit
     patches = patches_of(fit.shape, shown, channel, beside=bare.shape)
     costs = [cost_of(each.shape, patches, error=most.error) for each in (fit, bare)]

@@ -1,4 +1,4 @@
-"""Small pieces of work in threads: one task a thread, for to hand a task over takes as long as some pieces do."""
+"""Pieces of work in threads: small ones one task a thread, for to hand a task over takes as long as some pieces do."""
 
 from __future__ import annotations
 
@@ -32,3 +32,22 @@ def shared_out(work: Callable[..., Made], *given: Sequence[Any], pool: ThreadPoo
     for first, made in enumerate(parts):
         out[first::tasks] = made
     return out  # type: ignore[return-value]
+
+
+def side_by_side(*works: Callable[[], Made], pool: ThreadPoolExecutor | None) -> list[Made]:
+    """Return what some large pieces of work make, in their order.
+
+    While one waits for the last of the small pieces that it shares out, the others' are done.
+
+    Parameters
+    ----------
+    *works : callable
+        Each may share out small pieces to the pool.
+    pool : executor or None
+        None: one after the other.
+    """
+    if pool is None:
+        return [work() for work in works]
+    # in threads of their own: in the pool's they would wait for pieces that wait for them
+    with ThreadPoolExecutor(len(works)) as beside:
+        return list(beside.map(lambda work: work(), works))

@@ -1,0 +1,108 @@
+"""In which views a ghost is there, from its birth to its death."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from .fit import Presence, Shape, presence
+from .found import Found, by_light, lit_by
+from .shared_out import shared_out
+from .views import Pixels, View
+
+# how bright a ghost must be in a view, by its own measure, to be there
+THERE = 0.35
+# a view whose measure is less certain than this cannot tell
+_UNSURE = 0.5
+# two views tell place and size, and nothing of whether it goes along with the light
+LEAST_VIEWS = 3
+
+
+def span_of(
+    shape: Shape, views: Sequence[View], own: Sequence[Pixels], middle: int, pool: ThreadPoolExecutor | None = None
+) -> tuple[int, int]:
+    """Return the first and the last of the views around one of them in which a shape is there.
+
+    Parameters
+    ----------
+    shape : Shape
+    views : sequence of View
+    own : sequence of ndarray, shape (H, W)
+        What each shows of it, as far as it is known.
+    middle : int
+        Where it is there for certain.
+    pool : executor, optional
+
+    Notes
+    -----
+    A view that does not reach it, or cannot tell, is no reason for a death, and neither is a single one without it.
+    """
+    seen = shared_out(partial(_seen, shape), views, own, pool=pool)
+    return _around([_unsure(each) or each.amplitude > THERE for each in seen], middle)
+
+
+def respanned(
+    ghosts: Sequence[Found], views: Sequence[View], rest: Sequence[Pixels], pool: ThreadPoolExecutor | None = None
+) -> tuple[list[Found], list[Pixels]]:
+    """Ask all views anew in which of them each ghost is there, the brightest first.
+
+    When a ghost was found others were not known: light of theirs hid where it goes on, or passed for its own.
+
+    Parameters
+    ----------
+    ghosts : sequence of Found
+    views : sequence of View
+    rest : sequence of ndarray, shape (H, W)
+        What each shows of green beside all ghosts.
+    pool : executor, optional
+
+    Returns
+    -------
+    ghosts : list of Found
+    rest : list of ndarray, shape (H, W)
+        Beside these.
+    """
+    out, left = list(ghosts), list(rest)
+    for k in by_light(ghosts):
+        ghost, shape = out[k], out[k].shapes[1]
+        own = shared_out(partial(_own, ghost), range(len(views)), views, left, pool=pool)
+        seen = shared_out(partial(_seen, shape), views, own, pool=pool)
+        sure = [not _unsure(each) and each.amplitude > THERE for each in seen]
+        there = [_unsure(each) or each.amplitude > THERE for each in seen]
+        # the longest life of which views are certain
+        lives = {_around(there, at) for at, certain in enumerate(sure) if certain}
+        first, last = max(lives, key=lambda life: (sum(sure[life[0] : life[1] + 1]), -life[0]), default=(0, 0))
+        if last - first + 1 < LEAST_VIEWS:
+            continue
+        for at in range(len(views)):
+            if (first <= at <= last) != (ghost.first <= at <= ghost.last):
+                left[at] = lit_by(shape, views[at], own[at], -1.0) if first <= at <= last else own[at]
+        out[k] = replace(ghost, first=first, last=last)
+    return out, left
+
+
+def _own(ghost: Found, number: int, view: View, rest: Pixels) -> Pixels:
+    """Return what a view shows of a ghost's green: what is left and the ghost, where that was taken off."""
+    return lit_by(ghost.shapes[1], view, rest) if ghost.first <= number <= ghost.last else rest
+
+
+def _seen(shape: Shape, view: View, own: Pixels) -> Presence:
+    return presence(shape, view.showing(np.broadcast_to(own[..., None], view.pixels.shape)), 1)
+
+
+def _unsure(seen: Presence) -> bool:
+    return not np.isfinite(seen.error) or seen.error > _UNSURE
+
+
+def _around(there: Sequence[bool], middle: int) -> tuple[int, int]:
+    """Return the first and the last of those around a place, over single gaps."""
+    first = last = middle
+    while first > 0 and (there[first - 1] or (first > 1 and there[first - 2])):
+        first -= 1
+    while last < len(there) - 1 and (there[last + 1] or (last < len(there) - 2 and there[last + 2])):
+        last += 1
+    return first, last
