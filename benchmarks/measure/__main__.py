@@ -54,7 +54,7 @@ def prove(lens: str, folder: Path, given: argparse.Namespace) -> dict[str, Any]:
     merged = time.process_time()
     rough = find_ghosts(run_folder, run, tell=tell)
     found = time.process_time()
-    model = fit_ghosts(run_folder, run, rough, tell=tell)
+    model = fit_ghosts(run_folder, run, rough, rest=False, tell=tell)
     fitted = time.process_time()
     write_ghost_model(folder / f"model-{given.merge}.json", model)
     tell("fitted")

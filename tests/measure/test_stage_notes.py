@@ -4,10 +4,11 @@ import json
 import os
 
 import pytest
-from planted_run import SIZE
+from planted_run import GHOSTS, SIZE
 from test_stages import FOCAL, write
 
 from flarewright.cli.app import run as command
+from flarewright.cli.measure_stages import STAGES, run_stages
 from flarewright.errors import OutputError
 from flarewright.io.ghost_model_file import read_ghost_model, write_ghost_model
 from flarewright.measure import stages
@@ -63,6 +64,25 @@ def test_only_what_has_changed_is_done_again(tmp_path, capsys, monkeypatch):
         assert command(["measure", "find", str(tmp_path)]) == 130
     capsys.readouterr()
     assert kept() == fresh
+
+
+def test_what_is_left_beside_ghosts_is_learned_once(tmp_path):
+    """A fit on the way to the small model leaves it out; asked for by itself it has it, and no later stage is stale."""
+    write(tmp_path, GHOSTS[1:2])
+
+    def kept(*some: str) -> list[bool]:
+        facts = run_stages(tmp_path, some, 2, None, None, False)
+        return [facts[stage]["kept"] for stage in some]
+
+    def whole() -> list[bool]:
+        return [bool(read_ghost_model(tmp_path / f"{name}.json").sprites) for name in ("model", "compact")]
+
+    assert kept(*STAGES) == [False] * 4
+    assert whole() == [False, True]
+    assert kept("fit") == [True]
+    assert whole() == [True, True]
+    assert kept(*STAGES) == [True] * 4
+    assert whole() == [True, True]
 
 
 def test_corrections_hold_until_others_are_given(tmp_path, capsys, monkeypatch):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -92,13 +93,14 @@ def _one(
 
 @dataclass(frozen=True)
 class _Job:
-    """What every stage is told."""
+    """What every stage is told; with `whole` a fit shall also tell what is left beside the ghosts."""
 
     folder: Path
     run: MergedRun
     every: int
     corrections: Corrections | None
     by: str
+    whole: bool
     threads: int | None
     told: Callable[[str], None]
     progress: Callable[[float, str], None]
@@ -169,7 +171,8 @@ def run_stages(
         stage = _STAGES[name]
         made = folder / stage.file
         with progress_bar() as begin:
-            job = _Job(folder, run, every, told_of, by, threads, told, begin(name))
+            # what is left is learned anew for the small model: once is enough
+            job = _Job(folder, run, every, told_of, by, "compress" not in stages, threads, told, begin(name))
             digest = run_digest(folder, run, stage.given(job))
             kept = is_current(folder, name, digest, made)
             if not kept:
@@ -180,6 +183,8 @@ def run_stages(
                 if name == "find":
                     note_corrections(folder, told_of)
                 note(folder, name, digest)
+            elif name == "fit" and job.whole:
+                _complete(job, made)
         facts[name] = {**_facts(made), "file": str(made), "kept": kept}
         if talk:
             words = ", ".join(f"{value} {key}" for key, value in _facts(made).items())
@@ -238,7 +243,7 @@ def _fit(job: _Job, made: Path, steps: Journal) -> None:
     from ..measure.walch_fit import fit_as_walch
 
     rough = _model(job.folder / FOUND)
-    way = fit_ghosts if job.by == "joint" else fit_as_walch
+    way = partial(fit_ghosts, rest=job.whole) if job.by == "joint" else fit_as_walch
     model = way(
         job.folder, job.run, rough, every=job.every, threads=job.threads, tell=job.told, progress=job.progress,
         journal=steps,
@@ -246,8 +251,20 @@ def _fit(job: _Job, made: Path, steps: Journal) -> None:
     write_ghost_model(made, model)
 
 
+def _complete(job: _Job, made: Path) -> None:
+    """Learn what is left beside a model's ghosts when that was left to the small model."""
+    from ..io.ghost_model_file import write_ghost_model
+    from ..measure.stages import read_views, with_rest
+
+    model = _model(made)
+    if not model.sprites:
+        write_ghost_model(made, with_rest(model, read_views(job.folder, job.run, job.every), job.threads))
+
+
 def _track_given(job: _Job) -> dict[str, object]:
-    return {"every": job.every, "model": _model(job.needed(MODEL, "fit")).model_dump_json()}
+    # ghosts are followed beside halo and star alone
+    model = _model(job.needed(MODEL, "fit")).replace(sprites=())
+    return {"every": job.every, "model": model.model_dump_json()}
 
 
 def _track(job: _Job, made: Path, _steps: Journal) -> None:

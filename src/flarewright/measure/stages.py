@@ -219,6 +219,7 @@ def fit_ghosts(
     how: Settling | None = None,
     again: int = 1,
     most: int = 60,
+    rest: bool = True,
     threads: int | None = None,
     tell: Tell = lambda _: None,
     progress: Progress = lambda _part, _words: None,
@@ -239,6 +240,8 @@ def fit_ghosts(
         How often more ghosts are looked for in what is left.
     most : int
         Ghosts.
+    rest : bool
+        Also learn what is left beside them; `compress_ghosts` learns it anew.
     threads : int, optional
     tell, progress, journal
         As for `find_ghosts`.
@@ -280,7 +283,8 @@ def fit_ghosts(
             )  # fmt: skip
         dim = _dimmed_beside(settled, views, dim.star, pool)
     wanted = [ghost for ghost in settled if not ghost.unwanted]
-    return with_rest(_model(run, to_model(wanted, views), dim, views), views, threads)
+    model = _model(run, to_model(wanted, views), dim, views)
+    return with_rest(model, views, threads) if rest else model
 
 
 def with_rest(model: GhostModel, views: Sequence[View], threads: int | None = None) -> GhostModel:

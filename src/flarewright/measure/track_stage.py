@@ -84,7 +84,7 @@ def compress_ghosts(
     if names != {track.name for track in tracks.ghosts}:
         raise FlarewrightError("the tracks are of other ghosts than the model's; run flarewright measure track again")
     small = compact(model, tracks, _views(folder, run, model, every), threads=threads, tell=tell)
-    return with_rest(small, read_views(folder, run, every), threads) if model.sprites else small
+    return with_rest(small, read_views(folder, run, every), threads)
 
 
 def _views(folder: Path, run: MergedRun, model: GhostModel, every: int) -> list[View]:
