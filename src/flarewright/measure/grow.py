@@ -70,7 +70,6 @@ def grow(
     channel: int,
     *,
     most: Growth = Growth(),
-    order: int = 0,
     pool: ThreadPoolExecutor | None = None,
 ) -> Fit | None:
     """Fit a ghost in stages.
@@ -83,8 +82,6 @@ def grow(
         Their pixels hold this ghost alone, as far as it is known.
     channel : int
     most : Growth
-    order : int
-        Of the first stage: 0 while nothing is known but place and size.
     pool : executor, optional
 
     Returns
@@ -103,7 +100,8 @@ def grow(
         fit = refine(start, patches, free, width=width, steps=steps, error=most.error, alike=most.alike, pool=pool)
         return fit, patches
 
-    found = polish(shape, order, min(order, most.intensity_order), 8, None)
+    found = polish(shape, 0, 0, 8, None)
+    order = 0
     while found is not None:
         fit, patches = found
         grown: Shape | None = None

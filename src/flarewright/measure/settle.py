@@ -164,7 +164,7 @@ def _grown(
     """Fit a ghost for the first time, with the rims that a search gave it and without: others were not known then."""
 
     def grown(shape: Shape) -> Fit | None:
-        return grow(shape, shown, channel, most=most, order=1, pool=pool)
+        return grow(shape, shown, channel, most=most, pool=pool)
 
     if not start.discs:
         return grown(start)
