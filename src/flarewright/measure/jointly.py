@@ -204,13 +204,12 @@ class _Search:
         for g in sheet.shown:
             shape = shapes[g]
             left, top, w, h = window_of(shape.numbers, shape.discs, sheet.sigma, sheet.frame, width, height)
+            if not w:
+                continue
             # each alone, and then laid over the others: a soft one is spread with all that its plane holds
             own = _WINDOWS.zeros(h, w + 1)
-            if w:
-                draw_with_changes(
-                    shape.numbers, shape.discs, sheet.sigma, _NONE, sheet.frame, left, top, own, _NO_CHANGES
-                )
-                plane[top : top + h, left : left + w] += own[:, :w]
+            draw_with_changes(shape.numbers, shape.discs, sheet.sigma, _NONE, sheet.frame, left, top, own, _NO_CHANGES)
+            plane[top : top + h, left : left + w] += own[:, :w]
         weight, residual = np.empty((height, width)), np.empty((height, width))
         cost, total, count = weigh_misfit(
             plane, sheet.pixels, sheet.known, self.error, OUTLIER if self.tails else np.inf, True, weight, residual

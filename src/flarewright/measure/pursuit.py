@@ -16,7 +16,7 @@ from ..model.ghost_model import Blades
 from .evenly import evenly
 from .find import Candidate, candidates, slopes_of
 from .fit import Shape, brightens, cost_of, patches_of, presence, render
-from .found import Found, darkened, left_beside, lit_by, rest_of
+from .found import Found, darkened, left_beside, rest_of
 from .grow import Growth, grow
 from .jointly import fitted_jointly
 from .journal import Journal
@@ -150,7 +150,7 @@ def pursue(
                 continue
             taken.append(trial)
             found.append(ghost)
-            rest = _take_off(ghost, shown, rest)
+            rest = left_beside(rest, [ghost], shown, 1, pool)
             numbers = ghost.shapes[1].numbers
             rim = "round" if trial.blades is None else f"{trial.blades.count} blades"
             tell(
@@ -302,10 +302,3 @@ def _near(speck: Candidate, view: View) -> View:
     """Return a view of what is next to a speck: all that lies farther off is more than it, and fits run off to that."""
     far = distances(view, speck.place(view.sigma)) > speck.radius + BESIDE_SPECK
     return replace(view, variance=np.where(far[..., None], np.inf, view.variance).astype(np.float32))
-
-
-def _take_off(ghost: Found, views: Sequence[View], rest: Sequence[Pixels]) -> list[Pixels]:
-    out = list(rest)
-    for k in range(ghost.first, ghost.last + 1):
-        out[k] = lit_by(ghost.shapes[1], views[k], rest[k], -1.0)
-    return out

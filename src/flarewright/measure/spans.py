@@ -9,7 +9,7 @@ from functools import partial
 
 import numpy as np
 
-from .fit import Presence, Shape, presence
+from .fit import Shape, presence
 from .found import Found, by_light, lit_by
 from .shared_out import shared_out
 from .views import Pixels, View
@@ -41,8 +41,8 @@ def span_of(
     -----
     A view that does not reach it, or cannot tell, is no reason for a death, and neither is a single one without it.
     """
-    seen = shared_out(partial(_seen, shape), views, own, pool=pool)
-    return _around([_unsure(each) or each.amplitude > THERE for each in seen], middle)
+    seen = shared_out(partial(_shown, shape), views, own, pool=pool)
+    return _around([each is not False for each in seen], middle)
 
 
 def respanned(
@@ -70,12 +70,10 @@ def respanned(
     for k in by_light(ghosts):
         ghost, shape = out[k], out[k].shapes[1]
         own = shared_out(partial(_own, ghost), range(len(views)), views, left, pool=pool)
-        seen = shared_out(partial(_seen, shape), views, own, pool=pool)
-        sure = [not _unsure(each) and each.amplitude > THERE for each in seen]
-        there = [_unsure(each) or each.amplitude > THERE for each in seen]
+        seen = shared_out(partial(_shown, shape), views, own, pool=pool)
         # the longest life of which views are certain
-        lives = {_around(there, at) for at, certain in enumerate(sure) if certain}
-        first, last = max(lives, key=lambda life: (sum(sure[life[0] : life[1] + 1]), -life[0]), default=(0, 0))
+        lives = {_around([each is not False for each in seen], at) for at, each in enumerate(seen) if each}
+        first, last = max(lives, key=lambda life: (seen[life[0] : life[1] + 1].count(True), -life[0]), default=(0, 0))
         if last - first + 1 < LEAST_VIEWS:
             continue
         for at in range(len(views)):
@@ -90,12 +88,10 @@ def _own(ghost: Found, number: int, view: View, rest: Pixels) -> Pixels:
     return lit_by(ghost.shapes[1], view, rest) if ghost.first <= number <= ghost.last else rest
 
 
-def _seen(shape: Shape, view: View, own: Pixels) -> Presence:
-    return presence(shape, view.showing(np.broadcast_to(own[..., None], view.pixels.shape)), 1)
-
-
-def _unsure(seen: Presence) -> bool:
-    return not np.isfinite(seen.error) or seen.error > _UNSURE
+def _shown(shape: Shape, view: View, own: Pixels) -> bool | None:
+    """Tell whether a view shows a shape; None when it cannot tell."""
+    seen = presence(shape, view.showing(np.broadcast_to(own[..., None], view.pixels.shape)), 1)
+    return bool(seen.amplitude > THERE) if np.isfinite(seen.error) and seen.error <= _UNSURE else None
 
 
 def _around(there: Sequence[bool], middle: int) -> tuple[int, int]:
