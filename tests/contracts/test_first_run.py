@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 import time
@@ -303,6 +304,31 @@ print(pixels.sum(), absent(["pixels"]))
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "6.0 []"
+
+
+def test_a_kernel_is_compiled_anew_when_one_that_it_holds_has_changed(tmp_path):
+    package = tmp_path / "formulas"
+    package.mkdir()
+    for name in ("_jit", "_cached", "_compiler", "_inner"):
+        shutil.copy(Path(first_run.__file__).with_name(f"{name}.py"), package)
+    (package / "__init__.py").touch()
+    held = package / "held.py"
+    (package / "root.py").write_text(
+        "from ._jit import compiled\nfrom .held import doubled\n\n@compiled\ndef root(x):\n    return doubled(x)\n"
+    )
+    code = "from formulas.root import root; print(root(1.0), sum(root.stats.cache_hits.values()))"
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+
+    def told(factor: float) -> str:
+        text = f"from ._jit import inlined\n\n@inlined\ndef doubled(x):\n    return {factor:.2f} * x\n"
+        if not held.exists() or held.read_text() != text:
+            held.write_text(text)
+        done = subprocess.run(
+            [sys.executable, "-c", code], capture_output=True, text=True, check=True, env=environment, cwd=tmp_path
+        )
+        return done.stdout.strip()
+
+    assert [told(2.0), told(2.0), told(3.0)] == ["2.0 0", "2.0 1", "3.0 0"]
 
 
 @pytest.mark.parametrize("processes", [1, 2, 3, 4, 20])
