@@ -8,28 +8,70 @@ from ._jit import compiled, inner
 
 # how far a bowl's bends may differ before it is a valley
 _VALLEY = 0.01
+# what rounding may make of a bound that is none below the misfit
+_ROUNDED = 0.999
 
 
 @inner
-def _apart(here, there, fine, row, column, half, off, enough):
-    """Add up the squares by which two pictures differ around a cell, each read at a place off it.
-
-    Pictures have `fine` places to a cell; `off` has rows and columns for the one and then for the other. Adds no
-    further than `enough`.
-    """
-    last_row, last_column = here.shape[0] - 1, here.shape[1] - 1
-    total = 0.0
-    for r in range(row - half, row + half + 1):
-        ra = min(max(fine * r + off[0], 0), last_row)
-        rb = min(max(fine * r + off[2], 0), last_row)
-        for c in range(column - half, column + half + 1):
-            ca = min(max(fine * c + off[1], 0), last_column)
-            cb = min(max(fine * c + off[3], 0), last_column)
+def _widened(picture, down, along):
+    """Return a picture as rows of numbers, with so many more cells to each side, as at the border."""
+    height, width = picture.shape[0], picture.shape[1]
+    out = np.empty((height + 2 * down, 3 * (width + 2 * along)), np.float32)
+    for r in range(out.shape[0]):
+        row = min(max(r - down, 0), height - 1)
+        for c in range(width + 2 * along):
+            column = min(max(c - along, 0), width - 1)
             for m in range(3):
-                apart = here[ra, ca, m] - there[rb, cb, m]
-                total += apart * apart
+                out[r, 3 * c + m] = picture[row, column, m]
+    return out
+
+
+@inner
+def _sums(wide, side):
+    """Return the sum of each colour in each block of `side` by `side` cells, by its first row and number."""
+    rows, numbers = wide.shape[0] - side + 1, wide.shape[1] - 3 * (side - 1)
+    columns = np.zeros((rows, wide.shape[1]))
+    for r in range(rows):
+        for k in range(side):
+            for x in range(wide.shape[1]):
+                columns[r, x] += wide[r + k, x]
+    out = np.zeros((rows, numbers))
+    for r in range(rows):
+        for k in range(side):
+            for x in range(numbers):
+                out[r, x] += columns[r, x + 3 * k]
+    return out
+
+
+@inner
+def _apart(here, there, row, at, other_row, other_at, rows, count, enough):
+    """Add up the squares by which two blocks of `rows` rows of `count` numbers differ, no further than `enough`."""
+    total = 0.0
+    for r in range(rows):
+        squares = 0.0
+        for x in range(count):
+            apart = here[row + r, at + x] - there[other_row + r, other_at + x]
+            squares += apart * apart
+        total += squares
         if total > enough:
             break
+    return total
+
+
+@inner
+def _apart_halfway(before, after, row, column, half, down, along):
+    """Add up the squares by which two pictures, twice as fine as cells, differ a move apart around a cell."""
+    last_row, last_column = before.shape[0] - 1, before.shape[1] - 1
+    total = 0.0
+    for r in range(row - half, row + half + 1):
+        ra = min(max(2 * r - down, 0), last_row)
+        rb = min(max(2 * r + down, 0), last_row)
+        for c in range(column - half, column + half + 1):
+            ca = min(max(2 * c - along, 0), last_column)
+            cb = min(max(2 * c + along, 0), last_column)
+            for m in range(3):
+                apart = before[ra, ca, m] - after[rb, cb, m]
+                total += apart * apart
     return total
 
 
@@ -106,14 +148,23 @@ def match_blocks(here, there, rows, columns, half, reach, stiff, noise, out):
         moves[n, 0], moves[n, 1] = n // (2 * along + 1) - down, n % (2 * along + 1) - along
         lengths[n] = sqrt(moves[n, 0] ** 2 + moves[n, 1] ** 2)
     order = np.argsort(lengths, kind="mergesort")
+    side = 2 * half + 1
+    wide, other = _widened(here, half, half), _widened(there, half + down, half + along)
+    # blocks differ by no less than their means do: most moves are told by that (Li and Salari 1995, Successive
+    # elimination algorithm for motion estimation)
+    own, others, per = _sums(wide, side), _sums(other, side), _ROUNDED / side**2
     for i in range(rows.size):
         for j in range(columns.size):
             best, chosen, still = np.inf, 0, 0.0
             for n in order:
                 factor = 1.0 + stiff * lengths[n]
                 enough = best / factor - noise
-                off = (0, 0, moves[n, 0], moves[n, 1])
-                misfit = _apart(here, there, 1, rows[i], columns[j], half, off, enough)
+                row, at, x = rows[i] + down + moves[n, 0], 3 * (columns[j] + along + moves[n, 1]), 3 * columns[j]
+                red, green = own[rows[i], x] - others[row, at], own[rows[i], x + 1] - others[row, at + 1]
+                blue = own[rows[i], x + 2] - others[row, at + 2]
+                if per * (red * red + green * green + blue * blue) > enough:
+                    continue
+                misfit = _apart(wide, other, rows[i], x, row, at, side, 3 * side, enough)
                 cost = (misfit + noise) * factor
                 if n == order[0]:
                     still = cost
@@ -155,8 +206,7 @@ def refine_blocks(before, after, rows, columns, half, around, steps):
             for a in range(side):
                 for b in range(side):
                     down, along = v + a - around - 1, h + b - around - 1
-                    off = (-down, -along, down, along)
-                    misfits[a, b] = _apart(before, after, 2, rows[i], columns[j], half, off, np.inf)
+                    misfits[a, b] = _apart_halfway(before, after, rows[i], columns[j], half, down, along)
             # as it was, where nothing is better
             p = q = around + 1
             for a in range(1, side - 1):

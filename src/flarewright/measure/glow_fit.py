@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
 from statistics import NormalDist
 
@@ -15,6 +17,7 @@ from numpy.typing import NDArray
 from ..model.ghost_model import Blades, Halo, Rgb3, Star
 from .glow import halo_radiance, offsets, star_radiance
 from .numbers import Floats
+from .shared_out import shared_out
 from .views import Pixels, View, halved
 
 # the constellations' quantile that is taken for light without ghosts
@@ -22,6 +25,8 @@ LOW = 0.3
 # the halo's pictures are halved so often: noise would pull a low quantile down
 _HALVINGS = 2
 _RINGS = 20
+# rows of the registered picture that are sorted at once
+_BAND = 16
 # there is no more halo than anything shows: the part of a ring that may be darker, the part of the views that may
 # be darker still, for rims shade the light in some, and how many places a ring must have
 _DARKER, _DARKER_VIEWS, _LEAST_PLACES = 0.02, 0.1, 12
@@ -72,7 +77,13 @@ class Registered:
         return self.side * (x + 0.5 - self.origin[0]), self.side * (self.origin[1] - y - 0.5)
 
 
-def register(views: Sequence[View], pixels: Sequence[Pixels], low: float = LOW, halvings: int = 0) -> Registered:
+def register(
+    views: Sequence[View],
+    pixels: Sequence[Pixels],
+    low: float = LOW,
+    halvings: int = 0,
+    pool: ThreadPoolExecutor | None = None,
+) -> Registered:
     """Lay all views over each other by the light and take a low quantile.
 
     Parameters
@@ -84,45 +95,49 @@ def register(views: Sequence[View], pixels: Sequence[Pixels], low: float = LOW, 
         Quantile.
     halvings : int
         Of the resolution.
+    pool : executor, optional
     """
-    return Registered(
-        np.stack([_register(views, [each[..., m] for each in pixels], low, halvings) for m in range(3)], axis=-1),
-        2**halvings,
-    )
+    small = shared_out(partial(halved, times=halvings), pixels, pool=pool)
+    lights = [(round(view.light_px[0] / 2**halvings), round(view.light_px[1] / 2**halvings)) for view in views]
+    first_rows = range(0, 2 * small[0].shape[0], _BAND)
+    bands = shared_out(partial(_registered, small, lights, low), first_rows, pool=pool)
+    return Registered(np.concatenate(bands), 2**halvings)
 
 
-def _register(views: Sequence[View], pixels: Sequence[Pixels], low: float, halvings: int) -> Pixels:
-    """Register one channel, shape (2 h, 2 w)."""
-    small = [halved(each, halvings) for each in pixels]
-    height, width = small[0].shape
-    stack = np.full((len(views), 2 * height, 2 * width), np.nan, np.float32)
-    for k, view in enumerate(views):
-        x, y = (round(at / 2**halvings) for at in view.light_px)
+def _registered(pixels: Sequence[Pixels], lights: Sequence[tuple[int, int]], low: float, first_row: int) -> Pixels:
+    """Register some rows, shape (rows, 2 w, 3)."""
+    height, width = pixels[0].shape[:2]
+    last_row = min(first_row + _BAND, 2 * height)
+    # each place's values beside each other: they are sorted
+    stack = np.full((last_row - first_row, 2 * width, 3, len(pixels)), np.nan, np.float32)
+    for k, (picture, (x, y)) in enumerate(zip(pixels, lights, strict=True)):
         left, top = width - x, height - y
-        x0, y0 = max(left, 0), max(top, 0)
-        x1, y1 = min(left + width, 2 * width), min(top + height, 2 * height)
+        x0, y0 = max(left, 0), max(top, first_row)
+        x1, y1 = min(left + width, 2 * width), min(top + height, last_row)
         if x0 < x1 and y0 < y1:
-            stack[k, y0:y1, x0:x1] = small[k][y0 - top : y1 - top, x0 - left : x1 - left]
-    count = np.isfinite(stack).sum(axis=0)
+            stack[y0 - first_row : y1 - first_row, x0:x1, :, k] = picture[y0 - top : y1 - top, x0 - left : x1 - left]
+    count = np.isfinite(stack).sum(axis=-1)
     # not a number sorts last, so the quantile's place follows from how many there are
-    stack.sort(axis=0)
+    stack.sort(axis=-1)
     at = np.maximum(count - 1, 0) * low
     below = np.floor(at).astype(np.int64)
-    first = np.take_along_axis(stack, below[None], axis=0)[0]
-    second = np.take_along_axis(stack, np.minimum(below + 1, np.maximum(count - 1, 0))[None], axis=0)[0]
+    first = np.take_along_axis(stack, below[..., None], axis=-1)[..., 0]
+    second = np.take_along_axis(stack, np.minimum(below + 1, np.maximum(count - 1, 0))[..., None], axis=-1)[..., 0]
     found = first + (at - below) * (second - first)
-    found[count < max(3, len(views) // 5)] = np.nan
+    found[count < max(3, len(pixels) // 5)] = np.nan
     return np.asarray(found, dtype=np.float32)
 
 
-def fit_halo(views: Sequence[View], pixels: Sequence[Pixels], low: float = LOW) -> Halo | None:
+def fit_halo(
+    views: Sequence[View], pixels: Sequence[Pixels], low: float = LOW, pool: ThreadPoolExecutor | None = None
+) -> Halo | None:
     """Return the halo: the median of rings around the light in the registered quantile, as far as any place is as dark.
 
     Ghosts that go along with the light are beside it at every constellation, but not all around it.
 
     Parameters
     ----------
-    views, pixels, low
+    views, pixels, low, pool
         As for `register`.
 
     Returns
@@ -130,10 +145,10 @@ def fit_halo(views: Sequence[View], pixels: Sequence[Pixels], low: float = LOW) 
     Halo or None
         None when there is no light around the light.
     """
-    known = register(views, pixels, low, _HALVINGS)
+    known = register(views, pixels, low, _HALVINGS, pool)
     right, up = known.polar()
     radius = np.hypot(right, up)
-    seen = [_around(view) for view in views]
+    seen = shared_out(_around, views, pool=pool)
     far, side = float(radius.max()), known.side
     middles, levels = [], []
     for inner, outer in pairwise(np.geomspace(side, far + side, _RINGS + 1)):
@@ -189,7 +204,7 @@ def _rgb(level: NDArray[np.floating]) -> Rgb3:
 
 def followed(
     views: Sequence[View], pixels: Sequence[Pixels], masks: Sequence[NDArray[np.bool_]], halo: Halo | None,
-    star: Star | None,
+    star: Star | None, pool: ThreadPoolExecutor | None = None,
 ) -> tuple[Halo | None, Star | None]:  # fmt: skip
     """Return halo and star with how strong they are at each constellation.
 
@@ -202,6 +217,7 @@ def followed(
     masks : sequence of ndarray of bool, shape (H, W)
         Where to look.
     halo, star : Halo or None, Star or None
+    pool : executor, optional
 
     Returns
     -------
@@ -212,22 +228,7 @@ def followed(
     Least squares in every view, light that is missed (ghosts not known) counting less and less. The rims of a lens
     shade the light's image as the constellation grows, and so all that spreads from it.
     """
-    parts = np.ones((len(views), 5))
-    for k, (view, picture, mask) in enumerate(zip(views, pixels, masks, strict=True)):
-        x, y = offsets(view.light_px, view.size_px, 1.0)
-        shapes = np.zeros((*picture.shape, 5))
-        if halo is not None:
-            shapes[..., 0] = halo_radiance(halo, x, y)
-        if star is not None:
-            shapes[..., 1] = star_radiance(star, x, y)
-        for m in range(3):
-            shapes[..., m, 2 + m] = 1.0
-        known = np.isfinite(picture) & mask[..., None]
-        every = max(1, int(np.sqrt(np.count_nonzero(known) / _SAMPLES)))
-        spots = np.zeros(known.shape, bool)
-        spots[::every, ::every] = known[::every, ::every]
-        parts[k] = _strengths(shapes[spots], picture[spots].astype(float), view.variance[spots].astype(float))
-        parts[k] *= _bound(np.where(known, shapes @ parts[k], np.nan), view)
+    parts = np.array(shared_out(partial(_parts, halo, star), views, pixels, masks, pool=pool))
     padded = np.concatenate([parts[:1], parts, parts[-1:]])
     smooth = np.median(np.stack([padded[:-2], padded[1:-1], padded[2:]]), axis=0)
     told = [(view.constellation_deg, *map(float, row)) for view, row in zip(views, smooth, strict=True)]
@@ -237,6 +238,21 @@ def followed(
         }),
         None if star is None else star.model_copy(update={"strength": tuple((row[0], row[2]) for row in told)}),
     )  # fmt: skip
+
+
+def _parts(halo: Halo | None, star: Star | None, view: View, pixels: Pixels, mask: NDArray[np.bool_]) -> Floats:
+    """Return how strong halo, star and an even red, green and blue are in a view, shape (5,)."""
+    x, y = offsets(view.light_px, view.size_px, 1.0)
+    none = np.zeros(pixels.shape)
+    shapes = [none if halo is None else halo_radiance(halo, x, y), none if star is None else star_radiance(star, x, y)]
+    known = np.isfinite(pixels) & mask[..., None]
+    every = max(1, int(np.sqrt(np.count_nonzero(known) / _SAMPLES)))
+    spots = np.zeros(known.shape, bool)
+    spots[::every, ::every] = known[::every, ::every]
+    basis = np.concatenate([np.stack([one[spots] for one in shapes], axis=1), np.eye(3)[np.nonzero(spots)[2]]], axis=1)
+    parts = _strengths(basis, pixels[spots].astype(float), view.variance[spots].astype(float))
+    glow = parts[0] * shapes[0] + parts[1] * shapes[1] + parts[2:]
+    return parts * _bound(np.where(known, glow, np.nan), view)
 
 
 def _bound(glow: Floats, view: View) -> float:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from math import log
 
@@ -40,8 +40,8 @@ SPECK, BESIDE_SPECK = 3.5, 3.0
 # part of what either covers that a fit shares with the circle it began at, where it is brighter than this part of its
 # brightest place; so many views tell
 COVERS, LIT, _LOOKED = 0.35, 0.1, 4
-# who was refused is tried again when twice as many ghosts are known, and so many more
-_SOON = 2
+# who was refused is tried again when twice as many ghosts are known, and so many more; but no more often than this
+_SOON, _TRIES = 2, 3
 # steps of all ghosts at once after some were found
 _TOUCHES = 8
 # all are asked anew where they are there when by so much more ghosts are known
@@ -121,8 +121,7 @@ def pursue(
     wanted = rest_of(known, shown, 1, pool)
     rest = list(wanted)
     found: list[Found] = []
-    # each with how many ghosts were known when it was
-    refused: list[tuple[Candidate, int]] = []
+    refused: list[_Refused] = []
     waiting = list(first)
     steps = journal or Journal()
     fallen = _Fallen(progress)
@@ -146,7 +145,7 @@ def pursue(
                 continue
             ghost = steps.step(partial(_try, trial, shown, rest, pool))
             if ghost is None:
-                refused = [*((one, then) for one, then in refused if not _same(one, trial)), (trial, len(found))]
+                refused = _with_refused(refused, trial, len(found))
                 continue
             taken.append(trial)
             found.append(ghost)
@@ -171,14 +170,30 @@ def pursue(
     return respanned(found, shown, rest, pool)[0] if len(found) > asked_at else found
 
 
-def _open(votes: Sequence[Candidate], refused: Sequence[tuple[Candidate, int]], known: int) -> list[Candidate]:
+@dataclass(frozen=True)
+class _Refused:
+    """A candidate that was refused so many times, the last time when so many ghosts were known."""
+
+    candidate: Candidate
+    times: int
+    known: int
+
+
+def _with_refused(refused: Sequence[_Refused], trial: Candidate, known: int) -> list[_Refused]:
+    """Return who was refused, with one more."""
+    before = [one for one in refused if _same(one.candidate, trial)]
+    others = [one for one in refused if one not in before]
+    return [*others, _Refused(trial, 1 + max((one.times for one in before), default=0), known)]
+
+
+def _open(votes: Sequence[Candidate], refused: Sequence[_Refused], known: int) -> list[Candidate]:
     """Return the candidates to try while so many ghosts are known.
 
     Beside ghosts that are not known yet one explains little of what is in its windows, and runs off to their light. So
     one that was refused waits until many more are known; where nothing else is left, until any more are.
     """
     for latest in (known // 2 - _SOON, known - 1):
-        barred = [one for one, then in refused if then > latest]
+        barred = [one.candidate for one in refused if one.known > latest or one.times == _TRIES]
         trials = [each for each in votes if not any(_same(each, other) for other in barred)]
         if trials:
             return trials

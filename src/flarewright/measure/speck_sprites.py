@@ -7,6 +7,7 @@ for cells that are finer than pixels. What is left of it is taken, so that the g
 from __future__ import annotations
 
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from itertools import groupby
 from math import ceil, floor
@@ -19,6 +20,7 @@ from ..model.ghost_model import GhostModel
 from ..model.sprite import Sprite, packed
 from .numbers import Floats, visible
 from .packed import Packed, pack
+from .shared_out import shared_out
 from .specks_drawn import Grid, Outline, add_speck, outline, reading
 from .sprite_fit import DIGIT, darkest_noise, even_knots
 from .sprites import between, sprite_at
@@ -341,6 +343,12 @@ def _bright(pictures: Floats) -> Pixels:
     return np.asarray(pictures * kept[:, :, None], dtype=np.float32)
 
 
-def hidden(pixels: Pixels, mask: Mask) -> Pixels:
-    """Return a picture with what is in a mask not measured."""
-    return np.where(mask[..., None], np.float32(np.nan), pixels)
+def all_hidden(
+    pictures: Sequence[Pixels], masks: Sequence[Mask], pool: ThreadPoolExecutor | None = None
+) -> list[Pixels]:
+    """Return pictures with what is in their masks not measured."""
+
+    def hidden(pixels: Pixels, mask: Mask) -> Pixels:
+        return np.where(mask[..., None], np.float32(np.nan), pixels)
+
+    return shared_out(hidden, pictures, masks, pool=pool)

@@ -9,12 +9,14 @@ constellation.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..model.sprite import Sprite, packed
 from .numbers import Floats, frame
+from .shared_out import shared_out
 from .sprites import between, draw_sprites, samples, sprite_at, turned_ways, ways
 from .views import Pixels, View
 
@@ -39,10 +41,12 @@ _NOISE = 1.5
 _MEASURED, ENOUGH = 0.3, 0.6
 # a cell is told to this part of the noise of the darkest pixels, averaged over the cell
 DIGIT = 0.3
-_CHUNK = 20000
+_CHUNK = 2000
 
 
-def light_sprites(views: Sequence[View], pixels: Sequence[Pixels], starry: bool) -> tuple[Sprite, ...]:
+def light_sprites(
+    views: Sequence[View], pixels: Sequence[Pixels], starry: bool, pool: ThreadPoolExecutor | None = None
+) -> tuple[Sprite, ...]:
     """Learn what goes with the light.
 
     Parameters
@@ -54,6 +58,7 @@ def light_sprites(views: Sequence[View], pixels: Sequence[Pixels], starry: bool)
     starry : bool
         There is a star: it stands still when the light rolls, and so do the pictures that reach no farther than its
         core. All others turn with the light, as ghosts do.
+    pool : executor, optional
 
     Returns
     -------
@@ -70,18 +75,25 @@ def light_sprites(views: Sequence[View], pixels: Sequence[Pixels], starry: bool)
         grain = 2.0**level
         side = _AROUND * grain
         turns = not starry or (level > 0 and side > _CORE * width)
-        sprite = _fitted(views, left, grain, side, angles, usual if turns else None)
+        sprite = _fitted(views, left, grain, side, angles, usual if turns else None, pool)
         found.append(sprite)
-        left = [each - drawn((sprite,), view) for each, view in zip(left, views, strict=True)]
+        left = beside_sprites(left, (sprite,), views, pool)
     return tuple(found)
 
 
-def axis_sprite(views: Sequence[View], pixels: Sequence[Pixels]) -> Sprite:
+def beside_sprites(
+    left: Sequence[Pixels], sprites: Sequence[Sprite], views: Sequence[View], pool: ThreadPoolExecutor | None = None
+) -> list[Pixels]:
+    """Take sprites off what is left of views."""
+    return shared_out(lambda each, view: each - drawn(sprites, view), left, views, pool=pool)
+
+
+def axis_sprite(views: Sequence[View], pixels: Sequence[Pixels], pool: ThreadPoolExecutor | None = None) -> Sprite:
     """Keep what is still left, coarsely, about the axis and beside the ghosts.
 
     Parameters
     ----------
-    views, pixels
+    views, pixels, pool
         As for `light_sprites`.
 
     Returns
@@ -96,15 +108,17 @@ def axis_sprite(views: Sequence[View], pixels: Sequence[Pixels]) -> Sprite:
     columns, rows = (high - low).astype(int)
     along, down = _middles(low[0] * grain, low[1] * grain, grain, int(rows), int(columns))
     groups = np.array_split(np.arange(len(views)), min(len(views), _MOST_AXIS))
-    pictures, noises = [], []
-    for group in groups:
+
+    def of(group: NDArray[np.int64]) -> tuple[Floats, Floats]:
         light, noise, total = np.zeros((3, rows, columns, 3))
         for k in group:
             mean, variance, weight = _cells(pixels[k], views[k], *_placed(views[k], along, down), grain)
             light, noise, total = light + weight * mean, noise + weight**2 * variance, total + weight
         known = total > 0.0
-        pictures.append(np.where(known, light / np.maximum(total, 1e-9), np.nan))
-        noises.append(np.where(known, noise / np.maximum(total, 1e-9) ** 2, 0.0))
+        light = np.where(known, light / np.maximum(total, 1e-9), np.nan)
+        return light, np.where(known, noise / np.maximum(total, 1e-9) ** 2, 0.0)
+
+    pictures, noises = zip(*shared_out(of, groups, pool=pool), strict=True)
     unit, cells = packed(
         beside(_filled(beside(sure(np.stack(pictures), np.stack(noises)), _NEXT))), DIGIT * darkest_noise(views) / grain
     )
@@ -220,6 +234,7 @@ def _fitted(
     side: float,
     angles: tuple[float, ...],
     roll_deg: float | None,
+    pool: ThreadPoolExecutor | None,
 ) -> Sprite:
     """Fit the pictures of one grain, cell by cell, as far as `side` to each side of the light.
 
@@ -230,11 +245,14 @@ def _fitted(
     right, down = _middles(-side, -side, grain, rows, columns)
     values = np.zeros((len(views), rows, columns, 3), np.float32)
     weights, noise = np.zeros_like(values), np.zeros_like(values[0])
-    for k, (view, picture) in enumerate(zip(views, pixels, strict=True)):
-        x, y = _beside_light(view, right, down, roll_deg)
-        values[k], variance, weights[k] = _cells(picture, view, x, y, grain)
+
+    def one(view: View, picture: Pixels) -> tuple[Floats, Floats, Floats]:
+        return _cells(picture, view, *_beside_light(view, right, down, roll_deg), grain)
+
+    for k, (mean, variance, weight) in enumerate(shared_out(one, views, pixels, pool=pool)):
+        values[k], weights[k] = mean, weight
         noise += weights[k] ** 2 * variance
-    pictures = pictures_over(angles, views, values, weights, noise)
+    pictures = pictures_over(angles, views, values, weights, noise, pool)
     # beyond its border a fine picture is 0, and the coarse ones go on
     pictures *= np.outer(_window(rows), _window(columns))[..., None]
     unit, cells = packed(pictures, DIGIT * darkest_noise(views) / grain)
@@ -254,8 +272,9 @@ def _beside_light(view: View, right: Floats, down: Floats, roll_deg: float | Non
 
 
 def pictures_over(
-    angles: tuple[float, ...], views: Sequence[View], values: Pixels, weights: Pixels, noise: Floats | Pixels
-) -> Pixels:
+    angles: tuple[float, ...], views: Sequence[View], values: Pixels, weights: Pixels, noise: Floats | Pixels,
+    pool: ThreadPoolExecutor | None = None,
+) -> Pixels:  # fmt: skip
     """Fit pictures over the constellation to what views show of their cells.
 
     Parameters
@@ -267,6 +286,7 @@ def pictures_over(
         What each view shows, and how well; 0: not measured.
     noise : ndarray, shape (rows, columns, 3)
         Variance of the values, times squared weights, added up over the views.
+    pool : executor, optional
 
     Returns
     -------
@@ -275,7 +295,7 @@ def pictures_over(
     """
     told, knots = np.array([view.constellation_deg for view in views]), np.array(angles)
     flat, shape = (len(views), -1), (len(angles), *noise.shape)
-    found = over_angles(values.reshape(flat), weights.reshape(flat), told, knots)
+    found = over_angles(values.reshape(flat), weights.reshape(flat), told, knots, pool)
     near = seen_near(weights.reshape(flat), told, knots)
     total = weights.sum(axis=0)
     known = total >= ENOUGH * len(views) / max(len(angles), VIEWS)
@@ -290,7 +310,9 @@ def _window(count: int) -> Pixels:
     return np.asarray(np.sin(0.5 * np.pi * np.minimum(away, 1.0)) ** 2, dtype=np.float32)
 
 
-def over_angles(values: Pixels, weights: Pixels, told: Floats, knots: Floats) -> Pixels:
+def over_angles(
+    values: Pixels, weights: Pixels, told: Floats, knots: Floats, pool: ThreadPoolExecutor | None = None
+) -> Pixels:
     """Fit every cell over the constellation, linear between knots, what stands out counting less; shape (K, cells)."""
     basis = _hats(told, knots)
     count = knots.size
@@ -299,7 +321,8 @@ def over_angles(values: Pixels, weights: Pixels, told: Floats, knots: Floats) ->
     products = (basis[:, :, None] * basis[:, None, :]).reshape(told.size, -1)
     out = np.zeros((count, values.shape[1]), np.float32)
     seen = np.flatnonzero(weights.any(axis=0))
-    for part in np.array_split(seen, max(1, seen.size // _CHUNK)):
+
+    def fit(part: NDArray[np.int64]) -> None:
         value, own = values[:, part].astype(float), weights[:, part].astype(float)
         weight = own
         for turn in range(_ROUNDS):
@@ -313,6 +336,8 @@ def over_angles(values: Pixels, weights: Pixels, told: Floats, knots: Floats) ->
             # ghosts that nobody knows are bright
             weight = own / (1.0 + np.where(off > 0.0, off, 0.5 * off) ** 2)
         out[:, part] = solved.T
+
+    shared_out(fit, np.array_split(seen, max(1, seen.size // _CHUNK)), pool=pool)
     return out
 
 

@@ -18,7 +18,6 @@ from ..kernels.measure_pupil import FIRST_DISC, FIRST_I, LATERAL, SOFT
 from ..model.capture import FrameInfo, MergedRun
 from ..model.corrections import Corrections
 from ..model.ghost_model import AberrationGhost, Blades, GhostModel, Halo, Reference, Star
-from ..model.sprite import Sprite
 from .detail_fit import with_detail
 from .fit import Shape, light_of
 from .found import Found
@@ -36,10 +35,10 @@ from .reach import with_reaches
 from .replay import draw, light_px
 from .settle import Settling, settle, to_model
 from .shared_out import shared_out
-from .speck_sprites import covered, hidden, speck_sprites, specks_of
+from .speck_sprites import all_hidden, covered, speck_sprites, specks_of
 from .specks_drawn import draw_specks
 from .spike_fit import spike_sprites
-from .sprite_fit import axis_sprite, drawn, light_sprites
+from .sprite_fit import axis_sprite, beside_sprites, light_sprites
 from .views import Pixels, View, halved, views_of
 
 Tell = Callable[[str], None]
@@ -83,13 +82,14 @@ def read_views(folder: Path, run: MergedRun, every: int = 1) -> tuple[View, ...]
     return views_of([read_frame(folder, info) for info in frames], largest)
 
 
-def masks_of(views: Sequence[View]) -> list[NDArray[np.bool_]]:
+def masks_of(views: Sequence[View], pool: ThreadPoolExecutor | None = None) -> list[NDArray[np.bool_]]:
     """Return where ghosts are looked for: where all colours were measured, away from the light."""
-    out = []
-    for view in views:
+
+    def one(view: View) -> NDArray[np.bool_]:
         far = _off_light(view) > AROUND_LIGHT * view.size_px[0]
-        out.append(far & np.isfinite(view.variance).all(axis=2))
-    return out
+        return np.asarray(far & np.isfinite(view.variance).all(axis=2))
+
+    return shared_out(one, views, pool=pool)
 
 
 def _off_light(view: View) -> NDArray[np.float64]:
@@ -136,9 +136,9 @@ class Dimmed:
     star: Star | None
 
 
-def _star_of(views: Sequence[View]) -> Star | None:
+def _star_of(views: Sequence[View], pool: ThreadPoolExecutor) -> Star | None:
     """Find the star that stays beside the light at every constellation, if there is one."""
-    return fit_star(register(views, _measured(views)))
+    return fit_star(register(views, _measured(views), pool=pool))
 
 
 def _measured(views: Sequence[View]) -> list[Pixels]:
@@ -191,7 +191,7 @@ def find_ghosts(
     views = read_views(folder, run, every)
     known = corrections or Corrections()
     with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
-        dim = _dimmed_beside([], views, _star_of(views), pool)
+        dim = _dimmed_beside([], views, _star_of(views, pool), pool)
         times, small = _for_search(dim.views)
         iris = iris_of(dim.star)
         pointed = [candidate(each, small, 2.0**times, run) for each in known.add]
@@ -266,7 +266,7 @@ def fit_ghosts(
         raise FlarewrightError("a Bezier ghost cannot be fitted over all constellations; take it out of the model")
     settling = how or Settling(rounds=1)
     with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
-        dim = _dimmed_beside(found, views, _star_of(views), pool)
+        dim = _dimmed_beside(found, views, _star_of(views, pool), pool)
         iris = iris_of(dim.star)
         parts = iter(_parts(2 * again + 1, progress))
         settled = settle(
@@ -303,16 +303,16 @@ def with_rest(model: GhostModel, views: Sequence[View], threads: int | None = No
         specks = specks_of(model, placed)
         # a speck is so much brighter than what is around it that coarse cells would spread its errors over that
         masks = covered(specks, placed, left)
-        spikes = spike_sprites(placed, _all_hidden(left, masks), model.star)
-        left = _beside_sprites(left, spikes, placed, pool)
+        spikes = spike_sprites(placed, all_hidden(left, masks, pool), model.star)
+        left = beside_sprites(left, spikes, placed, pool)
         # coarse pictures overshoot beside the light's image, which finer ones only mend where something is known
-        around = shared_out(around_light, placed, _all_hidden(left, masks), pool=pool)
-        going = light_sprites(placed, around, model.star is not None)
-        left = _beside_sprites(left, going, placed, pool)
+        around = shared_out(around_light, placed, all_hidden(left, masks, pool), pool=pool)
+        going = light_sprites(placed, around, model.star is not None, pool)
+        left = beside_sprites(left, going, placed, pool)
         # next to the light a pixel's error is brighter than all that turns about the axis
         next_to_light = [_off_light(view) < NEXT_TO_LIGHT * view.size_px[0] for view in placed]
-        axis = axis_sprite(placed, _all_hidden(_all_hidden(left, masks), next_to_light))
-        left = _beside_sprites(left, (axis,), placed, pool)
+        axis = axis_sprite(placed, all_hidden(all_hidden(left, masks, pool), next_to_light, pool), pool)
+        left = beside_sprites(left, (axis,), placed, pool)
         small = speck_sprites(specks, placed, left, masks_of(placed))
     moving = with_moves(model.replace(sprites=(*spikes, *going, axis, *small)), threads)
     packed = pack(moving)
@@ -320,7 +320,7 @@ def with_rest(model: GhostModel, views: Sequence[View], threads: int | None = No
         each - draw_specks(small, packed, moving, view.constellation_deg, view.frame, view.size_px)
         for each, view in zip(left, placed, strict=True)
     ]
-    return with_reaches(with_detail(moving, placed, _all_hidden(left, next_to_light), threads), placed, threads)
+    return with_reaches(with_detail(moving, placed, all_hidden(left, next_to_light), threads), placed, threads)
 
 
 def _left_by(model: GhostModel, view: View) -> Pixels:
@@ -328,18 +328,6 @@ def _left_by(model: GhostModel, view: View) -> Pixels:
     known = np.where(np.isfinite(view.variance), view.pixels, np.nan)
     ghosts = draw(model, view.constellation_deg, view.roll_deg, view.size_px)
     return np.asarray(known - ghosts - _light(model.halo, model.star, view), dtype=np.float32)
-
-
-def _all_hidden(pictures: Sequence[Pixels], masks: Sequence[NDArray[np.bool_]]) -> list[Pixels]:
-    """Return pictures with what is in their masks not measured."""
-    return [hidden(each, mask) for each, mask in zip(pictures, masks, strict=True)]
-
-
-def _beside_sprites(
-    left: Sequence[Pixels], sprites: Sequence[Sprite], views: Sequence[View], pool: ThreadPoolExecutor
-) -> list[Pixels]:
-    """Take sprites off what is left of views."""
-    return shared_out(lambda each, view: each - drawn(sprites, view), left, views, pool=pool)
 
 
 def around_light(view: View, pixels: Pixels) -> Pixels:
@@ -387,7 +375,8 @@ def _dimmed_beside(
 ) -> Dimmed:
     """Learn the halo, and how strong a star is, from what is left beside known ghosts, and take both off the views."""
     left = shared_out(partial(without, ghosts), views, range(len(views)), pool=pool)
-    halo, star = followed(views, left, masks_of(views), fit_halo(views, left), star)
+    masks = masks_of(views, pool)
+    halo, star = followed(views, left, masks, fit_halo(views, left, pool=pool), star, pool)
     return Dimmed(beside(views, halo, star, pool), halo, star)
 
 
@@ -406,7 +395,7 @@ def beside(
         variance = np.where(mask[..., None], view.variance + (LEFT_BEHIND * light) ** 2, np.inf).astype(np.float32)
         return replace(view, pixels=view.pixels - light, variance=variance)
 
-    return shared_out(one, views, masks_of(views), pool=pool)
+    return shared_out(one, views, masks_of(views, pool), pool=pool)
 
 
 def _light(halo: Halo | None, star: Star | None, view: View) -> Pixels:
