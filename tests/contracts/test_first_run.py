@@ -309,7 +309,7 @@ print(pixels.sum(), absent(["pixels"]))
 def test_a_kernel_is_compiled_anew_when_one_that_it_holds_has_changed(tmp_path):
     package = tmp_path / "formulas"
     package.mkdir()
-    for name in ("_jit", "_cached", "_compiler", "_inner"):
+    for name in ("_jit", "_fresh", "_cached", "_compiler", "_inner"):
         shutil.copy(Path(first_run.__file__).with_name(f"{name}.py"), package)
     (package / "__init__.py").touch()
     held = package / "held.py"

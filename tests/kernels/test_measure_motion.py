@@ -36,6 +36,23 @@ def test_every_block_is_found_where_it_was_put(down, along):
     assert ((found[..., 2] > 1.0) == bool(down or along)).all()
 
 
+def test_no_move_is_passed_over_that_does_better():
+    """Every move is tried here, whatever the blocks' means say."""
+    rng = np.random.default_rng(8)
+    here, there = (light(0.3, along) + rng.normal(0.0, 0.2, (50, 80, 3)).astype(np.float32) for along in (0.0, 3.4))
+    found = matched(here, there)
+    wide = np.pad(there.astype(float), [(20, 20), (20, 20), (0, 0)], mode="edge")
+    for i, row in enumerate(ROWS):
+        for j, column in enumerate(COLUMNS):
+            own = here[row - 3 : row + 4, column - 3 : column + 4].astype(float)
+            costs = {}
+            for down in range(-REACH[0], REACH[0] + 1):
+                for along in range(-REACH[1], REACH[1] + 1):
+                    other = wide[row + down + 17 : row + down + 24, column + along + 17 : column + along + 24]
+                    costs[down, along] = (((own - other) ** 2).sum() + NOISE) * (1.0 + 0.01 * np.hypot(down, along))
+            assert tuple(found[i, j, :2]) == min(costs, key=costs.get)
+
+
 def test_nothing_moves_in_darkness_or_where_all_is_alike():
     rng = np.random.default_rng(3)
     dark = [rng.normal(0.0, 0.05 * np.sqrt(NOISE / 147.0), (50, 80, 3)).astype(np.float32) for _ in range(2)]

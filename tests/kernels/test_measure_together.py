@@ -2,7 +2,9 @@
 
 import numpy as np
 
-from flarewright.kernels.measure_together import add_together, ghost_changes
+from flarewright.kernels.measure_changes import draw_with_changes
+from flarewright.kernels.measure_mesh import window_of
+from flarewright.kernels.measure_together import add_together, draw_together, ghost_changes, windows_together
 
 HEIGHT, WIDTH, COLOURS = 9, 12, 3
 
@@ -41,3 +43,30 @@ def test_sums_over_windows_are_those_over_whole_pictures():
     weighted = flat * weight.reshape(-1, 1)
     assert np.allclose(matrix, weighted.T @ flat, rtol=1e-12, atol=1e-12)
     assert np.allclose(side, weighted.T @ left_over.ravel(), rtol=1e-12, atol=1e-12)
+
+
+def test_ghosts_drawn_together_are_as_they_are_alone():
+    sigma, frame, size = 0.7, np.array([20.0, 15.0, 0.8, 0.6, 1.0]), (48, 32)
+    parameters = np.zeros((3, 47))
+    parameters[:, 10] = 5.0, 4.0, 6.0
+    parameters[:, 20] = 30.0, 10.0, 20.0
+    # the second lies outside the picture
+    parameters[:, 0] = 8.0, 900.0, -6.0
+    discs, free = np.zeros(3, np.int64), np.array([0, 10, 11, 13])
+    shifts, growths = np.array([1.4, 1.0, 0.3]), np.random.default_rng(1).normal(size=(3, 3))
+    windows = np.zeros((3, 6), np.int64)
+    seen, count, largest = windows_together(parameters, discs, sigma, frame, *size, windows)
+    assert windows[:seen, 0].tolist() == [0, 2]
+    pixels, room = np.full((count, 3), np.nan), np.full(largest * (free.size + 1), np.nan)
+    draw_together(parameters, discs, sigma, frame, free, windows[:seen], shifts, growths, room, pixels)
+    start = 0
+    for row in windows[:seen]:
+        left, top, width, height = window_of(parameters[row[0]], 0, sigma, frame, *size)
+        assert row[1:].tolist() == [start, top, left, height, width]
+        plane, changes = np.zeros((height, width + 1)), np.zeros((height, width + 1, free.size))
+        draw_with_changes(parameters[row[0]], 0, sigma, free, frame, left, top, plane, changes)
+        own = np.empty((height * width, 3))
+        ghost_changes(plane, changes, shifts[row[0]], growths[row[0]], own)
+        assert np.allclose(pixels[start : start + own.shape[0]], own, rtol=1e-12, atol=1e-12)
+        start += own.shape[0]
+    assert start == count

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from flarewright.measure.fit import Shape, render
+from flarewright.measure.fit import render
 from flarewright.measure.numbers import NUMBERS, field, frame
+from flarewright.measure.shape import Shape
 from flarewright.measure.views import View
 
 SIZE = (240, 160)

@@ -9,11 +9,11 @@ from planted_run import LARGEST, SIZE, shape, views
 
 from flarewright.kernels.measure_pupil import SOFT
 from flarewright.measure.carried import carried
-from flarewright.measure.fit import Shape
 from flarewright.measure.found import Found
 from flarewright.measure.packed import pack
 from flarewright.measure.replay import replay
 from flarewright.measure.settle import to_model
+from flarewright.measure.shape import Shape
 from flarewright.measure.sprite_fit import axis_sprite
 from flarewright.measure.sprites import sprite_at
 from flarewright.model.ghost_model import GhostModel

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from planted_run import shape, views
 
-from flarewright.measure.fit import coarser, cost_of, patches_of, shows
+from flarewright.measure.fit import cost_of
+from flarewright.measure.patches import coarser, patches_of, shows
 
 ONE = shape(-60.0, 20.0, 0.4)
 

@@ -12,12 +12,14 @@ from test_track import ANGLES, drawn, thrice
 from flarewright.io.ghost_model_file import read_ghost_model, write_ghost_model
 from flarewright.measure.compact import compact, curves_of, held_error, numbers_in, rounded, written_numbers
 from flarewright.measure.curves import Pose, posed, spline_basis, value_at
-from flarewright.measure.fit import Shape, free_numbers, misfit, patches_of, refine, render
+from flarewright.measure.fit import cost_of, refine, render
 from flarewright.measure.found import Found
 from flarewright.measure.glow import offsets
 from flarewright.measure.numbers import NUMBERS, channel_of
 from flarewright.measure.orders import needed_numbers, parabola
+from flarewright.measure.patches import patches_of
 from flarewright.measure.replay import replay
+from flarewright.measure.shape import Shape, free_numbers
 from flarewright.measure.smooth import smooth_curve
 from flarewright.measure.stages import enlarged
 from flarewright.measure.together import halvings
@@ -70,7 +72,7 @@ def test_the_parabola_foretells_what_a_step_costs():
     step = 2.0 * np.linalg.cholesky(fit.covariance) @ np.random.default_rng(2).normal(size=free.size)
     numbers = fit.shape.numbers.copy()
     numbers[free] += step
-    there = [misfit(type(fit.shape)(numbers), patch, True, 0.0).cost for patch in patches]
+    there = np.array([cost_of(type(fit.shape)(numbers), [patch], error=0.0) for patch in patches])
     foretold = bowl.cost - 2.0 * bowl.side @ step + np.einsum("q,kqr,r->k", step, bowl.matrix, step)
     np.testing.assert_allclose(foretold - bowl.cost, there - bowl.cost, atol=0.15 * np.abs(there - bowl.cost).max())
 
@@ -184,6 +186,6 @@ def test_rounding_moves_no_picture_though_numbers_alone_are_vague():
     alone = held_error(fit)
     assert (alone[fit.free] <= fit.uncertainty[fit.free] * 1.01).all()
     numbers = [rounded(float(a), float(d)) for a, d in zip(fit.shape.numbers, alone, strict=True)]
-    after = sum(misfit(Shape(np.array(numbers)), patch, True, 0.0).cost for patch in patches)
-    before = sum(misfit(fit.shape, patch, True, 0.0).cost for patch in patches)
+    after = cost_of(Shape(np.array(numbers)), patches, error=0.0)
+    before = cost_of(fit.shape, patches, error=0.0)
     assert after - before < 3.0

@@ -12,13 +12,16 @@ from flarewright.measure import grow as growing
 from flarewright.measure import pursuit
 from flarewright.measure.compress import compress
 from flarewright.measure.find import Candidate, candidates, slopes_of
-from flarewright.measure.fit import Shape, free_numbers, parted, patches_of, presence, refine, render
+from flarewright.measure.fit import refine, render
 from flarewright.measure.found import Found
 from flarewright.measure.grow import Growth, grow, spread_by_colour
 from flarewright.measure.numbers import channel_numbers, channel_of
+from flarewright.measure.patches import patches_of
+from flarewright.measure.presence import presences
 from flarewright.measure.pursuit import pursue
 from flarewright.measure.replay import replay
 from flarewright.measure.settle import Settling, settle, to_model
+from flarewright.measure.shape import Shape, free_numbers, parted
 from flarewright.measure.walch import circle, cost, descend, draw, edges, fit_bezier, window_of
 from flarewright.model.ghost_model import GhostModel
 
@@ -268,6 +271,20 @@ def test_what_was_refused_is_tried_again_when_more_is_known(monkeypatch):
     assert tried[0] is tried[-1] is votes[0]
 
 
+def test_who_was_refused_three_times_is_not_tried_again(monkeypatch):
+    tried, votes = [], [Candidate(80.0 * k, 10.0, 0, 8, 99.0 - k) for k in range(24)]
+
+    def trial(candidate, views, rest, pool):
+        tried.append(candidate)
+        return None if candidate is votes[0] else Found((GHOSTS[0],) * 3, 0, 1)
+
+    monkeypatch.setattr(pursuit, "_try", trial)
+    monkeypatch.setattr(pursuit, "_candidates", lambda *_: ([votes[0], *(e for e in votes if e not in tried)], []))
+    shown = views(GHOSTS[:1], angles=FEW)
+    assert len(pursue(shown, masks(shown), most=40)) == 23
+    assert tried.count(votes[0]) == 3
+
+
 def test_a_rolled_camera_sees_the_same_ghosts():
     best = []
     for roll in (0.0, 37.0):
@@ -295,9 +312,11 @@ def test_permuted_starts_give_the_same_picture():
 
 def test_presence_tells_births_and_deaths():
     there, gone = views((GHOSTS[1],), angles=FEW)[4], views((), angles=FEW)[4]
-    assert presence(GHOSTS[1], there, 1).amplitude == pytest.approx(1.0, abs=0.05)
-    assert presence(GHOSTS[1], gone, 1).amplitude == pytest.approx(0.0, abs=0.05)
-    assert not np.isfinite(presence(shape(3000.0, 5.0, 1.0), there, 1).error)
+    seen = presences(GHOSTS[1], [there, gone], 1)
+    assert [each.amplitude for each in seen] == [pytest.approx(1.0, abs=0.05), pytest.approx(0.0, abs=0.05)]
+    assert all(np.isfinite(each.error) for each in seen)
+    (beyond,) = presences(shape(3000.0, 5.0, 1.0), [there], 1)
+    assert (beyond.amplitude, beyond.error) == (0.0, np.inf)
 
 
 def test_candidates_say_which_views_saw_them():

@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 from planted_run import GHOSTS, LARGEST, NOISE, shape, views
 
-from flarewright.measure.fit import Shape, render
+from flarewright.measure.fit import render
 from flarewright.measure.found import Found
 from flarewright.measure.fragments import joined
 from flarewright.measure.joint import lit
+from flarewright.measure.shape import Shape
 
 FEW = np.linspace(2.0, LARGEST, 9)
 

@@ -7,9 +7,11 @@ import numpy as np
 from planted_run import GHOSTS, shape, views
 
 from flarewright.kernels.measure_pupil import FIRST_G, FIRST_I, SOFT
-from flarewright.measure.fit import Shape, free_numbers, improve, patches_of, render
+from flarewright.measure.fit import improve, render
 from flarewright.measure.found import Found, alone, rest_of
 from flarewright.measure.jointly import fitted_jointly
+from flarewright.measure.patches import patches_of
+from flarewright.measure.shape import Shape, free_numbers
 
 COUNT = 10
 # of a ghost's size, by which it begins beside its place

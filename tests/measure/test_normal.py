@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 
 from flarewright.measure import normal
-from flarewright.measure.fit import Shape, free_numbers, patches_of, refine
+from flarewright.measure.fit import refine
 from flarewright.measure.normal import inverse, solution
+from flarewright.measure.patches import patches_of
+from flarewright.measure.shape import Shape, free_numbers
 
 
 def jacobian() -> np.ndarray:

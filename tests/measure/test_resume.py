@@ -13,10 +13,11 @@ from flarewright.cli.app import run as command
 from flarewright.errors import FlarewrightError, OutputError
 from flarewright.measure import journal as journals
 from flarewright.measure.find import Candidate
-from flarewright.measure.fit import Fit, Shape
+from flarewright.measure.fit import Fit
 from flarewright.measure.found import Found
 from flarewright.measure.journal import Journal, journal
 from flarewright.measure.numbers import NUMBERS
+from flarewright.measure.shape import Shape
 from flarewright.model.ghost_model import Blades
 
 

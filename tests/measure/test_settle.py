@@ -4,10 +4,12 @@ import numpy as np
 from planted_run import NOISE, shape, views
 
 from flarewright.kernels.measure_pupil import FIRST_DISC, FIRST_G
-from flarewright.measure.fit import Shape, free_numbers, patches_of, refine, render
+from flarewright.measure.fit import refine, render
 from flarewright.measure.found import Found
 from flarewright.measure.marquardt import FAR
+from flarewright.measure.patches import patches_of
 from flarewright.measure.settle import settle
+from flarewright.measure.shape import Shape, free_numbers
 
 TRUE = shape(-60.0, 34.0, 0.5)
 

@@ -2,7 +2,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
-from flarewright.measure.shared_out import shared_out, side_by_side
+from flarewright.measure.shared_out import dealt_out, shared_out, side_by_side
 
 
 @pytest.mark.parametrize("count", [0, 1, 2, 7, 40])
@@ -30,3 +30,15 @@ def test_large_pieces_share_out_small_ones_to_the_same_pool():
 
 def test_large_pieces_come_in_their_order_without_a_pool():
     assert side_by_side(lambda: 1, lambda: 2, pool=None) == [1, 2]
+
+
+@pytest.mark.parametrize("threads", [False, True])
+@pytest.mark.parametrize("count", [0, 1, 2, 7])
+def test_every_piece_is_dealt_out_once(threads, count, monkeypatch):
+    monkeypatch.setattr("os.cpu_count", lambda: 3)
+    done = []
+    with ThreadPoolExecutor(3) as pool:
+        dealt_out(
+            lambda first, every: done.extend(range(first, count, every)), count, None if threads is None else pool
+        )
+    assert sorted(done) == list(range(count))

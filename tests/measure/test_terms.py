@@ -5,8 +5,9 @@ import pytest
 from benchmarks.measure.shoot import setup_of
 from benchmarks.measure.terms import TERMS, terms_of
 
-from flarewright.measure.fit import Shape, priors
+from flarewright.measure.fit import priors
 from flarewright.measure.numbers import NUMBERS
+from flarewright.measure.shape import Shape
 
 WIDTH = 360
 

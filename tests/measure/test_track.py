@@ -7,7 +7,8 @@ import pytest
 from planted_run import LARGEST, NOISE, SIZE, shape, views
 
 from flarewright.measure.curves import Pose, posed
-from flarewright.measure.fit import Shape, render
+from flarewright.measure.fit import render
+from flarewright.measure.shape import Shape
 from flarewright.measure.together import measure_together
 from flarewright.measure.track import follow, lives
 from flarewright.model.ghost_tracks import Step

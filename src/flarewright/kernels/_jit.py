@@ -8,6 +8,8 @@ from typing import Any
 
 from numba import njit
 
+from ._fresh import ask_all
+
 # contract, reassoc, arcp, nsz and afn keep tests for NaN and infinity legal, unlike fastmath=True
 _FASTMATH = {"contract", "reassoc", "arcp", "nsz", "afn"}
 
@@ -46,6 +48,7 @@ def compiled(function: Callable[..., Any]) -> Any:
         return _njit(function, **_ROOT, **_OPTIONS)
     # plain Python where Numba does not compile
     if hasattr(kernel, "_cache"):
+        ask_all(kernel)
         _load(kernel)
     return kernel
 

@@ -6,7 +6,7 @@ are drawn as the ghost is (`measure_mesh`), edge by edge.
 
 import numpy as np
 
-from ._jit import compiled, inner
+from ._jit import borrowing, compiled, inner
 from .measure_edges import add_edge_changes
 from .measure_lateral import beyond, draw_rim_changes, draw_rims, shifts_of, wavelengths_of
 from .measure_mesh import (
@@ -52,7 +52,7 @@ def _spot_changes(parameters, sigma, free, frame, pupil, pupil_by, spots_by):
                 spots_by[i, j, 0, q], spots_by[i, j, 1, q] = turned(frame, along, across)
 
 
-@inner
+@borrowing
 def _add_triangle(
     parameters, sigma, free, pupil, pupil_by, spots, spots_by, ia, ja, ib, jb, ic, jc, terms, flux_by, area_by
 ):

@@ -7,10 +7,10 @@ light swept over: the exact derivative of the exact coverage.
 
 from math import floor
 
-from ._jit import compiled, inner
+from ._jit import borrowing, compiled
 
 
-@inner
+@borrowing
 def _piece(row, x0, x1, dy, weight, left, width, plane):
     """Add a piece of an edge that lies within one row: light to its right."""
     if x0 > x1:
@@ -43,7 +43,7 @@ def _piece(row, x0, x1, dy, weight, left, width, plane):
         c += 1
 
 
-@inner
+@borrowing
 def _add_inside(x, y0, y1, slope, weight, plane):
     """Add an edge that nothing cuts off: most are, and most lie in one pixel of each row."""
     row = int(y0)
@@ -72,7 +72,7 @@ def _add_inside(x, y0, y1, slope, weight, plane):
         row += 1
 
 
-@inner
+@borrowing
 def add_edge(x0, y0, x1, y1, weight, left, top, width, height, plane):
     """Add the light to the right of an edge that runs from (x0, y0) to (x1, y1), as differences along rows.
 
@@ -104,7 +104,7 @@ def add_edge(x0, y0, x1, y1, weight, left, top, width, height, plane):
         row += 1
 
 
-@inner
+@borrowing
 def _crossing(row, c, light, part, length, t, change, sweep, out):
     """Add one pixel's derivatives: the step's change times the coverage, and the step times what the edge sweeps."""
     near, far = light * (1.0 - part), light * part
@@ -114,7 +114,7 @@ def _crossing(row, c, light, part, length, t, change, sweep, out):
         out[row, c + 1, q] += change[q] * far + moved
 
 
-@inner
+@borrowing
 def add_edge_changes(x0, y0, x1, y1, weight, change, v0, v1, left, top, width, height, sweep, out):
     """Add the derivatives of `add_edge` by Q parameters.
 

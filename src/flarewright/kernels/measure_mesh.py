@@ -10,7 +10,7 @@ from math import ceil, floor, pi, sin, sqrt
 
 import numpy as np
 
-from ._jit import compiled, inner
+from ._jit import borrowing, compiled, inner
 from .measure_edges import add_edge
 from .measure_lateral import beyond, draw_rims, shifts_of, wavelengths_of
 from .measure_pupil import (
@@ -81,7 +81,7 @@ def steadied(area):
     return area
 
 
-@inner
+@borrowing
 def _flux(light, sigma, pupil, ia, ja, ib, jb, ic, jc):
     """Return a triangle's flux: intensity at its middle, never below 0, times its part of the pupil."""
     xi = (pupil[ia, ja, 0] + pupil[ib, jb, 0] + pupil[ic, jc, 0]) / 3.0
@@ -132,7 +132,7 @@ def fill_densities(parameters, sigma, pupil, spots, densities):
             densities[i, j, 1] = -_flux(light, sigma, pupil, i, j, i + 1, k, i, k) / steadied(area)
 
 
-@inner
+@borrowing
 def join(spots, span, densities):
     """Give all triangles of each cell one density, so that the edges between them need not be drawn."""
     rings, spokes = densities.shape[0], densities.shape[1]
@@ -196,7 +196,7 @@ def _chord_of(span, spokes):
     return chord
 
 
-@inner
+@borrowing
 def cell_light(spots, span, densities, i, first):
     """Return the light and the signed area of a cell of `span` spokes that begins at one of them."""
     light, area = 0.0, 0.0
@@ -211,7 +211,7 @@ def cell_light(spots, span, densities, i, first):
     return light, steadied(area)
 
 
-@inner
+@borrowing
 def cell_areas(spots, i, j, spokes):
     """Return the signed areas of the two triangles between two spokes and two rings, as they are divided by."""
     k = j + 1 if j + 1 < spokes else 0
@@ -224,7 +224,7 @@ def cell_areas(spots, i, j, spokes):
     return steadied(one), steadied(other)
 
 
-@inner
+@borrowing
 def draw_mesh(spots, densities, span, fine, rim, left, top, width, height, plane):
     """Draw every edge once, with the step in density across it; unless fine, one between rings spans several spokes.
 
@@ -256,7 +256,7 @@ def draw_mesh(spots, densities, span, fine, rim, left, top, width, height, plane
             )  # fmt: skip
 
 
-@inner
+@borrowing
 def _least_radius(spots):
     """Return how far the nearest point of a mesh's outline is from its middle."""
     rings = spots.shape[0] - 1

@@ -1,6 +1,6 @@
 """How a drawn picture misses a photographed one: weights, residuals and cost of a fit, in one pass or two."""
 
-from ._jit import compiled, inner
+from ._jit import borrowing, compiled
 
 
 @compiled
@@ -52,7 +52,7 @@ def weigh_misfit(plane, pixels, known, error, outlier, offset, weight, residual)
     return cost, total, count
 
 
-@inner
+@borrowing
 def _weigh_row(differences, pixels, known, error, weight, residual):
     """Fill a row's residuals and weights, outliers and background not yet looked at; return sums."""
     drawn = 0.0

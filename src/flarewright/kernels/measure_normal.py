@@ -6,7 +6,7 @@ work, and its sums change with the number of threads.
 
 import numpy as np
 
-from ._jit import compiled, inner
+from ._jit import borrowing, compiled
 
 # pixels whose products are summed at once: the matrix is read and written once for all of them
 _TOGETHER = 8
@@ -67,7 +67,7 @@ def normal_equations(changes, weight, residual, matrix, side, mean):
             matrix[a, b] = matrix[b, a]
 
 
-@inner
+@borrowing
 def _add_products(rows, weighted, matrix):
     """Add the products of `_TOGETHER` pixels to the matrix' upper triangle."""
     count = matrix.shape[0]

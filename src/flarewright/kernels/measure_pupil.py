@@ -10,7 +10,7 @@ from math import cos, pi, sin, sqrt
 
 import numpy as np
 
-from ._jit import inner
+from ._jit import borrowing, inner
 from .measure_iris import ends, nearest_side, side_and_disc, side_corner
 
 # monomials of u = p.p, v = p.s, w = s.s up to second order: of f, of g and of the intensity
@@ -27,7 +27,7 @@ SOFT = TURN + 1
 LATERAL = SOFT + 1
 
 
-@inner
+@borrowing
 def monomials(u, v, w, out):
     """Fill the ten monomials of (u, v, w): 1, u, v, w, uu, uv, vv, uw, vw, ww."""
     out[0], out[1], out[2], out[3] = 1.0, u, v, w
@@ -35,7 +35,7 @@ def monomials(u, v, w, out):
     out[7], out[8], out[9] = u * w, v * w, w * w
 
 
-@inner
+@borrowing
 def slopes(c, at, u, v, w):
     """Return value and derivatives by u and v of the polynomial whose ten numbers begin at c[at]."""
     value = c[at] + c[at + 1] * u + c[at + 2] * v + c[at + 3] * w + c[at + 4] * u * u + c[at + 5] * u * v
@@ -45,7 +45,7 @@ def slopes(c, at, u, v, w):
     return value, by_u, by_v
 
 
-@inner
+@borrowing
 def at_field(c, at, w, out):
     """Fill the six numbers 1, u, v, uu, uv, vv of a polynomial's ten at a field of w = s.s."""
     out[0] = c[at] + c[at + 3] * w + c[at + 9] * w * w
@@ -53,13 +53,13 @@ def at_field(c, at, w, out):
     out[3], out[4], out[5] = c[at + 4], c[at + 5], c[at + 6]
 
 
-@inner
+@borrowing
 def level(six, u, v):
     """Return the value of a polynomial of `at_field`."""
     return six[0] + u * (six[1] + six[3] * u + six[4] * v) + v * (six[2] + six[5] * v)
 
 
-@inner
+@borrowing
 def _reach(middle, cosine, sine, centre, radius):
     """Return the distance from `middle` to a disc's rim, and its derivatives by middle - centre and by radius."""
     a = middle - centre
@@ -67,7 +67,7 @@ def _reach(middle, cosine, sine, centre, radius):
     return root - a * cosine, -cosine - a * sine * sine / root, radius / root
 
 
-@inner
+@borrowing
 def _nearest_rim(middle, cosine, sine, discs, count, blades, turn):
     """Return which rim is met first along a spoke: a disc's number, or -1 - e for side e of the iris."""
     best, at, first = 1e30, 0, 0
@@ -109,7 +109,7 @@ def _corner(discs, a, b, upper, spot, by):
     return True
 
 
-@inner
+@borrowing
 def rims(parameters, disc_count, sigma, discs):
     """Fill centre (along s) and radius of each disc at a field; the first is the unit disc."""
     discs[0, 0], discs[0, 1] = 0.0, 1.0
@@ -222,7 +222,7 @@ def _snap(discs, spokes, blades, turn, active, middle, points, by):
         by[at] = change
 
 
-@inner
+@borrowing
 def turned(frame, along, across):
     """Return a step along s and across it as columns and rows of the picture; rows count downwards."""
     return (
@@ -231,7 +231,7 @@ def turned(frame, along, across):
     )
 
 
-@inner
+@borrowing
 def pupil_change(n, sigma, pupil_by, i, j):
     """Return how a pupil point moves with parameter n of a disc."""
     disc, which = (n - FIRST_DISC) // DISC_NUMBERS + 1, (n - FIRST_DISC) % DISC_NUMBERS
@@ -241,7 +241,7 @@ def pupil_change(n, sigma, pupil_by, i, j):
     return by * pupil_by[i, j, 0, 2 * disc], by * pupil_by[i, j, 1, 2 * disc]
 
 
-@inner
+@borrowing
 def place(parameters, xi, eta, sigma):
     """Return where a pupil point lands, along s and across, and the derivatives by the pupil point."""
     u, v, w = xi * xi + eta * eta, xi * sigma, sigma * sigma

@@ -5,6 +5,8 @@ cost more to set up than to sum.
 """
 
 from ._jit import compiled, inner
+from .measure_changes import draw_with_changes
+from .measure_mesh import window_of
 
 
 @compiled
@@ -34,6 +36,67 @@ def ghost_changes(plane, changes, shift, growth, pixels):
                 grown += growth[q] * changes[y, x, 1 + q]
             at = y * width + x
             pixels[at, 0], pixels[at, 1], pixels[at, 2] = light, moved, grown
+
+
+@compiled
+def windows_together(parameters, disc_counts, sigma, frame, width, height, windows):
+    """Fill which part of a view each ghost may touch; see `window_of`.
+
+    Parameters
+    ----------
+    parameters : ndarray, shape (G, N), float64
+    disc_counts : ndarray, shape (G,), int64
+    sigma : float
+    frame : ndarray, shape (5,), float64
+    width, height : int
+        Of the view.
+    windows : ndarray, shape (G, 6), int64
+        Filled from the first row on: which ghost, the first of its pixels, and top, left, height and width in the view.
+
+    Returns
+    -------
+    seen, pixels, largest : int
+        How many ghosts the view shows, how many pixels all have, and how many numbers the drawing of the largest takes.
+    """
+    seen, start, largest = 0, 0, 0
+    for g in range(parameters.shape[0]):
+        left, top, w, h = window_of(parameters[g], disc_counts[g], sigma, frame, width, height)
+        if w > 0:
+            row = windows[seen]
+            row[0], row[1], row[2], row[3], row[4], row[5] = g, start, top, left, h, w
+            seen += 1
+            start += h * w
+            largest = max(largest, h * (w + 1))
+    return seen, start, largest
+
+
+@compiled
+def draw_together(parameters, disc_counts, sigma, frame, free, windows, shifts, growths, room, pixels):
+    """Draw ghosts of a view, each with how it changes with its place and its size; see `ghost_changes`.
+
+    Parameters
+    ----------
+    parameters, disc_counts, sigma, frame
+        As for `windows_together`.
+    free : ndarray, shape (1 + Q,), int64
+        The first number of its place, and those of its size.
+    windows : ndarray, shape (S, 6), int64
+        Of the ghosts that are seen.
+    shifts : ndarray, shape (G,), float64
+    growths : ndarray, shape (G, Q), float64
+    room : ndarray, float64
+        To work in, at least height (width + 1) (2 + Q) of the largest window.
+    pixels : ndarray, shape (P, 3), float64
+        Filled.
+    """
+    for k in range(windows.shape[0]):
+        g, start, top, left, height, width = windows[k]
+        size = height * (width + 1)
+        room[: size * (free.size + 1)] = 0.0
+        plane = room[:size].reshape((height, width + 1))
+        changes = room[size : size * (free.size + 1)].reshape((height, width + 1, free.size))
+        draw_with_changes(parameters[g], disc_counts[g], sigma, free, frame, left, top, plane, changes)
+        ghost_changes(plane, changes, shifts[g], growths[g], pixels[start : start + height * width])
 
 
 @compiled

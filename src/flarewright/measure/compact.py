@@ -14,11 +14,13 @@ from ..kernels.measure_pupil import DISC_NUMBERS, FIRST_DISC, FIRST_G, LATERAL, 
 from ..model.ghost_model import AberrationGhost, Channel, Curve, Curves, GhostModel
 from ..model.ghost_tracks import GhostTrack, Tracks
 from .curves import Pose
-from .fit import MODEL_ERROR, Fit, Indices, Shape, cost_of, free_numbers, patches_of, refine
+from .fit import MODEL_ERROR, Fit, cost_of, refine
 from .found import CHANNELS, Found, alone, by_light, exchange, rest_of
 from .normal import inverse
 from .numbers import NUMBERS, Floats, channel_numbers, channel_of
 from .orders import needed_numbers, parabola
+from .patches import patches_of
+from .shape import Indices, Shape, free_numbers
 from .smooth import smooth_curve
 from .stages import coarse, enlarged
 from .together import Measured, Shapes, halvings, measure_together
@@ -27,7 +29,7 @@ from .views import Pixels, View
 Tell = Callable[[float, str], None]
 
 # views that one ghost's numbers are judged by, at most
-_VIEWS = 48
+_VIEWS = 32
 # fewer numbers may cost so much of what the views hold, and so much with an even background held at none
 _WORSE, _UNEVEN = 0.002, 0.05
 # numbers are written to this part of the standard deviation that they have with all others held
@@ -150,7 +152,7 @@ def _smaller(
     patches = [patches_of(ghost.shapes[m], shown[m], m) for m in range(CHANNELS)]
     if not all(patches):
         return ghost
-    bowls = [parabola(ghost.shapes[m], patches[m], free, width, MODEL_ERROR) for m in range(CHANNELS)]
+    bowls = [parabola(ghost.shapes[m], patches[m], free, width, MODEL_ERROR, pool) for m in range(CHANNELS)]
     fewer = needed_numbers(bowls, free)
     best: list[Fit | None] = [None, None, None]
     shapes = list(ghost.shapes)

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from ..kernels.measure_hough import outline, salient_slopes, search
 from ..model.ghost_model import Blades
-from .fit import scaled
 from .numbers import Floats
+from .patches import scaled
 from .shared_out import shared_out
 from .views import Pixels, View, halved
 

@@ -2,37 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
-from typing import TypeVar
+from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..kernels.measure_changes import draw_with_changes
 from ..kernels.measure_edges import sum_along_rows
 from ..kernels.measure_mesh import window_of
-from ..kernels.measure_misfit import weigh_misfit
-from ..kernels.measure_normal import normal_equations
-from ..kernels.measure_pupil import DISC_NUMBERS, FIRST_DISC, FIRST_G, FIRST_I, LATERAL, SOFT
+from ..kernels.measure_pupil import FIRST_DISC, FIRST_G, FIRST_I, LATERAL, SOFT
 from .marquardt import NEAR, descend
 from .normal import inverse
 from .numbers import NUMBERS, Floats
+from .patches import Missed, Patch, Patches, equations, laid_out, missed
 from .room import Room
-from .shared_out import shared_out
-from .views import View, halved
+from .shape import Indices, Shape, stepped
+from .views import View
 
-Indices = NDArray[np.int64]
-Made = TypeVar("Made")
 Part = tuple[slice, slice]
 
-# a ghost is fitted on pictures halved until its window has about so many pixels
-AREA = 7000
 # part of the light that the model may miss without blame, so that bright ghosts do not rule faint ones
 MODEL_ERROR = 0.03
-# standard deviations beyond which a pixel counts less and less
-OUTLIER = 4.0
 # what ghosts are like, see `priors`: aberrations over the size, the size at least this part of the picture's width, the
 # change of place and size with the field over the width; brightness over the pupil (u, v) and the field (w)
 _FIRST_ORDER, _HIGHER_ORDER, _LEAST_SIZE = 0.3, 0.15, 0.04
@@ -40,28 +31,11 @@ _ANY, _BY_FIELD = 5.0, 0.3
 _SLOPES, _HIGHER_SLOPES = (0.15, 0.25, 0.5), 0.25
 # what softness is usual, part of the picture's width
 _SOFTNESS = 0.005
-# by which wavelengths of a colour may shift a ghost and make it larger, part of its size
-_PART = np.array([1.0, 0.25])
 # pixels that miss a model alike: noise is every pixel's own, what cannot be drawn is not
 ALIKE = 64.0
 _NONE = np.zeros(0, np.int64)
 _NO_CHANGES = np.zeros((0, 0, 0))
-_PLANES, _CHANGES = Room(), Room()
-
-
-@dataclass(frozen=True)
-class Shape:
-    """One colour of one ghost while it is fitted.
-
-    Attributes
-    ----------
-    numbers : ndarray, shape (47,)
-        See `kernels.measure_pupil`.
-    discs : int
-    """
-
-    numbers: Floats
-    discs: int = 0
+_PLANES = Room()
 
 
 @dataclass(frozen=True)
@@ -100,42 +74,6 @@ class Fit:
         return deviation
 
 
-@dataclass(frozen=True)
-class Patch:
-    """The part of a view that one fit looks at, at its resolution."""
-
-    sigma: float
-    frame: Floats
-    left: int
-    top: int
-    pixels: Floats
-    weight: Floats
-
-
-def free_numbers(order: int, discs: int, intensity_order: int, soft: bool = False, lateral: bool = False) -> Indices:
-    """Return which numbers to fit.
-
-    Parameters
-    ----------
-    order : int
-        0: place, size and their change with the field; 1: Seidel's aberrations; 2: all.
-    discs : int
-    intensity_order : int
-        0: even; 1: first order in u, v, w; 2: all.
-    soft : bool
-        Also how soft the borders are.
-    lateral : bool
-        And how far the channel's wavelengths part.
-    """
-    geometry = {0: (0, 3), 1: (0, 1, 2, 3), 2: tuple(range(10))}[order]
-    light = {0: (0,), 1: (0, 1, 2, 3), 2: tuple(range(10))}[intensity_order]
-    picked = [*geometry, *(FIRST_G + k for k in geometry), *(FIRST_I + k for k in light)]
-    picked += [FIRST_DISC + k for k in range(DISC_NUMBERS * discs)]
-    picked += [SOFT] if soft else []
-    picked += [LATERAL, LATERAL + 1] if lateral else []
-    return np.array(picked, dtype=np.int64)
-
-
 def render(shape: Shape, view: View, scale: float = 1.0) -> Floats:
     """Draw a shape into a picture of a view's size, shape (H, W)."""
     picture = np.zeros(view.pixels.shape[:2])
@@ -158,140 +96,6 @@ def light_of(shape: Shape, view: View) -> tuple[Part, Floats]:
 def brightens(shape: Shape, views: Sequence[View]) -> bool:
     """Tell whether a shape adds light to views, all in all: its rims may leave only a part of what its numbers say."""
     return sum(float(light_of(shape, view)[1].sum()) for view in views) > 0.0
-
-
-def scaled(frame: Floats, times: int) -> Floats:
-    """Return the frame of a picture halved so often."""
-    factor = 0.5**times
-    return np.array([frame[0] * factor, frame[1] * factor, frame[2], frame[3], frame[4] * factor])
-
-
-def patches_of(
-    shape: Shape,
-    views: Sequence[View],
-    channel: int,
-    masks: Sequence[NDArray[np.bool_]] | None = None,
-    beside: Shape | None = None,
-) -> list[Patch]:
-    """Cut out what a ghost touches, and a margin, from every view.
-
-    Parameters
-    ----------
-    shape : Shape
-    views : sequence of View
-        Their pixels hold this ghost alone, as far as it is known.
-    channel : int
-    masks : sequence of ndarray of bool, optional
-        Where to look, per view.
-    beside : Shape, optional
-        What this one touches is cut out with it.
-
-    Returns
-    -------
-    list of Patch
-        Of the views that show it.
-    """
-    windows = [_window(shape, beside, view) for view in views]
-    areas = [window[2] * window[3] for window in windows if window[2]]
-    if not areas:
-        return []
-    times = max(0, int(np.ceil(0.5 * np.log2(max(float(np.median(areas)) / AREA, 1.0)))))
-    found = []
-    for k, (view, (left, top, width, height)) in enumerate(zip(views, windows, strict=True)):
-        if not width:
-            continue
-        margin, side = 4 + int(0.12 * max(width, height)), 2**times
-        x0, y0 = max(left - margin, 0) // side, max(top - margin, 0) // side
-        x1 = min(left + width + margin, view.size_px[0]) // side
-        y1 = min(top + height + margin, view.size_px[1]) // side
-        if x1 - x0 < 3 or y1 - y0 < 3:
-            continue
-        part = np.s_[y0 * side : y1 * side, x0 * side : x1 * side]
-        pixels = halved(view.pixels[part][..., channel], times)
-        variance = halved(view.variance[part][..., channel], times, variance=True)
-        if masks is not None:
-            variance = np.where(halved(masks[k][part].astype(np.float32), times) > 0.99, variance, np.inf)
-        found.append(
-            Patch(view.sigma, scaled(view.frame, times), x0, y0, pixels.astype(float), 1.0 / variance.astype(float))
-        )
-    return found
-
-
-def _window(shape: Shape, beside: Shape | None, view: View) -> tuple[int, int, int, int]:
-    """Return left, top, width and height of what one shape, or either of two, touches in a view."""
-    left, top, width, height = window_of(shape.numbers, shape.discs, view.sigma, view.frame, *view.size_px)
-    if beside is None:
-        return left, top, width, height
-    x, y, w, h = _window(beside, None, view)
-    if not (width and w):
-        return (left, top, width, height) if width else (x, y, w, h)
-    right, bottom = max(left + width, x + w), max(top + height, y + h)
-    return min(left, x), min(top, y), right - min(left, x), bottom - min(top, y)
-
-
-def shows(shape: Shape, views: Sequence[View]) -> bool:
-    """Tell whether any view reaches a shape."""
-    return any(_window(shape, None, view)[2] for view in views)
-
-
-def coarser(patch: Patch) -> Patch:
-    """Return a patch in a picture of half the resolution."""
-    # whole pixels of that picture
-    part = np.s_[patch.top % 2 :, patch.left % 2 :]
-    with np.errstate(divide="ignore"):
-        variance = (1.0 / patch.weight[part]).astype(np.float32)
-    pixels, variance = halved(patch.pixels[part].astype(np.float32), 1), halved(variance, 1, variance=True)
-    left, top = (patch.left + 1) // 2, (patch.top + 1) // 2
-    return Patch(patch.sigma, scaled(patch.frame, 1), left, top, pixels.astype(float), 1.0 / variance.astype(float))
-
-
-@dataclass(frozen=True)
-class Misfit:
-    """How a shape misses a patch.
-
-    Attributes
-    ----------
-    cost : float
-        Weighted squares.
-    total : float
-        Sum of the weights.
-    count : int
-        Pixels that have weight.
-    weight, residual : ndarray, shape (H, W)
-    """
-
-    cost: float
-    total: float
-    count: int
-    weight: Floats
-    residual: Floats
-
-
-def misfit(shape: Shape, patch: Patch, offset: bool, error: float, tails: bool = True) -> Misfit:
-    """Draw a shape on a patch and weigh what it misses; see `refine`."""
-    height, width = patch.pixels.shape
-    plane, weight, residual = _PLANES.zeros(height, width + 1), np.empty((height, width)), np.empty((height, width))
-    draw_with_changes(
-        shape.numbers, shape.discs, patch.sigma, _NONE, patch.frame, patch.left, patch.top, plane, _NO_CHANGES
-    )
-    # heavy tails: other ghosts that are not known yet
-    outlier = OUTLIER if error > 0.0 and tails else np.inf
-    cost, total, count = weigh_misfit(
-        plane, patch.pixels, patch.weight, max(error, 0.0), outlier, offset, weight, residual
-    )
-    return Misfit(cost, total, count, weight, residual)
-
-
-def equations(shape: Shape, free: Indices, patch: Patch, missed: Misfit, offset: bool) -> tuple[Floats, Floats]:
-    """Return normal matrix and right side of one patch by its misfit."""
-    height, width = patch.pixels.shape
-    plane, changes = _PLANES.zeros(height, width + 1), _CHANGES.zeros(height, width + 1, free.size)
-    draw_with_changes(shape.numbers, shape.discs, patch.sigma, free, patch.frame, patch.left, patch.top, plane, changes)
-    matrix, side, mean = np.empty((free.size, free.size)), np.empty(free.size), np.empty(free.size)
-    normal_equations(changes, missed.weight, missed.residual, matrix, side, mean)
-    if offset and missed.total > 0.0:
-        matrix -= np.outer(mean, mean) / missed.total
-    return matrix, side
 
 
 def priors(shape: Shape, free: Indices, width: int) -> Floats:
@@ -402,10 +206,10 @@ def refine(
     See `marquardt`; the Jacobian is the drawn picture's own derivative.
     """
     alike = alike and error > 0.0
-    search = _Search(patches, free, width, offset, error, tails, alike, pool)
+    search = _Search(laid_out(patches), free, width, offset, error, tails, alike, pool)
     last, matrix = search.descend(shape, steps, damping)
     covariance = inverse(search.slopes(last)[0] if matrix is None else matrix)
-    cost, count = sum(one.cost for one in last.missed), sum(one.count for one in last.missed)
+    cost, count = last.missed.cost, last.missed.count
     return Fit(last.shape, free, covariance, cost, count, witness(cost, count - free.size) if alike else 1.0)
 
 
@@ -422,7 +226,8 @@ def improve(
     pool: ThreadPoolExecutor | None = None,
 ) -> tuple[Shape, float]:
     """Return what `refine` makes of a shape, and its cost: for trials, of which nobody asks how sure they are."""
-    last, _ = _Search(patches, free, width, True, error, tails, alike and error > 0.0, pool).descend(shape, steps)
+    search = _Search(laid_out(patches), free, width, True, error, tails, alike and error > 0.0, pool)
+    last, _ = search.descend(shape, steps)
     return last.shape, last.cost
 
 
@@ -433,14 +238,14 @@ class _State:
     shape: Shape
     prior: Floats
     cost: float
-    missed: list[Misfit]
+    missed: Missed
 
 
 @dataclass(frozen=True)
 class _Search:
     """Levenberg and Marquardt's search; see `refine`."""
 
-    patches: Sequence[Patch]
+    patches: Patches
     free: Indices
     width: int
     offset: bool
@@ -460,113 +265,31 @@ class _Search:
 
     def look(self, shape: Shape, prior: Floats | None = None) -> _State:
         """Return the state of a shape."""
-        missed = self.each(lambda patch: misfit(shape, patch, self.offset, self.error, self.tails), self.patches)
-        return self.weighed(shape, np.zeros(self.free.size) if prior is None else prior, missed)
+        miss = missed(shape, self.patches, offset=self.offset, error=self.error, tails=self.tails, pool=self.pool)
+        return self.weighed(shape, np.zeros(self.free.size) if prior is None else prior, miss)
 
     def anew(self, at: _State) -> _State:
         """Return a state with the prior that its shape and its misfit ask for."""
         prior = priors(at.shape, self.free, self.width)
         if self.alike:
-            count = sum(one.count for one in at.missed) - self.free.size
             # where a rim may lie nobody knows beforehand
             known = (self.free < FIRST_DISC) | (self.free >= SOFT)
-            prior[known] *= witness(sum(one.cost for one in at.missed), count)
+            prior[known] *= witness(at.missed.cost, at.missed.count - self.free.size)
         return self.weighed(at.shape, prior, at.missed)
 
-    def weighed(self, shape: Shape, prior: Floats, missed: list[Misfit]) -> _State:
-        cost = sum(one.cost for one in missed) + float(prior @ shape.numbers[self.free] ** 2)
-        return _State(shape, prior, cost, missed)
+    def weighed(self, shape: Shape, prior: Floats, miss: Missed) -> _State:
+        """Return a state with a prior."""
+        return _State(shape, prior, miss.cost + float(prior @ shape.numbers[self.free] ** 2), miss)
 
     def slopes(self, at: _State) -> tuple[Floats, Floats]:
         """Return normal matrix and right side."""
-        parts = self.each(
-            lambda patch, missed: equations(at.shape, self.free, patch, missed, self.offset), self.patches, at.missed
-        )
-        matrix = np.sum([part[0] for part in parts], axis=0) + np.diag(at.prior)
-        return matrix, np.sum([part[1] for part in parts], axis=0) - at.prior * at.shape.numbers[self.free]
-
-    def each(self, work: Callable[..., Made], *given: Sequence[object]) -> list[Made]:
-        """Return what is made of every patch, in their order."""
-        return shared_out(work, *given, pool=self.pool)
-
-
-def stepped(shape: Shape, free: Indices, step: Floats) -> Shape:
-    """Return a shape moved by a step; a disc never shrinks below a twentieth, and softness not below 0."""
-    numbers = shape.numbers.copy()
-    numbers[free] += step
-    for k in range(shape.discs):
-        at = FIRST_DISC + DISC_NUMBERS * k + 2
-        numbers[at] = max(numbers[at], 0.05)
-    # softer than half as wide as it is, a ghost would be a blot
-    numbers[SOFT] = min(max(numbers[SOFT], 0.0), 0.25 * numbers[FIRST_G] ** 2)
-    # and what grows much by colour would add light
-    wide = np.abs(numbers[FIRST_G]) * _PART
-    numbers[LATERAL:] = np.clip(numbers[LATERAL:], -wide, wide)
-    return replace(shape, numbers=numbers)
-
-
-def parted(shape: Shape) -> Shape:
-    """Return a shape whose wavelengths part by half of what its borders are soft.
-
-    Wavelengths that part one way look as those that part the other way: from where they do not, no search would begin.
-    """
-    numbers = shape.numbers.copy()
-    if not numbers[LATERAL:].any():
-        numbers[SOFT] *= 0.5
-        numbers[LATERAL:] = np.sqrt(numbers[SOFT])
-    return replace(shape, numbers=numbers)
+        matrices, sides = equations(at.shape, self.free, self.patches, at.missed, offset=self.offset, pool=self.pool)
+        prior = at.prior * at.shape.numbers[self.free]
+        return matrices.sum(axis=0) + np.diag(at.prior), sides.sum(axis=0) - prior
 
 
 def cost_of(
     shape: Shape, patches: Sequence[Patch], *, offset: bool = True, error: float = MODEL_ERROR, tails: bool = True
 ) -> float:
     """Return the cost of a shape on patches, without the priors."""
-    return sum(misfit(shape, patch, offset, error, tails).cost for patch in patches)
-
-
-@dataclass(frozen=True)
-class Presence:
-    """How much of a ghost one view shows.
-
-    Attributes
-    ----------
-    amplitude : float
-        1: as bright as the shape says; 0 when the view does not reach it.
-    error : float
-        Standard deviation of the amplitude; infinite when the view does not reach it.
-    """
-
-    amplitude: float
-    error: float
-
-
-def presence(shape: Shape, view: View, channel: int, error: float = MODEL_ERROR) -> Presence:
-    """Return how much of a shape a view shows, an even background aside.
-
-    Parameters
-    ----------
-    shape : Shape
-    view : View
-        Its pixels hold this ghost alone, as far as it is known.
-    channel : int
-    error : float
-        Part of the light that the model may miss.
-    """
-    patches = patches_of(shape, [view], channel)
-    if not patches:
-        return Presence(0.0, np.inf)
-    patch = patches[0]
-    missed = misfit(shape, patch, False, error, tails=False)
-    weight, model = missed.weight, patch.pixels - missed.residual
-    if not missed.total > 0.0:
-        return Presence(0.0, np.inf)
-    even = model - (weight * model).sum() / missed.total
-    power = float((weight * even**2).sum())
-    if not power > 1e-9:
-        return Presence(0.0, np.inf)
-    # other ghosts' edges count less and less: from the shape's own brightness on
-    weight = weight / (1.0 + weight * missed.residual**2 / (4.0 * OUTLIER) ** 2)
-    total = weight.sum()
-    even = model - (weight * model).sum() / total
-    power = float((weight * even**2).sum())
-    return Presence(float((weight * even * patch.pixels).sum()) / max(power, 1e-300), max(power, 1e-300) ** -0.5)
+    return missed(shape, laid_out(patches), offset=offset, error=error, tails=tails).cost

@@ -10,7 +10,8 @@ import numpy as np
 
 from ..kernels.measure_pupil import FIRST_DISC, FIRST_I
 from .evenly import evenly
-from .fit import Fit, Shape, light_of
+from .fit import Fit, light_of
+from .shape import Shape
 from .shared_out import shared_out
 from .views import Pixels, View
 
@@ -94,30 +95,29 @@ def alone(
     """
 
     def one(k: int) -> View:
-        own = lit_by(ghost.shapes[channel], views[k], rest[k])
+        own = rest[k].copy()
+        _add(ghost.shapes[channel], views[k], own, 1.0)
         return views[k].showing(np.broadcast_to(own[..., None], views[k].pixels.shape))
 
     return shared_out(one, evenly(range(ghost.first, ghost.last + 1), most), pool=pool)
 
 
 def exchange(
-    old: Shape, new: Shape, ghost: Found, views: Sequence[View], rest: list[Pixels], pool: ThreadPoolExecutor | None
+    old: Shape, new: Shape, ghost: Found, views: Sequence[View], rest: Sequence[Pixels], pool: ThreadPoolExecutor | None
 ) -> None:
-    """Put a ghost's new light in the place of the old in the rest."""
+    """Put a ghost's new light in the place of the old in the rest, in place."""
 
-    def one(k: int) -> Pixels:
-        return lit_by(new, views[k], lit_by(old, views[k], rest[k]), -1.0)
+    def one(k: int) -> None:
+        _add(old, views[k], rest[k], 1.0)
+        _add(new, views[k], rest[k], -1.0)
 
-    its = range(ghost.first, ghost.last + 1)
-    rest[ghost.first : ghost.last + 1] = shared_out(one, its, pool=pool)
+    shared_out(one, range(ghost.first, ghost.last + 1), pool=pool)
 
 
-def lit_by(shape: Shape, view: View, pixels: Pixels, sign: float = 1.0) -> Pixels:
-    """Return pixels of one channel with a shape's light added to them, or taken off."""
-    out = pixels.copy()
+def _add(shape: Shape, view: View, pixels: Pixels, sign: float) -> None:
+    """Add a shape's light to a view's pixels of one channel, or take it off, in place."""
     part, light = light_of(shape, view)
-    out[part] += sign * light
-    return out
+    pixels[part] += sign * light
 
 
 def darkened(shape: Shape) -> Shape:

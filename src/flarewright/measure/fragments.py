@@ -10,9 +10,11 @@ import numpy as np
 
 from ..kernels.measure_pupil import FIRST_G, FIRST_I
 from .evenly import evenly
-from .fit import MODEL_ERROR, Patch, Shape, brightens, cost_of, free_numbers, improve, patches_of, render
+from .fit import MODEL_ERROR, brightens, cost_of, improve, render
 from .found import Found, by_light, rest_of
 from .numbers import Floats
+from .patches import Patch, patches_of
+from .shape import Shape, free_numbers
 from .views import Pixels, View
 
 # part of the squares explained by the smaller of two ghosts that one ghost may lose
@@ -21,8 +23,8 @@ _LOST = 0.08
 _APART, _SHARED = 0.4, 0.5
 # how wide the pupil's middle is drawn where fits of one ghost begin: 1 is even, little is a bright core
 _CORES = (1.0, 0.4, -0.2)
-# views that a trial looks at
-_FEW = 10
+# views that a trial looks at, and pixels of a window there
+_FEW, _AREA = 10, 2500
 # part of the light that a trial's model may miss beyond what its views say: nothing, but a search as rough as others
 _KNOWN = 1e-9
 
@@ -103,7 +105,7 @@ def _as_one(
         as_two.append(_green(views[k], rest[k] + alone, level))
         as_one.append(_green(views[k], there, level))
     # what the smaller one has beside the larger is lost as well
-    patches = patches_of(shape, as_one, 1, beside=core)
+    patches = patches_of(shape, as_one, 1, beside=core, area=_AREA)
     if not patches:
         return None
     width = views[0].size_px[0]
@@ -115,7 +117,7 @@ def _as_one(
 
     best = fitted(core.numbers, patches)
     # the larger one alone is as free as one for both, or what it gains by itself would be taken for a fragment's light
-    apart = patches_of(shape, as_two, 1, beside=core)
+    apart = patches_of(shape, as_two, 1, beside=core, area=_AREA)
     if _lost(best, fitted(np.zeros_like(core.numbers), apart), patches, apart) > _LOST or not brightens(best, as_one):
         return None
     # and may begin where the one for both ended: what this found is not for want of light to be found without it

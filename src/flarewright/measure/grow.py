@@ -5,25 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from ..kernels.measure_mesh import parting_of
 from ..kernels.measure_pupil import DISC_NUMBERS, FIRST_DISC, FIRST_G, FIRST_I, LATERAL, MOST_DISCS, SOFT
-from .fit import (
-    MODEL_ERROR,
-    Fit,
-    Patch,
-    Shape,
-    coarser,
-    cost_of,
-    free_numbers,
-    improve,
-    parted,
-    patches_of,
-    refine,
-    shows,
-)
+from .fit import MODEL_ERROR, Fit, cost_of, improve, refine
+from .patches import AREA, Patch, coarser, patches_of, shows
+from .shape import Indices, Shape, free_numbers, parted
+from .shared_out import shared_out
 from .views import View
 
 # part of the cost by which a rim, or a higher order, or lateral colour, must lower it to stay
@@ -54,6 +45,8 @@ class Growth:
         Whether borders may be soft, once place and size are known.
     alike : bool
         See `fit.refine`.
+    area : int
+        See `patches.patches_of`.
     """
 
     order: int = 2
@@ -62,6 +55,7 @@ class Growth:
     error: float = MODEL_ERROR
     soft: bool = True
     alike: bool = True
+    area: int = AREA
 
 
 def grow(
@@ -93,7 +87,7 @@ def grow(
 
     def polish(start: Shape, order: int, light: int, steps: int, old: Shape | None) -> tuple[Fit, list[Patch]] | None:
         # a ghost that shrinks shall not forget the light that it leaves
-        patches = patches_of(start, views, channel, beside=old)
+        patches = patches_of(start, views, channel, beside=old, area=most.area)
         if not patches or not shows(start, views):
             return None
         free = free_numbers(order, start.discs, light, most.soft and order > 0)
@@ -177,7 +171,7 @@ def _with_rim(
     at = FIRST_DISC + DISC_NUMBERS * shape.discs
     largest = max(patch.sigma for patch in patches)
     own = np.concatenate([free[free >= FIRST_I], [at, at + 2]])
-    trials = []
+    starts = []
     for centre in _CENTRES:
         for bite in _BITES:
             numbers = shape.numbers.copy()
@@ -186,13 +180,13 @@ def _with_rim(
             away = 0.5 * bite * np.sign(centre)
             numbers[0] -= 0.5 * away * numbers[FIRST_G] / max(largest, 0.1)
             numbers[FIRST_G] *= 1.0 + 0.25 * bite
-            trial = replace(shape, numbers=numbers, discs=shape.discs + 1)
-            trials.append(
-                improve(trial, rough, own, width=width, steps=3, error=most.error, alike=most.alike, pool=pool)
-            )
-    everything = np.concatenate([free, [at, at + 2]])
-    best = [
-        improve(trial, few, everything, width=width, steps=6, error=most.error, alike=most.alike, pool=pool)
-        for trial, _ in sorted(trials, key=lambda each: each[1])[:3]
-    ]
+            starts.append(replace(shape, numbers=numbers, discs=shape.discs + 1))
+
+    def tried(look: Sequence[Patch], numbers: Indices, steps: int, start: Shape) -> tuple[Shape, float]:
+        return improve(start, look, numbers, width=width, steps=steps, error=most.error, alike=most.alike)
+
+    # each in one thread: a trial is too small to be shared out
+    trials = shared_out(partial(tried, rough, own, 3), starts, pool=pool)
+    promising = [trial for trial, _ in sorted(trials, key=lambda each: each[1])[:3]]
+    best = shared_out(partial(tried, few, np.concatenate([free, [at, at + 2]]), 6), promising, pool=pool)
     return min(best, key=lambda each: each[1])[0]

@@ -19,9 +19,11 @@ from ..kernels.measure_edges import sum_along_rows, sum_changes_along_rows
 from ..kernels.measure_mesh import window_of
 from ..kernels.measure_pupil import FIRST_I
 from .evenly import evenly
-from .fit import ALIKE, MODEL_ERROR, Indices, Shape, priors, scaled, witness
+from .fit import ALIKE, MODEL_ERROR, priors, witness
 from .found import CHANNELS, Found
 from .numbers import Floats
+from .patches import scaled
+from .shape import Indices, Shape
 from .shared_out import shared_out
 from .views import View, halved
 

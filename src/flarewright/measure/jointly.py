@@ -18,11 +18,13 @@ from ..kernels.measure_mesh import window_of
 from ..kernels.measure_misfit import weigh_misfit
 from ..kernels.measure_pupil import FIRST_DISC, FIRST_G, FIRST_I, SOFT
 from .evenly import evenly
-from .fit import MODEL_ERROR, OUTLIER, Indices, Misfit, Shape, free_numbers, priors, scaled, stepped, witness
+from .fit import MODEL_ERROR, priors, witness
 from .found import Found
 from .marquardt import FAR, descend
 from .numbers import Floats
+from .patches import OUTLIER, scaled
 from .room import Room
+from .shape import Indices, Shape, free_numbers, stepped
 from .shared_out import shared_out
 from .views import Pixels, View, halved
 
@@ -122,13 +124,35 @@ def _cautious(shape: Shape, free: Indices, step: Floats) -> float:
 
 
 @dataclass(frozen=True)
+class _Missed:
+    """How all shapes miss a sheet.
+
+    Attributes
+    ----------
+    cost : float
+        Weighted squares.
+    total : float
+        Sum of the weights.
+    count : int
+        Pixels that have weight.
+    weight, residual : ndarray, shape (H, W)
+    """
+
+    cost: float
+    total: float
+    count: int
+    weight: Floats
+    residual: Floats
+
+
+@dataclass(frozen=True)
 class _State:
     """Where the search stands; see `fit`."""
 
     shapes: list[Shape]
     prior: Floats
     cost: float
-    missed: list[Misfit]
+    missed: list[_Missed]
 
 
 @dataclass(frozen=True)
@@ -160,7 +184,7 @@ class _Search:
         missed = shared_out(lambda sheet: self.missed(shapes, sheet), self.sheets, pool=self.pool)
         return self.weighed(shapes, np.zeros(self.ends[-1]) if prior is None else prior, missed)
 
-    def weighed(self, shapes: list[Shape], prior: Floats, missed: list[Misfit]) -> _State:
+    def weighed(self, shapes: list[Shape], prior: Floats, missed: list[_Missed]) -> _State:
         """Return a state with a prior."""
         return _State(shapes, prior, sum(one.cost for one in missed) + float(prior @ self.numbers(shapes) ** 2), missed)
 
@@ -197,7 +221,7 @@ class _Search:
             side += beside
         return matrix, side
 
-    def missed(self, shapes: Sequence[Shape], sheet: _Sheet) -> Misfit:
+    def missed(self, shapes: Sequence[Shape], sheet: _Sheet) -> _Missed:
         """Draw all shapes on a sheet and weigh what they miss."""
         height, width = sheet.pixels.shape
         plane = _PLANES.zeros(height, width + 1)
@@ -214,9 +238,9 @@ class _Search:
         cost, total, count = weigh_misfit(
             plane, sheet.pixels, sheet.known, self.error, OUTLIER if self.tails else np.inf, True, weight, residual
         )
-        return Misfit(cost, total, count, weight, residual)
+        return _Missed(cost, total, count, weight, residual)
 
-    def equations(self, shapes: Sequence[Shape], sheet: _Sheet, missed: Misfit) -> tuple[Floats, Floats]:
+    def equations(self, shapes: Sequence[Shape], sheet: _Sheet, missed: _Missed) -> tuple[Floats, Floats]:
         """Return normal matrix and right side of one sheet, its even background solved for."""
         height, width = sheet.pixels.shape
         drawn, windows, start = [np.zeros(0)], [], 0

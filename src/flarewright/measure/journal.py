@@ -22,8 +22,9 @@ from ..errors import OutputError
 from ..io.atomic import write_atomically
 from ..model.ghost_model import Blades
 from .find import Candidate
-from .fit import Fit, Shape
+from .fit import Fit
 from .found import Found
+from .shape import Shape
 
 Made = TypeVar("Made")
 

@@ -8,13 +8,16 @@ does not change at all (the pupil stretched, its intensity thinned) cost nothing
 from __future__ import annotations
 
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..kernels.measure_pupil import DISC_NUMBERS, FIRST_DISC, FIRST_G, FIRST_I, LATERAL, SOFT
-from .fit import Indices, Patch, Shape, equations, misfit, priors
+from .fit import priors
 from .numbers import Floats
+from .patches import Patch, equations, laid_out, missed
+from .shape import Indices, Shape
 from .smooth import alike
 
 # constellations are left out by every so many
@@ -43,7 +46,14 @@ class Parabola:
     prior: Floats
 
 
-def parabola(shape: Shape, patches: Sequence[Patch], free: Indices, width: int, error: float) -> Parabola:
+def parabola(
+    shape: Shape,
+    patches: Sequence[Patch],
+    free: Indices,
+    width: int,
+    error: float,
+    pool: ThreadPoolExecutor | None = None,
+) -> Parabola:
     """Return the cost of one colour around its fit.
 
     Parameters
@@ -57,13 +67,12 @@ def parabola(shape: Shape, patches: Sequence[Patch], free: Indices, width: int, 
         Of the picture.
     error : float
         Part of the light that the model may miss.
+    pool : executor, optional
     """
-    missed = [misfit(shape, patch, True, error) for patch in patches]
-    parts = [equations(shape, free, patch, one, True) for patch, one in zip(patches, missed, strict=True)]
-    return Parabola(
-        shape.numbers[free], np.array([one.cost for one in missed]), np.array([side for _, side in parts]),
-        np.array([matrix for matrix, _ in parts]), priors(shape, free, width),
-    )  # fmt: skip
+    whole = laid_out(patches)
+    miss = missed(shape, whole, error=error, pool=pool)
+    matrices, sides = equations(shape, free, whole, miss, pool=pool)
+    return Parabola(shape.numbers[free], miss.costs, sides, matrices, priors(shape, free, width))
 
 
 def can_go(free: Indices) -> list[int]:

@@ -15,12 +15,16 @@ from ..kernels.measure_pupil import FIRST_G, FIRST_I
 from ..model.ghost_model import Blades
 from .evenly import evenly
 from .find import Candidate, candidates, slopes_of
-from .fit import Shape, brightens, cost_of, patches_of, presence, render
+from .fit import brightens, cost_of, render
 from .found import Found, darkened, left_beside, rest_of
 from .grow import Growth, grow
 from .jointly import fitted_jointly
 from .journal import Journal
 from .numbers import NUMBERS, with_blades
+from .patches import patches_of
+from .presence import presences
+from .shape import Shape
+from .shared_out import shared_out
 from .spans import LEAST_VIEWS, respanned, span_of
 from .specks import RADII, highest_near, specks
 from .views import Pixels, View, distances
@@ -43,7 +47,7 @@ COVERS, LIT, _LOOKED = 0.35, 0.1, 4
 # who was refused is tried again when twice as many ghosts are known, and so many more; but no more often than this
 _SOON, _TRIES = 2, 3
 # steps of all ghosts at once after some were found
-_TOUCHES = 8
+_TOUCHES = 6
 # all are asked anew where they are there when by so much more ghosts are known
 _MANY_MORE = 1.1
 # candidates that are looked for beside those that were refused, and more, so that not every refusal is a new search
@@ -51,8 +55,9 @@ _TRIALS, _SPARE = 12, 20
 # views that vote, and that a first fit looks at
 VOTERS = 50
 _FEW = 16
-# how far a candidate grows: most of what lies beside it is not known yet, so its misfit tells nothing of it
-_FIRST = Growth(order=1, discs=1, error=0.05, soft=False, alike=False)
+# how far a candidate grows: most of what lies beside it is not known yet, so its misfit tells nothing of it, and
+# fine pictures no more than coarse ones
+_FIRST = Growth(order=1, discs=1, error=0.05, soft=False, alike=False, area=2500)
 
 
 def beginning(candidate: Candidate, views: Sequence[View], pixels: Sequence[Pixels]) -> Shape:
@@ -62,12 +67,11 @@ def beginning(candidate: Candidate, views: Sequence[View], pixels: Sequence[Pixe
     numbers[FIRST_I] = candidate.radius**2
     numbers = with_blades(numbers, candidate.blades)
     shape = Shape(numbers)
-    seen = []
-    for view, picture in zip(views, pixels, strict=True):
-        alone = view.showing(np.repeat(picture[..., None], 3, axis=2))
-        there = presence(shape, alone, 1, 0.0)
-        if np.isfinite(there.error):
-            seen.append(there.amplitude)
+    alone = [
+        view.showing(np.broadcast_to(picture[..., None], view.pixels.shape))
+        for view, picture in zip(views, pixels, strict=True)
+    ]
+    seen = [each.amplitude for each in presences(shape, alone, 1, 0.0) if np.isfinite(each.error)]
     numbers[FIRST_I] *= max(float(np.median(seen)) if seen else 0.0, 1e-12)
     return Shape(numbers)
 
@@ -193,7 +197,7 @@ def _open(votes: Sequence[Candidate], refused: Sequence[_Refused], known: int) -
     one that was refused waits until many more are known; where nothing else is left, until any more are.
     """
     for latest in (known // 2 - _SOON, known - 1):
-        barred = [one.candidate for one in refused if one.known > latest or one.times == _TRIES]
+        barred = [one.candidate for one in refused if one.known > latest or one.times >= _TRIES]
         trials = [each for each in votes if not any(_same(each, other) for other in barred)]
         if trials:
             return trials
@@ -225,9 +229,9 @@ def _candidates(
     # with more of them a vote costs more and tells no more: `SCORE` is what chance reaches with so many
     voters = evenly(range(len(views)), VOTERS)
     seen, left, where = evenly(views, VOTERS), evenly(rest, VOTERS), evenly(masks, VOTERS)
-    slopes = slopes_of(_doubted(seen, left), left, where, pool=pool)
+    slopes = slopes_of(_doubted(seen, left, pool=pool), left, where, pool=pool)
     rims = candidates(slopes, views[0].size_px[0], most=most, iris=iris, pool=pool)
-    small = specks(_doubted(seen, left, beside=True), left, where, most=most, pool=pool)
+    small = specks(_doubted(seen, left, beside=True, pool=pool), left, where, most=most, pool=pool)
 
     def numbered(some: Sequence[Candidate]) -> list[Candidate]:
         return [replace(each, first=voters[each.first], last=voters[each.last]) for each in some]
@@ -235,20 +239,23 @@ def _candidates(
     return numbered(rims), numbered(small)
 
 
-def _doubted(views: Sequence[View], rest: Sequence[Pixels], *, beside: bool = False) -> list[View]:
+def _doubted(
+    views: Sequence[View], rest: Sequence[Pixels], *, beside: bool = False, pool: ThreadPoolExecutor | None
+) -> list[View]:
     """Return the views less certain where light was taken off: a part of it stays behind as edges.
 
     With `beside` also around there: of a speck whose form is not drawn well enough a larger part stays, as specks.
     """
-    out = []
-    for view, picture in zip(views, rest, strict=True):
+
+    def one(view: View, picture: Pixels) -> View:
         known = np.abs(view.pixels[..., 1] - picture)
         if beside:
             known = LEFT_AS_SPECKS * highest_near(highest_near(known, _BESIDE, axis=0), _BESIDE, axis=1)
         else:
             known = LEFT_BEHIND * known
-        out.append(replace(view, variance=view.variance + (known**2)[..., None]))
-    return out
+        return replace(view, variance=view.variance + (known**2)[..., None])
+
+    return shared_out(one, views, rest, pool=pool)
 
 
 def _same(a: Candidate, b: Candidate) -> bool:

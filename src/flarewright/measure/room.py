@@ -16,11 +16,14 @@ class Room(threading.local):
     def __init__(self) -> None:
         self._numbers: Floats = np.empty(0)
 
-    def zeros(self, *shape: int) -> Floats:
-        """Return zeros that hold until the thread asks again."""
-        size = prod(shape)
+    def some(self, size: int) -> Floats:
+        """Return so many numbers, whatever they are, that hold until the thread asks again."""
         if self._numbers.size < size:
             self._numbers = np.empty(size)
-        found = self._numbers[:size].reshape(shape)
+        return self._numbers[:size]
+
+    def zeros(self, *shape: int) -> Floats:
+        """Return zeros that hold until the thread asks again."""
+        found = self.some(prod(shape)).reshape(shape)
         found[...] = 0.0
         return found

@@ -12,13 +12,16 @@ import numpy as np
 from ..kernels.measure_pupil import DISC_NUMBERS, FIRST_DISC, FIRST_I
 from ..model.ghost_model import AberrationGhost, Blades
 from .find import rims_of
-from .fit import Fit, Shape, cost_of, free_numbers, improve, patches_of, presence, refine
+from .fit import Fit, cost_of, improve, refine
 from .found import CHANNELS, Found, alone, by_light, exchange, rest_of
 from .grow import RIM_PAYS, Growth, grow
 from .joint import lit
 from .jointly import fitted_jointly
 from .journal import Journal
 from .numbers import blades_of, channel_of, with_blades
+from .patches import patches_of
+from .presence import presences
+from .shape import Shape, free_numbers
 from .shared_out import side_by_side
 from .spans import respanned
 from .views import Pixels, View
@@ -44,7 +47,7 @@ class Settling:
     """
 
     rounds: int = 2
-    most: Growth = field(default_factory=lambda: Growth(order=2, discs=2))
+    most: Growth = field(default_factory=lambda: Growth(order=2, discs=2, area=3500))
     views: int = 32
 
 
@@ -227,8 +230,7 @@ def without_discs(shape: Shape) -> Shape:
 
 def _like(green: Shape, own: Shape, alone: Sequence[View], channel: int) -> Shape:
     """Return green's shape as bright as another colour is."""
-    seen = [presence(green, view, channel) for view in alone]
-    sure = [each.amplitude for each in seen if np.isfinite(each.error)]
+    sure = [each.amplitude for each in presences(green, alone, channel) if np.isfinite(each.error)]
     if not sure:
         return own
     numbers = green.numbers.copy()

@@ -34,6 +34,26 @@ def shared_out(work: Callable[..., Made], *given: Sequence[Any], pool: ThreadPoo
     return out  # type: ignore[return-value]
 
 
+def dealt_out(work: Callable[[int, int], None], count: int, pool: ThreadPoolExecutor | None) -> None:
+    """Have pieces of work done by kernels that are told which: from the first one on, every so many.
+
+    Parameters
+    ----------
+    work : callable
+        Takes the first piece and how many it is to the next.
+    count : int
+        Pieces.
+    pool : executor or None
+        None: everything is done here, in one call.
+    """
+    tasks = 1 if pool is None else min(os.cpu_count() or 1, count)
+    if pool is None or tasks < 2:
+        work(0, 1)
+        return
+    for _ in pool.map(lambda first: work(first, tasks), range(tasks)):
+        pass
+
+
 def side_by_side(*works: Callable[[], Made], pool: ThreadPoolExecutor | None) -> list[Made]:
     """Return what some large pieces of work make, in their order.
 

@@ -9,8 +9,11 @@ from functools import partial
 
 import numpy as np
 
-from .fit import Shape, presence
-from .found import Found, by_light, lit_by
+from .fit import Part, light_of
+from .found import Found, by_light
+from .numbers import Floats
+from .presence import presences
+from .shape import Shape
 from .shared_out import shared_out
 from .views import Pixels, View
 
@@ -41,8 +44,7 @@ def span_of(
     -----
     A view that does not reach it, or cannot tell, is no reason for a death, and neither is a single one without it.
     """
-    seen = shared_out(partial(_shown, shape), views, own, pool=pool)
-    return _around([each is not False for each in seen], middle)
+    return _around([each is not False for each in _shown(shape, views, own, pool)], middle)
 
 
 def respanned(
@@ -66,32 +68,39 @@ def respanned(
     rest : list of ndarray, shape (H, W)
         Beside these.
     """
-    out, left = list(ghosts), list(rest)
+    out, left = list(ghosts), [picture.copy() for picture in rest]
     for k in by_light(ghosts):
         ghost, shape = out[k], out[k].shapes[1]
-        own = shared_out(partial(_own, ghost), range(len(views)), views, left, pool=pool)
-        seen = shared_out(partial(_shown, shape), views, own, pool=pool)
+        lights = shared_out(partial(light_of, shape), views, pool=pool)
+        _add(lights, left, range(ghost.first, ghost.last + 1), 1.0)
+        seen = _shown(shape, views, left, pool)
         # the longest life of which views are certain
         lives = {_around([each is not False for each in seen], at) for at, each in enumerate(seen) if each}
         first, last = max(lives, key=lambda life: (seen[life[0] : life[1] + 1].count(True), -life[0]), default=(0, 0))
-        if last - first + 1 < LEAST_VIEWS:
-            continue
-        for at in range(len(views)):
-            if (first <= at <= last) != (ghost.first <= at <= ghost.last):
-                left[at] = lit_by(shape, views[at], own[at], -1.0) if first <= at <= last else own[at]
-        out[k] = replace(ghost, first=first, last=last)
+        if last - first + 1 >= LEAST_VIEWS:
+            out[k] = replace(ghost, first=first, last=last)
+        _add(lights, left, range(out[k].first, out[k].last + 1), -1.0)
     return out, left
 
 
-def _own(ghost: Found, number: int, view: View, rest: Pixels) -> Pixels:
-    """Return what a view shows of a ghost's green: what is left and the ghost, where that was taken off."""
-    return lit_by(ghost.shapes[1], view, rest) if ghost.first <= number <= ghost.last else rest
+def _add(lights: Sequence[tuple[Part, Floats]], pixels: Sequence[Pixels], where: range, sign: float) -> None:
+    """Add a ghost's light to some views' pixels, in place."""
+    for k in where:
+        part, light = lights[k]
+        pixels[k][part] += sign * light
 
 
-def _shown(shape: Shape, view: View, own: Pixels) -> bool | None:
-    """Tell whether a view shows a shape; None when it cannot tell."""
-    seen = presence(shape, view.showing(np.broadcast_to(own[..., None], view.pixels.shape)), 1)
-    return bool(seen.amplitude > THERE) if np.isfinite(seen.error) and seen.error <= _UNSURE else None
+def _shown(
+    shape: Shape, views: Sequence[View], own: Sequence[Pixels], pool: ThreadPoolExecutor | None
+) -> list[bool | None]:
+    """Tell which views show a shape; None of those that cannot tell."""
+    alone = [
+        view.showing(np.broadcast_to(each[..., None], view.pixels.shape)) for view, each in zip(views, own, strict=True)
+    ]
+    return [
+        bool(seen.amplitude > THERE) if np.isfinite(seen.error) and seen.error <= _UNSURE else None
+        for seen in presences(shape, alone, 1, pool=pool)
+    ]
 
 
 def _around(there: Sequence[bool], middle: int) -> tuple[int, int]:

@@ -199,12 +199,12 @@ def _best_runs(votes: Floats) -> tuple[Floats, NDArray[np.int64], NDArray[np.int
 def _law(votes: Floats, foretold: Floats, sigmas: Floats, places: Floats) -> tuple[float, float]:
     """Return speed and bend, place = sigma (speed + bend sigma^2), of the specks that are seen near foretold places."""
     seen = []
-    for vote, middle, sigma in zip(votes, foretold, sigmas, strict=True):
-        near = np.flatnonzero(np.abs(places - middle) <= STRAY)
-        if near.size and vote[near].max() > 0.0:
+    lows, highs = np.searchsorted(places, foretold - STRAY), np.searchsorted(places, foretold + STRAY, side="right")
+    for vote, low, high, sigma in zip(votes, lows, highs, sigmas, strict=True):
+        near = vote[low:high]
+        if near.size and near.max() > 0.0:
             # the middle of what is as good as the best
-            good = near[vote[near] > 0.9 * vote[near].max()]
-            seen.append((sigma, float(places[good].mean())))
+            seen.append((sigma, float(places[low:high][near > 0.9 * near.max()].mean())))
     if len(seen) < 2:
         return float(foretold[-1] / max(sigmas[-1], 1e-9)), 0.0
     sigma, place = np.array(seen).T

@@ -14,6 +14,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 from numpy.typing import NDArray
 
+from ..kernels.measure_boxes import box_means
 from ..model.sprite import Sprite, packed
 from .numbers import Floats, frame
 from .shared_out import shared_out
@@ -363,19 +364,9 @@ def _hats(told: Floats, knots: Floats) -> Floats:
 
 def _boxes(picture: Pixels, x: Floats, y: Floats, side: float) -> tuple[Floats, Floats]:
     """Return the mean of upright squares around places, and which part was measured, shape (..., 3) each."""
-    known = np.isfinite(picture)
-    height, width = picture.shape[:2]
-    xs = [np.clip(x + off * side, 0.0, width) for off in (-0.5, 0.5)]
-    ys = [np.clip(y + off * side, 0.0, height) for off in (-0.5, 0.5)]
-    sums = []
-    for each in (np.where(known, picture, 0.0), known):
-        # sums over all pixels above and left, linear within a pixel, give the light in any square
-        whole = np.pad(each.astype(float), ((1, 0), (1, 0), (0, 0))).cumsum(axis=0).cumsum(axis=1)
-        sums.append(sum(sign * _linear(whole, a, b) for sign, a, b in (
-            (1.0, xs[1], ys[1]), (-1.0, xs[1], ys[0]), (-1.0, xs[0], ys[1]), (1.0, xs[0], ys[0])
-        )))  # fmt: skip
-    part = np.asarray(sums[1] / side**2)
-    return np.where(part > 1e-6, sums[0] / np.maximum(sums[1], 1e-9), 0.0), part
+    mean, part = np.empty((2, x.size, 3))
+    box_means(np.asarray(picture, dtype=np.float32), x.ravel(), y.ravel(), side, mean, part)
+    return mean.reshape(*x.shape, 3), part.reshape(*x.shape, 3)
 
 
 def _cells(picture: Pixels, view: View, x: Floats, y: Floats, side: float) -> tuple[Floats, Floats, Floats]:
@@ -403,15 +394,6 @@ def sure(pictures: Floats, variance: Floats) -> Floats:
     power = sum(padded[:, a : a + rows, b : b + columns] for a in range(3) for b in range(3)) / 9.0
     kept = np.where(power > _NOISE, 1.0 - 1.0 / np.maximum(power, 1.0), 0.0)
     return np.asarray(pictures * kept[..., None])
-
-
-def _linear(whole: Floats, x: Floats, y: Floats) -> Floats:
-    """Read an array of shape (H, W, 3) between its whole places."""
-    left = np.minimum(x.astype(np.int64), whole.shape[1] - 2)
-    top = np.minimum(y.astype(np.int64), whole.shape[0] - 2)
-    a, b = (x - left)[..., None], (y - top)[..., None]
-    upper = (1.0 - a) * whole[top, left] + a * whole[top, left + 1]
-    return np.asarray((1.0 - b) * upper + b * ((1.0 - a) * whole[top + 1, left] + a * whole[top + 1, left + 1]))
 
 
 def points(picture: Pixels, x: Floats, y: Floats) -> tuple[Floats, Floats]:

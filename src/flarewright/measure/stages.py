@@ -19,7 +19,7 @@ from ..model.capture import FrameInfo, MergedRun
 from ..model.corrections import Corrections
 from ..model.ghost_model import AberrationGhost, Blades, GhostModel, Halo, Reference, Star
 from .detail_fit import with_detail
-from .fit import Shape, light_of
+from .fit import light_of
 from .found import Found
 from .fragments import joined
 from .glow import halo_at, offsets, star_at
@@ -34,6 +34,7 @@ from .pursuit import pursue
 from .reach import with_reaches
 from .replay import draw, light_px
 from .settle import Settling, settle, to_model
+from .shape import Shape
 from .shared_out import shared_out
 from .speck_sprites import all_hidden, covered, speck_sprites, specks_of
 from .specks_drawn import draw_specks

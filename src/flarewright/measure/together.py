@@ -8,16 +8,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernels.measure_changes import draw_with_changes
 from ..kernels.measure_mesh import window_of
 from ..kernels.measure_pupil import FIRST_G, FIRST_I
-from ..kernels.measure_together import add_together, ghost_changes
+from ..kernels.measure_together import add_together, draw_together, windows_together
 from .curves import Pose, posed
-from .fit import MODEL_ERROR, OUTLIER, Shape
+from .fit import MODEL_ERROR
 from .found import CHANNELS
 from .normal import inverse, solution
-from .numbers import Floats
+from .numbers import NUMBERS, Floats
+from .patches import OUTLIER
 from .room import Room
+from .shape import Shape
 from .views import View
 
 Shapes = tuple[Shape, Shape, Shape]
@@ -34,7 +35,7 @@ _DARK = 10.0
 _GAIN = 1e-3
 # the derivatives that make a shift and a change of size
 _FREE = np.array([0, *range(FIRST_G, FIRST_I)], dtype=np.int64)
-_PLANES, _CHANGES = Room(), Room()
+_ROOM = Room()
 
 
 def halvings(width: int) -> int:
@@ -120,8 +121,12 @@ def measure_together(
             off = np.array([_difference(e, p) for e, p in zip(expected, poses, strict=True)]).reshape(-1, PER_GHOST)
             pulled = side.copy()
             pulled[:size] += prior[:size] * off.ravel()
-            step = solution(matrix + np.diag(prior + 1e-12), pulled)[:size]
-            trial = [_stepped(*each) for each in zip(poses, step.reshape(-1, PER_GHOST), spread, strict=True)]
+            step = solution(matrix + np.diag(prior + 1e-12), pulled)
+            trial = [_stepped(*each) for each in zip(poses, step[:size].reshape(-1, PER_GHOST), spread, strict=True)]
+            if float(step @ pulled) < _GAIN * cost:
+                # nothing is left to be told by another picture
+                poses = trial
+                break
             redrawn = _drawn(ghosts, trial, view)
             there = _normal(redrawn, view, size, sure, doubting)
             if there[2] > cost:
@@ -202,25 +207,23 @@ def _drawn(ghosts: Sequence[Shapes], poses: Sequence[Pose], view: View) -> list[
 
 
 def _colour(shapes: Sequence[Shape], poses: Sequence[Pose], view: View) -> _Drawn:
+    bare = [Pose(1.0, pose.along_px, pose.size) for pose in poses]
+    numbers = [posed(shape.numbers, view.sigma, pose) for shape, pose in zip(shapes, bare, strict=True)]
+    parameters, discs = np.reshape(numbers, (-1, NUMBERS)), np.array([shape.discs for shape in shapes], dtype=np.int64)
+    windows = np.zeros((len(shapes), 6), np.int64)
+    seen, count, largest = windows_together(parameters, discs, view.sigma, view.frame, *view.size_px, windows)
+    windows, pixels = windows[:seen], np.empty((count, PER_GHOST))
+    # a ghost that is not seen has no place either: its light, not below a tenth, scales what place and size change
+    levels = np.array([max(pose.brightness, 0.1) for pose in poses])
+    shifts = levels / view.sigma if view.sigma > 0.0 else 0.0 * levels
+    growths = levels[:, None] * np.reshape([shape.numbers[FIRST_G:FIRST_I] for shape in shapes], (-1, _FREE.size - 1))
+    room = _ROOM.some(largest * (_FREE.size + 1))
+    draw_together(parameters, discs, view.sigma, view.frame, _FREE, windows, shifts, growths, room, pixels)
     picture = np.zeros(view.pixels.shape[:2])
-    windows, pixels, end = [], [np.zeros((0, PER_GHOST))], 0
-    for g, (shape, pose) in enumerate(zip(shapes, poses, strict=True)):
-        numbers = posed(shape.numbers, view.sigma, Pose(1.0, pose.along_px, pose.size))
-        left, top, width, height = window_of(numbers, shape.discs, view.sigma, view.frame, *view.size_px)
-        if not width:
-            continue
-        plane, changes = _PLANES.zeros(height, width + 1), _CHANGES.zeros(height, width + 1, _FREE.size)
-        draw_with_changes(numbers, shape.discs, view.sigma, _FREE, view.frame, left, top, plane, changes)
-        # a ghost that is not seen has no place either: its light, not below a tenth, scales what place and size change
-        level = max(pose.brightness, 0.1)
-        own = np.empty((height * width, PER_GHOST))
-        shift = level / view.sigma if view.sigma > 0.0 else 0.0
-        ghost_changes(plane, changes, shift, level * shape.numbers[FIRST_G:FIRST_I], own)
-        picture[top : top + height, left : left + width] += pose.brightness * own[:, 0].reshape(height, width)
-        windows.append((g, end, top, left, height, width))
-        pixels.append(own)
-        end += height * width
-    return _Drawn(picture, np.concatenate(pixels), np.array(windows, dtype=np.int64).reshape(-1, 6))
+    for g, start, top, left, height, width in windows:
+        light = pixels[start : start + height * width, 0].reshape(height, width)
+        picture[top : top + height, left : left + width] += poses[g].brightness * light
+    return _Drawn(picture, pixels, windows)
 
 
 def _inside(shape: Shape, pose: Pose, view: View) -> float:

@@ -10,8 +10,8 @@ from ..model.capture import MergedRun
 from ..model.ghost_model import AberrationGhost, GhostModel
 from ..model.ghost_tracks import Tracks
 from .compact import compact
-from .fit import Shape
 from .numbers import channel_numbers
+from .shape import Shape
 from .stages import beside, coarse, enlarged, read_views, with_rest
 from .together import Shapes, halvings
 from .track import follow

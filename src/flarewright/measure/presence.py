@@ -1,0 +1,63 @@
+"""How much of a ghost each view shows."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..kernels.measure_patches import weigh_presence
+from .fit import MODEL_ERROR
+from .patches import OUTLIER, cut_out, laid_out, missed
+from .shape import Shape
+from .views import View
+
+# standard deviations beyond which a pixel counts less and less: other ghosts' edges count so, from the shape's own
+# brightness on
+_OUTLIER = 4.0 * OUTLIER
+
+
+@dataclass(frozen=True)
+class Presence:
+    """How much of a ghost one view shows.
+
+    Attributes
+    ----------
+    amplitude : float
+        1: as bright as the shape says; 0 when the view does not reach it.
+    error : float
+        Standard deviation of the amplitude; infinite when the view does not reach it.
+    """
+
+    amplitude: float
+    error: float
+
+
+def presences(
+    shape: Shape,
+    views: Sequence[View],
+    channel: int,
+    error: float = MODEL_ERROR,
+    pool: ThreadPoolExecutor | None = None,
+) -> list[Presence]:
+    """Return how much of a shape each view shows, an even background aside.
+
+    Parameters
+    ----------
+    shape : Shape
+    views : sequence of View
+        Their pixels hold this ghost alone, as far as it is known.
+    channel : int
+    error : float
+        Part of the light that the model may miss.
+    pool : executor, optional
+    """
+    patches = cut_out(shape, views, channel)
+    whole = laid_out([patch for patch in patches if patch is not None])
+    miss = missed(shape, whole, offset=False, error=error, tails=False, pool=pool)
+    told = np.empty((len(whole.table), 2))
+    weigh_presence(whole.table, whole.pixels, miss.weight, miss.residual, _OUTLIER, told)
+    seen = iter(told)
+    return [Presence(0.0, np.inf) if patch is None else Presence(*map(float, next(seen))) for patch in patches]

@@ -1,0 +1,82 @@
+"""One colour of one ghost while it is fitted, and which of its numbers are."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..kernels.measure_pupil import DISC_NUMBERS, FIRST_DISC, FIRST_G, FIRST_I, LATERAL, SOFT
+from .numbers import Floats
+
+Indices = NDArray[np.int64]
+
+# by which wavelengths of a colour may shift a ghost and make it larger, part of its size
+_PART = np.array([1.0, 0.25])
+
+
+@dataclass(frozen=True)
+class Shape:
+    """One colour of one ghost while it is fitted.
+
+    Attributes
+    ----------
+    numbers : ndarray, shape (47,)
+        See `kernels.measure_pupil`.
+    discs : int
+    """
+
+    numbers: Floats
+    discs: int = 0
+
+
+def free_numbers(order: int, discs: int, intensity_order: int, soft: bool = False, lateral: bool = False) -> Indices:
+    """Return which numbers to fit.
+
+    Parameters
+    ----------
+    order : int
+        0: place, size and their change with the field; 1: Seidel's aberrations; 2: all.
+    discs : int
+    intensity_order : int
+        0: even; 1: first order in u, v, w; 2: all.
+    soft : bool
+        Also how soft the borders are.
+    lateral : bool
+        And how far the channel's wavelengths part.
+    """
+    geometry = {0: (0, 3), 1: (0, 1, 2, 3), 2: tuple(range(10))}[order]
+    light = {0: (0,), 1: (0, 1, 2, 3), 2: tuple(range(10))}[intensity_order]
+    picked = [*geometry, *(FIRST_G + k for k in geometry), *(FIRST_I + k for k in light)]
+    picked += [FIRST_DISC + k for k in range(DISC_NUMBERS * discs)]
+    picked += [SOFT] if soft else []
+    picked += [LATERAL, LATERAL + 1] if lateral else []
+    return np.array(picked, dtype=np.int64)
+
+
+def stepped(shape: Shape, free: Indices, step: Floats) -> Shape:
+    """Return a shape moved by a step; a disc never shrinks below a twentieth, and softness not below 0."""
+    numbers = shape.numbers.copy()
+    numbers[free] += step
+    for k in range(shape.discs):
+        at = FIRST_DISC + DISC_NUMBERS * k + 2
+        numbers[at] = max(numbers[at], 0.05)
+    # softer than half as wide as it is, a ghost would be a blot
+    numbers[SOFT] = min(max(numbers[SOFT], 0.0), 0.25 * numbers[FIRST_G] ** 2)
+    # and what grows much by colour would add light
+    wide = np.abs(numbers[FIRST_G]) * _PART
+    numbers[LATERAL:] = np.clip(numbers[LATERAL:], -wide, wide)
+    return replace(shape, numbers=numbers)
+
+
+def parted(shape: Shape) -> Shape:
+    """Return a shape whose wavelengths part by half of what its borders are soft.
+
+    Wavelengths that part one way look as those that part the other way: from where they do not, no search would begin.
+    """
+    numbers = shape.numbers.copy()
+    if not numbers[LATERAL:].any():
+        numbers[SOFT] *= 0.5
+        numbers[LATERAL:] = np.sqrt(numbers[SOFT])
+    return replace(shape, numbers=numbers)
