@@ -1,5 +1,6 @@
 """The first run: two processes compile for one picture, and whatever happens to a helper, there is a picture."""
 
+import importlib
 import json
 import os
 import shutil
@@ -10,6 +11,7 @@ from contextlib import nullcontext
 from pathlib import Path
 
 import pytest
+from numba.core.caching import FunctionCache
 
 from flarewright.cli.app import run
 from flarewright.io.exr import read_exr
@@ -329,6 +331,20 @@ def test_a_kernel_is_compiled_anew_when_one_that_it_holds_has_changed(tmp_path):
         return done.stdout.strip()
 
     assert [told(2.0), told(2.0), told(3.0)] == ["2.0 0", "2.0 1", "3.0 0"]
+
+
+@pytest.mark.parametrize(
+    "path", sorted(Path(first_run.__file__).parent.glob("measure_*.py")), ids=lambda path: path.stem
+)
+def test_what_python_calls_no_kernel_calls(path):
+    """A fit's last bits make other ghosts: they must not depend on whether its kernels were compiled or loaded."""
+    module = importlib.import_module(f"flarewright.kernels.{path.stem}")
+    own = [each for each in vars(module).values() if hasattr(each, "py_func") and each.__module__ == module.__name__]
+    assert own
+    for kernel in own:
+        used = [kernel.py_func.__globals__.get(name) for name in kernel.py_func.__code__.co_names]
+        called = [each for each in used if hasattr(each, "py_func")]
+        assert not [each for each in called if isinstance(each._cache, FunctionCache)], kernel
 
 
 @pytest.mark.parametrize("processes", [1, 2, 3, 4, 20])

@@ -3,7 +3,10 @@
 import numpy as np
 import pytest
 
-from flarewright.kernels.measure_normal import normal_equations
+from flarewright.kernels import measure_normal
+from flarewright.kernels._jit import for_python
+
+normal_equations = for_python(measure_normal.normal_equations)
 
 
 @pytest.mark.parametrize(("height", "width", "count"), [(1, 1, 1), (5, 7, 3), (4, 16, 33)])

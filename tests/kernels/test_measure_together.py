@@ -2,9 +2,13 @@
 
 import numpy as np
 
+from flarewright.kernels import measure_together
+from flarewright.kernels._jit import for_python
 from flarewright.kernels.measure_changes import draw_with_changes
 from flarewright.kernels.measure_mesh import window_of
-from flarewright.kernels.measure_together import add_together, draw_together, ghost_changes, windows_together
+from flarewright.kernels.measure_together import add_together, draw_together, windows_together
+
+ghost_changes = for_python(measure_together.ghost_changes)
 
 HEIGHT, WIDTH, COLOURS = 9, 12, 3
 

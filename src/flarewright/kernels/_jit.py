@@ -40,7 +40,11 @@ with suppress(ImportError, AttributeError, KeyError):
 
 
 def compiled(function: Callable[..., Any]) -> Any:
-    """Compile a kernel that Python calls."""
+    """Compile a kernel that Python calls, and no kernel.
+
+    Of one that kernels call as well there would be several copies, each optimised in its own place, and which of them
+    runs depends on what was loaded first: the run that compiles told other last bits than the next one.
+    """
     try:
         kernel = _njit(function, cache=True, **_ROOT, **_OPTIONS)
     except RuntimeError:

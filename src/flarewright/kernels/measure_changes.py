@@ -170,30 +170,9 @@ def _draw_changes(spots, spots_by, densities, changes, span, rim, left, top, wid
                 )  # fmt: skip
 
 
-@compiled
-def draw_with_changes(parameters, disc_count, sigma, free, frame, left, top, plane, out):
-    """Draw one ghost of one channel and its derivatives inside a window.
-
-    Parameters
-    ----------
-    parameters : ndarray, shape (N,), float64
-    disc_count : int
-    sigma : float
-    free : ndarray, shape (Q,), int64
-        Which parameters to derive by; with none the derivatives cost nothing.
-    frame : ndarray, shape (5,)
-    left, top : int
-        First pixel of the window.
-    plane : ndarray, shape (h, w + 1), float64
-        Zeros, and then differences along rows.
-    out : ndarray, shape (h, w + 1, Q), float64
-        Zeros, and then differences along rows of the derivatives.
-
-    Notes
-    -----
-    The derivative of the drawn picture itself, mesh and all: tests/kernels/test_measure_mesh.py compares it with
-    differences.
-    """
+@inner
+def draw_changes(parameters, disc_count, sigma, free, frame, left, top, plane, out):
+    """Do what `draw_with_changes` does, for kernels."""
     height, width = plane.shape[0], plane.shape[1] - 1
     spokes, rings, span = grain(parameters, disc_count, sigma, frame, True)
     if spokes == 0:
@@ -238,3 +217,30 @@ def draw_with_changes(parameters, disc_count, sigma, free, frame, left, top, pla
     for q in range(free.size):
         if free[q] == SOFT:
             add_spreading(plane, scale, out[:, :, q])
+
+
+@compiled
+def draw_with_changes(parameters, disc_count, sigma, free, frame, left, top, plane, out):
+    """Draw one ghost of one channel and its derivatives inside a window.
+
+    Parameters
+    ----------
+    parameters : ndarray, shape (N,), float64
+    disc_count : int
+    sigma : float
+    free : ndarray, shape (Q,), int64
+        Which parameters to derive by; with none the derivatives cost nothing.
+    frame : ndarray, shape (5,)
+    left, top : int
+        First pixel of the window.
+    plane : ndarray, shape (h, w + 1), float64
+        Zeros, and then differences along rows.
+    out : ndarray, shape (h, w + 1, Q), float64
+        Zeros, and then differences along rows of the derivatives.
+
+    Notes
+    -----
+    The derivative of the drawn picture itself, mesh and all: tests/kernels/test_measure_mesh.py compares it with
+    differences.
+    """
+    draw_changes(parameters, disc_count, sigma, free, frame, left, top, plane, out)

@@ -434,6 +434,16 @@ def _landed(parameters, disc_count, sigma, frame):
     return pupil, spots
 
 
+@inner
+def touched(parameters, disc_count, sigma, frame, width, height):
+    """Do what `window_of` does, for kernels."""
+    pupil, spots = _landed(parameters, disc_count, sigma, frame)
+    if spots.shape[0] == 0:
+        return 0, 0, 0, 0
+    far = shifts_of(parameters, sigma, frame, pupil, np.empty(spots.shape[1:]))
+    return _box(spots, reach_of(parameters[SOFT] * frame[4] * frame[4]) + beyond(far), width, height)
+
+
 @compiled
 def window_of(parameters, disc_count, sigma, frame, width, height):
     """Return the pixels that a ghost may touch.
@@ -452,11 +462,7 @@ def window_of(parameters, disc_count, sigma, frame, width, height):
     left, top, width, height : int
         Of the window; width 0 when it touches none.
     """
-    pupil, spots = _landed(parameters, disc_count, sigma, frame)
-    if spots.shape[0] == 0:
-        return 0, 0, 0, 0
-    far = shifts_of(parameters, sigma, frame, pupil, np.empty(spots.shape[1:]))
-    return _box(spots, reach_of(parameters[SOFT] * frame[4] * frame[4]) + beyond(far), width, height)
+    return touched(parameters, disc_count, sigma, frame, width, height)
 
 
 @compiled

@@ -6,13 +6,13 @@ work, and its sums change with the number of threads.
 
 import numpy as np
 
-from ._jit import borrowing, compiled
+from ._jit import borrowing, inner
 
 # pixels whose products are summed at once: the matrix is read and written once for all of them
 _TOGETHER = 8
 
 
-@compiled
+@inner
 def normal_equations(changes, weight, residual, matrix, side, mean):
     """Sum J' W J, J' W r and J' W 1 over pixels.
 

@@ -7,8 +7,8 @@ own first one on.
 import numpy as np
 
 from ._jit import compiled, inner
-from .measure_changes import draw_with_changes
-from .measure_misfit import weigh_misfit
+from .measure_changes import draw_changes
+from .measure_misfit import misfit_of
 from .measure_normal import normal_equations
 
 
@@ -51,10 +51,8 @@ def miss_patches(
         start, height, width = table[p, 0], table[p, 1], table[p, 2]
         plane = _part(room, 0, height, width + 1)
         plane[:] = 0.0
-        draw_with_changes(
-            parameters, disc_count, sigmas[p], none, frames[p], table[p, 3], table[p, 4], plane, no_changes
-        )
-        told[p, 0], told[p, 1], told[p, 2] = weigh_misfit(
+        draw_changes(parameters, disc_count, sigmas[p], none, frames[p], table[p, 3], table[p, 4], plane, no_changes)
+        told[p, 0], told[p, 1], told[p, 2] = misfit_of(
             plane, _part(pixels, start, height, width), _part(known, start, height, width), error, outlier, offset,
             _part(weight, start, height, width), _part(residual, start, height, width),
         )  # fmt: skip
@@ -62,7 +60,7 @@ def miss_patches(
 
 @compiled
 def weigh_changes(
-    parameters, disc_count, free, table, sigmas, frames, weight, residual, totals, offset, first, every, room, matrices,
+    parameters, disc_count, free, table, sigmas, frames, weight, residual, told, offset, first, every, room, matrices,
     sides,
 ):  # fmt: skip
     """Sum the normal equations of patches, each patch's even background solved for; see `normal_equations`.
@@ -74,9 +72,8 @@ def weigh_changes(
     free : ndarray, shape (Q,), int64
         Which parameters to derive by.
     weight, residual : ndarray, shape (S,), float64
+    told : ndarray, shape (P, 3), float64
         As `miss_patches` fills them.
-    totals : ndarray, shape (P,), float64
-        Sums of the weights.
     offset : bool
         There is an even background.
     room : ndarray, float64
@@ -93,15 +90,16 @@ def weigh_changes(
         room[: size * (count + 1)] = 0.0
         plane = _part(room, 0, height, width + 1)
         changes = room[size : size * (count + 1)].reshape((height, width + 1, count))
-        draw_with_changes(parameters, disc_count, sigmas[p], free, frames[p], table[p, 3], table[p, 4], plane, changes)
+        draw_changes(parameters, disc_count, sigmas[p], free, frames[p], table[p, 3], table[p, 4], plane, changes)
         matrix = matrices[p]
         normal_equations(
             changes, _part(weight, start, height, width), _part(residual, start, height, width), matrix, sides[p], mean
         )
-        if offset and totals[p] > 0.0:
+        total = told[p, 1]
+        if offset and total > 0.0:
             for a in range(count):
                 for b in range(count):
-                    matrix[a, b] -= mean[a] * mean[b] / totals[p]
+                    matrix[a, b] -= mean[a] * mean[b] / total
 
 
 @compiled
@@ -134,7 +132,7 @@ def weigh_presence(table, pixels, weight, residual, outlier, told):
 def _power(pixels, weight, residual, outlier, start, end):
     """Return the products of what was drawn, its mean taken off, with what was seen and with itself."""
     scale = 1.0 / outlier**2
-    total, mean, light, seen, power = 0.0, 0.0, 0.0, 0.0, 0.0
+    total, mean, seen, power = 0.0, 0.0, 0.0, 0.0
     for k in range(start, end):
         w = weight[k] / (1.0 + weight[k] * (residual[k] * residual[k] * scale))
         total += w

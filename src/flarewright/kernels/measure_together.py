@@ -5,11 +5,11 @@ cost more to set up than to sum.
 """
 
 from ._jit import compiled, inner
-from .measure_changes import draw_with_changes
-from .measure_mesh import window_of
+from .measure_changes import draw_changes
+from .measure_mesh import touched
 
 
-@compiled
+@inner
 def ghost_changes(plane, changes, shift, growth, pixels):
     """Fill what a ghost adds to each pixel of its window, and how that changes with its place and its size.
 
@@ -60,7 +60,7 @@ def windows_together(parameters, disc_counts, sigma, frame, width, height, windo
     """
     seen, start, largest = 0, 0, 0
     for g in range(parameters.shape[0]):
-        left, top, w, h = window_of(parameters[g], disc_counts[g], sigma, frame, width, height)
+        left, top, w, h = touched(parameters[g], disc_counts[g], sigma, frame, width, height)
         if w > 0:
             row = windows[seen]
             row[0], row[1], row[2], row[3], row[4], row[5] = g, start, top, left, h, w
@@ -95,7 +95,7 @@ def draw_together(parameters, disc_counts, sigma, frame, free, windows, shifts, 
         room[: size * (free.size + 1)] = 0.0
         plane = room[:size].reshape((height, width + 1))
         changes = room[size : size * (free.size + 1)].reshape((height, width + 1, free.size))
-        draw_with_changes(parameters[g], disc_counts[g], sigma, free, frame, left, top, plane, changes)
+        draw_changes(parameters[g], disc_counts[g], sigma, free, frame, left, top, plane, changes)
         ghost_changes(plane, changes, shifts[g], growths[g], pixels[start : start + height * width])
 
 

@@ -97,7 +97,7 @@ def alone(
     def one(k: int) -> View:
         own = rest[k].copy()
         _add(ghost.shapes[channel], views[k], own, 1.0)
-        return views[k].showing(np.broadcast_to(own[..., None], views[k].pixels.shape))
+        return views[k].showing_one(own)
 
     return shared_out(one, evenly(range(ghost.first, ghost.last + 1), most), pool=pool)
 
@@ -106,12 +106,20 @@ def exchange(
     old: Shape, new: Shape, ghost: Found, views: Sequence[View], rest: Sequence[Pixels], pool: ThreadPoolExecutor | None
 ) -> None:
     """Put a ghost's new light in the place of the old in the rest, in place."""
+    lay_over(old, ghost, views, rest, 1.0, pool)
+    lay_over(new, ghost, views, rest, -1.0, pool)
 
-    def one(k: int) -> None:
-        _add(old, views[k], rest[k], 1.0)
-        _add(new, views[k], rest[k], -1.0)
 
-    shared_out(one, range(ghost.first, ghost.last + 1), pool=pool)
+def lay_over(
+    shape: Shape,
+    ghost: Found,
+    views: Sequence[View],
+    pixels: Sequence[Pixels],
+    sign: float,
+    pool: ThreadPoolExecutor | None,
+) -> None:
+    """Add a shape's light to a channel's pixels of the views in which a ghost is there, or take it off, in place."""
+    shared_out(lambda k: _add(shape, views[k], pixels[k], sign), range(ghost.first, ghost.last + 1), pool=pool)
 
 
 def _add(shape: Shape, view: View, pixels: Pixels, sign: float) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf
 
 import numpy as np
@@ -26,8 +26,9 @@ _ROOM = Room()
 
 @dataclass(frozen=True)
 class Patch:
-    """The part of a view that one fit looks at, at its resolution."""
+    """The part of a view, told by its number, that one fit looks at, at its resolution."""
 
+    view: int
     sigma: float
     frame: Floats
     left: int
@@ -67,23 +68,12 @@ def patches_of(
     list of Patch
         Of the views that show it.
     """
-    return [patch for patch in cut_out(shape, views, channel, beside, area) if patch is not None]
-
-
-def cut_out(
-    shape: Shape,
-    views: Sequence[View],
-    channel: int,
-    beside: Shape | None = None,
-    area: int = AREA,
-) -> list[Patch | None]:
-    """Return a patch of every view, None of those that do not show the ghost; see `patches_of`."""
     windows = [_window(shape, beside, view) for view in views]
     areas = [window[2] * window[3] for window in windows if window[2]]
-    found: list[Patch | None] = [None] * len(views)
     if not areas:
-        return found
+        return []
     times = max(0, int(np.ceil(0.5 * np.log2(max(float(np.median(areas)) / area, 1.0)))))
+    found = []
     for k, (view, (left, top, width, height)) in enumerate(zip(views, windows, strict=True)):
         if not width:
             continue
@@ -96,9 +86,8 @@ def cut_out(
         part = np.s_[y0 * side : y1 * side, x0 * side : x1 * side]
         pixels = halved(view.pixels[part][..., channel], times)
         variance = halved(view.variance[part][..., channel], times, variance=True)
-        found[k] = Patch(
-            view.sigma, scaled(view.frame, times), x0, y0, pixels.astype(float), 1.0 / variance.astype(float)
-        )
+        frame = scaled(view.frame, times)
+        found.append(Patch(k, view.sigma, frame, x0, y0, pixels.astype(float), 1.0 / variance.astype(float)))
     return found
 
 
@@ -126,8 +115,10 @@ def coarser(patch: Patch) -> Patch:
     with np.errstate(divide="ignore"):
         variance = (1.0 / patch.weight[part]).astype(np.float32)
     pixels, variance = halved(patch.pixels[part].astype(np.float32), 1), halved(variance, 1, variance=True)
-    left, top = (patch.left + 1) // 2, (patch.top + 1) // 2
-    return Patch(patch.sigma, scaled(patch.frame, 1), left, top, pixels.astype(float), 1.0 / variance.astype(float))
+    return replace(
+        patch, frame=scaled(patch.frame, 1), left=(patch.left + 1) // 2, top=(patch.top + 1) // 2,
+        pixels=pixels.astype(float), weight=1.0 / variance.astype(float),
+    )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -245,7 +236,7 @@ def equations(
     def some(first: int, every: int) -> None:
         weigh_changes(
             shape.numbers, shape.discs, free, patches.table, patches.sigmas, patches.frames, miss.weight, miss.residual,
-            miss.told[:, 1].copy(), offset, first, every, _ROOM.some(patches.largest * (size + 1)), matrices, sides,
+            miss.told, offset, first, every, _ROOM.some(patches.largest * (size + 1)), matrices, sides,
         )  # fmt: skip
 
     dealt_out(some, count, pool=pool)

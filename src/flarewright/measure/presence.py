@@ -10,7 +10,7 @@ import numpy as np
 
 from ..kernels.measure_patches import weigh_presence
 from .fit import MODEL_ERROR
-from .patches import OUTLIER, cut_out, laid_out, missed
+from .patches import OUTLIER, laid_out, missed, patches_of
 from .shape import Shape
 from .views import View
 
@@ -54,10 +54,12 @@ def presences(
         Part of the light that the model may miss.
     pool : executor, optional
     """
-    patches = cut_out(shape, views, channel)
-    whole = laid_out([patch for patch in patches if patch is not None])
+    patches = patches_of(shape, views, channel)
+    whole = laid_out(patches)
     miss = missed(shape, whole, offset=False, error=error, tails=False, pool=pool)
     told = np.empty((len(whole.table), 2))
     weigh_presence(whole.table, whole.pixels, miss.weight, miss.residual, _OUTLIER, told)
-    seen = iter(told)
-    return [Presence(0.0, np.inf) if patch is None else Presence(*map(float, next(seen))) for patch in patches]
+    seen = [Presence(0.0, np.inf)] * len(views)
+    for patch, (amplitude, deviation) in zip(patches, told, strict=True):
+        seen[patch.view] = Presence(float(amplitude), float(deviation))
+    return seen

@@ -67,10 +67,7 @@ def beginning(candidate: Candidate, views: Sequence[View], pixels: Sequence[Pixe
     numbers[FIRST_I] = candidate.radius**2
     numbers = with_blades(numbers, candidate.blades)
     shape = Shape(numbers)
-    alone = [
-        view.showing(np.broadcast_to(picture[..., None], view.pixels.shape))
-        for view, picture in zip(views, pixels, strict=True)
-    ]
+    alone = [view.showing_one(picture) for view, picture in zip(views, pixels, strict=True)]
     seen = [each.amplitude for each in presences(shape, alone, 1, 0.0) if np.isfinite(each.error)]
     numbers[FIRST_I] *= max(float(np.median(seen)) if seen else 0.0, 1e-12)
     return Shape(numbers)
@@ -272,7 +269,7 @@ def _stale(trial: Candidate, taken: Candidate) -> bool:
 
 def _alone(views: Sequence[View], rest: Sequence[Pixels], keep: Sequence[int]) -> list[View]:
     """Return some views with one channel's rest as their green."""
-    return [views[k].showing(np.broadcast_to(rest[k][..., None], views[k].pixels.shape)) for k in keep]
+    return [views[k].showing_one(rest[k]) for k in keep]
 
 
 def _try(

@@ -5,16 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 
-from .fit import Part, light_of
-from .found import Found, by_light
-from .numbers import Floats
+from .found import Found, by_light, lay_over
 from .presence import presences
 from .shape import Shape
-from .shared_out import shared_out
 from .views import Pixels, View
 
 # how bright a ghost must be in a view, by its own measure, to be there
@@ -71,32 +67,22 @@ def respanned(
     out, left = list(ghosts), [picture.copy() for picture in rest]
     for k in by_light(ghosts):
         ghost, shape = out[k], out[k].shapes[1]
-        lights = shared_out(partial(light_of, shape), views, pool=pool)
-        _add(lights, left, range(ghost.first, ghost.last + 1), 1.0)
+        lay_over(shape, ghost, views, left, 1.0, pool)
         seen = _shown(shape, views, left, pool)
         # the longest life of which views are certain
         lives = {_around([each is not False for each in seen], at) for at, each in enumerate(seen) if each}
         first, last = max(lives, key=lambda life: (seen[life[0] : life[1] + 1].count(True), -life[0]), default=(0, 0))
         if last - first + 1 >= LEAST_VIEWS:
             out[k] = replace(ghost, first=first, last=last)
-        _add(lights, left, range(out[k].first, out[k].last + 1), -1.0)
+        lay_over(shape, out[k], views, left, -1.0, pool)
     return out, left
-
-
-def _add(lights: Sequence[tuple[Part, Floats]], pixels: Sequence[Pixels], where: range, sign: float) -> None:
-    """Add a ghost's light to some views' pixels, in place."""
-    for k in where:
-        part, light = lights[k]
-        pixels[k][part] += sign * light
 
 
 def _shown(
     shape: Shape, views: Sequence[View], own: Sequence[Pixels], pool: ThreadPoolExecutor | None
 ) -> list[bool | None]:
     """Tell which views show a shape; None of those that cannot tell."""
-    alone = [
-        view.showing(np.broadcast_to(each[..., None], view.pixels.shape)) for view, each in zip(views, own, strict=True)
-    ]
+    alone = [view.showing_one(each) for view, each in zip(views, own, strict=True)]
     return [
         bool(seen.amplitude > THERE) if np.isfinite(seen.error) and seen.error <= _UNSURE else None
         for seen in presences(shape, alone, 1, pool=pool)

@@ -63,6 +63,10 @@ class View:
         """Return the same view with other pixels."""
         return replace(self, pixels=pixels)
 
+    def showing_one(self, picture: Pixels) -> View:
+        """Return the same view with one channel's picture, shape (H, W), as every channel."""
+        return self.showing(np.broadcast_to(picture[..., None], self.pixels.shape))
+
 
 def views_of(frames: Sequence[MergedFrame], largest_deg: float | None = None) -> tuple[View, ...]:
     """Return the views of merged frames, by rising constellation.
