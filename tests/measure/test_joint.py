@@ -68,6 +68,16 @@ def test_a_ghost_is_judged_by_the_light_that_its_rims_let_through():
     assert misfit(kept, shown) < 1.2
 
 
+@pytest.mark.parametrize(("part", "told"), [(0.015, 1), (0.06, 2)])
+def test_what_a_model_may_miss_of_a_ghost_is_no_other_ghost(part, told):
+    # no noise to speak of: whatever is drawn explains its own light well
+    body, within = shape(-40.0, 34.0, 50.0), shape(-46.0, 20.0, 50.0 * part)
+    shown = views((body, within), angles=FEW)
+    kept = lit([found(body), found(within)], shown)
+    assert len(kept) == told
+    assert kept[0].shapes[1].numbers[0] == body.numbers[0]
+
+
 def test_ghosts_are_lit_only_where_they_are():
     shown = views((GHOSTS[0],), angles=FEW[:5]) + views((), angles=FEW[5:])
     assert misfit(lit([found(dimmer(GHOSTS[0], 0.5), 5)], shown), shown) < 1.2

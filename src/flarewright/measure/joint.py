@@ -40,7 +40,8 @@ class _Picture:
     """One view and the G `ghosts` that it shows: what each number of their light would add, shape (P, 4 G).
 
     An even background is nobody's: the means are taken off. `there`, shape (P, G), is where the ghosts are, `pixels` is
-    what is seen, `light`, shape (4 G,), is what each number adds in all.
+    what is seen, `light`, shape (4 G,), is what each number adds in all, `allowed`, shape (G,), is what a model may
+    miss where each ghost is, in weighted squares.
     """
 
     ghosts: Indices
@@ -49,6 +50,7 @@ class _Picture:
     there: NDArray[np.bool_]
     pixels: Floats
     weight: Floats
+    allowed: Floats
 
     @property
     def columns(self) -> Indices:
@@ -119,9 +121,10 @@ def _needed(matrix: Floats, side: Floats, pictures: Sequence[_Picture], least: f
     and C their part of the inverse matrix.
     """
     kept = np.arange(side.size // _TERMS.size)
-    adds = np.zeros(side.size)
+    adds, allowed = np.zeros(side.size), np.zeros(kept.size)
     for one in pictures:
         adds[one.columns] += one.light
+        allowed[one.ghosts] += one.allowed
     while kept.size:
         at = _columns(kept)
         inverse = np.linalg.inv(matrix[np.ix_(at, at)])
@@ -134,10 +137,15 @@ def _needed(matrix: Floats, side: Floats, pictures: Sequence[_Picture], least: f
             rests[one.ghosts] += (one.weight * missed**2) @ one.there
         gains = np.empty(kept.size)
         for n, k in enumerate(kept):
-            own = slice(_TERMS.size * n, _TERMS.size * (n + 1))
-            grown = float(values[own] @ np.linalg.solve(inverse[own, own], values[own]))
+            own, part = _columns(kept[n : n + 1]), slice(_TERMS.size * n, _TERMS.size * (n + 1))
+            light = everything[own]
+            grown = float(light @ np.linalg.solve(inverse[part, part], light))
+            seen = float(light @ matrix[np.ix_(own, own)] @ light)
+            # one that is fainter than what the model may miss of the others there is what it misses of them
+            gains[n] = min(grown / max(grown + rests[k], 1e-300), seen / max(allowed[k], 1e-300) - 1.0)
             # a ghost that darkens is none: what its rims let through counts, not what its law says of the whole pupil
-            gains[n] = grown / max(grown + rests[k], 1e-300) if adds[at][own] @ values[own] > 0.0 else -1.0
+            if adds[own] @ light <= 0.0:
+                gains[n] = -1.0
         worst = int(np.argmin(gains))
         if gains[worst] >= least:
             break
@@ -162,14 +170,16 @@ def _pictures(
         for n, g in enumerate(shown):
             model += _add(ghosts[g].shapes[channel], view.sigma, scaled(view.frame, times), basis[:, :, n])
         level = np.maximum(np.abs(model), np.abs(pixels))
-        weight = np.where(np.isfinite(variance), 1.0 / (variance + (MODEL_ERROR * level) ** 2), 0.0).ravel()
+        allowed = (MODEL_ERROR * level) ** 2
+        weight = np.where(np.isfinite(variance), 1.0 / (variance + allowed), 0.0).ravel()
         columns = basis.reshape(height * width, -1)
         total = max(float(weight.sum()), 1e-300)
         seen = np.where(weight > 0.0, pixels.ravel(), 0.0)
         there = columns[:, :: _TERMS.size] != 0.0
         light = columns.sum(axis=0, dtype=np.float64)
         columns = columns - ((weight @ columns) / total).astype(np.float32)
-        return _Picture(shown, columns, light, there, seen - float(weight @ seen) / total, weight)
+        missed = (weight * allowed.ravel()) @ there
+        return _Picture(shown, columns, light, there, seen - float(weight @ seen) / total, weight, missed)
 
     return shared_out(one, evenly(range(len(views)), _VIEWS), pool=pool)
 
