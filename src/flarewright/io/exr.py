@@ -181,7 +181,7 @@ def read_exr(path: str | PathLike[str]) -> ExrContents:
     for k, part in enumerate(file.parts):
         prefix = "" if k == 0 else f"{part.name()}."
         planes = [part.channels[f"{prefix}{name}"].pixels for name in _CHANNELS]
-        pixels = np.stack(planes, axis=-1).astype(np.float32)
+        pixels = np.stack(planes, axis=-1).astype(np.float32, copy=False)
         x, y = (int(value) for value in part.header["dataWindow"][0])
         about = _prefixed(part.header, f"{_PREFIX}layer.")
         name = part.name() or "beauty"

@@ -23,7 +23,7 @@ from .moved import displaced
 from .moves_fit import mean_about
 from .sprite_fit import darkest_noise, fine_cells, nearest_views, sure
 from .sprites import Pixels, where_foretold
-from .views import View
+from .views import View, all_known
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -68,7 +68,7 @@ def _learned(
 
     def keep(k: int) -> tuple[str, Pixels, Mask]:
         light, variance = fine_cells(sprite, views[k], left[k], _PARTS)
-        known = np.asarray(np.isfinite(light).all(axis=2))
+        known = all_known(light)
         text, picture = told_detail(np.nan_to_num(sure(light[None], variance[None])[0]).astype(np.float32), unit)
         return text, picture, known
 

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from ..io.merged import read_frame
 from ..model.capture import FrameInfo, MergedFrame, MergedRun
 from .curves import spline_basis
+from .views import all_known
 
 Floats = NDArray[np.float64]
 
@@ -163,7 +164,7 @@ def _ratio(one: tuple[Floats, Floats], other: tuple[Floats, Floats]) -> _Ratio |
     half = one[0].shape[0] // 2
     across = np.arange(-half, half + 1)
     sector = np.floor((np.arctan2(across[:, None], across) % np.pi) / np.pi * _SECTORS).astype(int) % _SECTORS
-    known = np.isfinite(one[0]).all(axis=2) & np.isfinite(other[0]).all(axis=2)
+    known = all_known(one[0]) & all_known(other[0])
     # only where the mirrored pixel is known too
     known = known & np.asarray(known)[::-1, ::-1]
     logs = []

@@ -5,21 +5,19 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..kernels.measure_glow import halo_light, star_light
 from ..model.ghost_model import Halo, Star
 
 Floats = NDArray[np.float64]
 
+# no law has less light than this, and what has not twice as much has none
 _DARK = 1e-30
+_NONE = np.log(2.0 * _DARK)
 
 
-def _law(radius: Floats, knots: tuple[float, ...], radiance: tuple[tuple[float, float, float], ...]) -> Floats:
-    """Interpolate logarithms of radiance over the logarithm of the radius; 0 beyond the last knot."""
-    at, logs = np.log(np.maximum(radius, knots[0])), np.log(knots)
-    values = np.log(np.maximum(np.array(radiance), _DARK))
-    out = np.stack([np.exp(np.interp(at, logs, values[:, m])) for m in range(3)], axis=-1)
-    out[out <= 2.0 * _DARK] = 0.0
-    out[radius > knots[-1]] = 0.0
-    return out
+def _law(knots: tuple[float, ...], radiance: tuple[tuple[float, float, float], ...]) -> tuple[Floats, Floats]:
+    """Return the logarithms of a law's radii, shape (K,), and of its radiance there, shape (K, 3)."""
+    return np.log(np.array(knots)), np.log(np.maximum(np.array(radiance), _DARK))
 
 
 def offsets(light_px: tuple[float, float], size_px: tuple[int, int], scale: float) -> tuple[Floats, Floats]:
@@ -31,8 +29,14 @@ def offsets(light_px: tuple[float, float], size_px: tuple[int, int], scale: floa
 
 
 def halo_radiance(halo: Halo, x: Floats, y: Floats) -> Floats:
-    """Return the halo's radiance at offsets from the light, shape (..., 3)."""
-    return _law(np.hypot(x, y), halo.radius_px, halo.radiance)
+    """Return the halo's radiance at offsets from the light, shape (..., 3), as strong as its law says."""
+    return _halo(halo, x, y, 1.0, np.zeros(3))
+
+
+def _halo(halo: Halo, x: Floats, y: Floats, strength: float, even: Floats) -> Floats:
+    out = np.empty((x.size, 3))
+    halo_light(x.ravel(), y.ravel(), *_law(halo.radius_px, halo.radiance), _NONE, strength, even, out)
+    return out.reshape(*x.shape, 3)
 
 
 def star_radiance(star: Star, x: Floats, y: Floats) -> Floats:
@@ -40,12 +44,9 @@ def star_radiance(star: Star, x: Floats, y: Floats) -> Floats:
 
     Every spike falls off as a Gaussian across and by the star's law along.
     """
-    radius, angle = np.hypot(x, y), np.arctan2(y, x)
-    apart = 2.0 * np.pi / star.spikes
-    off = (angle - np.radians(star.first_deg) + 0.5 * apart) % apart - 0.5 * apart
-    # the nearest spike only: beside it, a spike's own circle is farther than the next one's
-    ridge = np.exp(-0.5 * (radius * np.sin(off) / star.width_px) ** 2)
-    return np.asarray(ridge[..., None] * _law(radius, star.radius_px, star.radiance))
+    out, law = np.empty((x.size, 3)), _law(star.radius_px, star.radiance)
+    star_light(x.ravel(), y.ravel(), star.spikes, np.radians(star.first_deg), star.width_px, *law, _NONE, out)
+    return out.reshape(*x.shape, 3)
 
 
 def strength_at(strength: tuple[tuple[float, float], ...], constellation_deg: float) -> float:
@@ -58,11 +59,11 @@ def strength_at(strength: tuple[tuple[float, float], ...], constellation_deg: fl
 
 def halo_at(halo: Halo, constellation_deg: float, x: Floats, y: Floats) -> Floats:
     """Return the halo's radiance at a constellation and at offsets from the light, shape (..., 3)."""
-    light = strength_at(halo.strength, constellation_deg) * halo_radiance(halo, x, y)
+    even = np.zeros(3)
     if halo.even:
         angles, levels = zip(*halo.even, strict=True)
-        light = light + [np.interp(constellation_deg, angles, [level[m] for level in levels]) for m in range(3)]
-    return np.asarray(light)
+        even = np.array([np.interp(constellation_deg, angles, [level[m] for level in levels]) for m in range(3)])
+    return _halo(halo, x, y, strength_at(halo.strength, constellation_deg), even)
 
 
 def star_at(star: Star, constellation_deg: float, x: Floats, y: Floats) -> Floats:

@@ -18,7 +18,7 @@ from ..model.ghost_model import Blades, Halo, Rgb3, Star
 from .glow import halo_radiance, offsets, star_radiance
 from .numbers import Floats
 from .shared_out import shared_out
-from .views import Pixels, View, halved
+from .views import Pixels, View, all_known, halved
 
 # the constellations' quantile that is taken for light without ghosts
 LOW = 0.3
@@ -181,7 +181,7 @@ def _around(view: View) -> _Around:
     side = 2.0**-_HALVINGS
     at = view.light_px[0] * side, view.light_px[1] * side
     radius = np.hypot(*offsets(at, (light.shape[1], light.shape[0]), side))
-    known = np.isfinite(light).all(axis=2) & np.isfinite(variance).all(axis=2)
+    known = all_known(light) & all_known(variance)
     return _Around(radius[known], light[known], variance[known])
 
 
@@ -243,15 +243,18 @@ def followed(
 def _parts(halo: Halo | None, star: Star | None, view: View, pixels: Pixels, mask: NDArray[np.bool_]) -> Floats:
     """Return how strong halo, star and an even red, green and blue are in a view, shape (5,)."""
     x, y = offsets(view.light_px, view.size_px, 1.0)
-    none = np.zeros(pixels.shape)
+    none = np.broadcast_to(0.0, pixels.shape)
     shapes = [none if halo is None else halo_radiance(halo, x, y), none if star is None else star_radiance(star, x, y)]
     known = np.isfinite(pixels) & mask[..., None]
     every = max(1, int(np.sqrt(np.count_nonzero(known) / _SAMPLES)))
-    spots = np.zeros(known.shape, bool)
-    spots[::every, ::every] = known[::every, ::every]
-    basis = np.concatenate([np.stack([one[spots] for one in shapes], axis=1), np.eye(3)[np.nonzero(spots)[2]]], axis=1)
-    parts = _strengths(basis, pixels[spots].astype(float), view.variance[spots].astype(float))
-    glow = parts[0] * shapes[0] + parts[1] * shapes[1] + parts[2:]
+    spots = known[::every, ::every]
+    few = [one[::every, ::every][spots] for one in (*shapes, pixels, view.variance)]
+    basis = np.concatenate([np.stack(few[:2], axis=1), np.eye(3)[np.nonzero(spots)[2]]], axis=1)
+    parts = _strengths(basis, few[2].astype(float), few[3].astype(float))
+    glow = np.broadcast_to(parts[2:], pixels.shape).copy()
+    for part, shape in zip(parts, shapes, strict=False):
+        if part > 0.0:
+            glow += part * shape
     return parts * _bound(np.where(known, glow, np.nan), view)
 
 

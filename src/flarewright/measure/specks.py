@@ -14,6 +14,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from ..kernels.measure_strip import means_along
 from .find import Candidate
 from .numbers import Floats
 from .shared_out import shared_out
@@ -159,10 +160,10 @@ def _contrast(strip: Floats, noise: Floats, radius: float, across: Floats) -> Fl
     inside = away <= radius
     ring = (away >= radius + _FROM) & (away <= radius + _TO)
     side = np.floor(np.arctan2(across[:, None], along) / (2.0 * np.pi / _SIDES) + 0.5) % _SIDES
-    middle, doubt = _mean(strip, inside), _mean(noise, inside) / (np.pi * radius**2)
-    sides = np.array([_mean(strip, ring & (side == k)) for k in range(_SIDES)])
-    contrast, most = middle - sides.max(axis=0), middle - sides.min(axis=0)
-    doubt = doubt + _mean(noise, ring) / (ring.sum() * _STEP / _SIDES)
+    middle, *sides = _means(strip, inside, *(ring & (side == k) for k in range(_SIDES)))
+    contrast, most = middle - np.max(sides, axis=0), middle - np.min(sides, axis=0)
+    within, around = _means(noise, inside, ring)
+    doubt = within / (np.pi * radius**2) + around / (ring.sum() * _STEP / _SIDES)
     with np.errstate(invalid="ignore", divide="ignore"):
         # within a larger ghost, next to its rim, only one side is darker
         even = np.maximum(contrast, 0.0) / most
@@ -170,16 +171,12 @@ def _contrast(strip: Floats, noise: Floats, radius: float, across: Floats) -> Fl
     return np.where(np.isfinite(vote), vote, 0.0)
 
 
-def _mean(strip: Floats, weights: NDArray[np.bool_]) -> Floats:
-    """Return the mean of a strip under weights, at every place along it; not a number at the ends."""
-    half = weights.shape[1] // 2
-    total = np.full(strip.shape[1], np.nan)
-    inner = np.zeros(max(strip.shape[1] - 2 * half, 0))
-    for row, line in zip(weights, strip, strict=True):
-        for k in np.flatnonzero(row):
-            inner += line[k : k + len(inner)]
-    total[half : half + len(inner)] = inner / weights.sum()
-    return total
+def _means(strip: Floats, *weights: NDArray[np.bool_]) -> Floats:
+    """Return the means of a strip under some weights, at every place along it; not a number at the ends."""
+    means = np.full((len(weights), strip.shape[1]), np.nan)
+    if strip.shape[1] >= weights[0].shape[1]:
+        means_along(strip, np.array(weights), means)
+    return means
 
 
 def _best_runs(votes: Floats) -> tuple[Floats, NDArray[np.int64], NDArray[np.int64]]:
@@ -198,16 +195,20 @@ def _best_runs(votes: Floats) -> tuple[Floats, NDArray[np.int64], NDArray[np.int
 
 def _law(votes: Floats, foretold: Floats, sigmas: Floats, places: Floats) -> tuple[float, float]:
     """Return speed and bend, place = sigma (speed + bend sigma^2), of the specks that are seen near foretold places."""
-    seen = []
     lows, highs = np.searchsorted(places, foretold - STRAY), np.searchsorted(places, foretold + STRAY, side="right")
-    for vote, low, high, sigma in zip(votes, lows, highs, sigmas, strict=True):
-        near = vote[low:high]
-        if near.size and near.max() > 0.0:
-            # the middle of what is as good as the best
-            seen.append((sigma, float(places[low:high][near > 0.9 * near.max()].mean())))
-    if len(seen) < 2:
+    # shape (views, places near the foretold one)
+    at = lows[:, None] + np.arange(int(2.0 * STRAY / _STEP) + 2)
+    there = at < highs[:, None]
+    at = np.minimum(at, len(places) - 1)
+    near = np.where(there, np.take_along_axis(votes, at, axis=1), 0.0)
+    best = near.max(axis=1)
+    seen = best > 0.0
+    if np.count_nonzero(seen) < 2:
         return float(foretold[-1] / max(sigmas[-1], 1e-9)), 0.0
-    sigma, place = np.array(seen).T
-    basis = np.stack([sigma, sigma**3], axis=1)[:, : 2 if len(seen) >= _BENT else 1]
+    # the middle of what is as good as the best
+    good = near[seen] > 0.9 * best[seen, None]
+    place = (places[at[seen]] * good).sum(axis=1) / good.sum(axis=1)
+    sigma = sigmas[seen]
+    basis = np.stack([sigma, sigma**3], axis=1)[:, : 2 if len(sigma) >= _BENT else 1]
     law = np.linalg.lstsq(basis, place, rcond=None)[0]
     return float(law[0]), float(law[1]) if len(law) > 1 else 0.0

@@ -40,7 +40,7 @@ from .speck_sprites import all_hidden, covered, speck_sprites, specks_of
 from .specks_drawn import draw_specks
 from .spike_fit import spike_sprites
 from .sprite_fit import axis_sprite, beside_sprites, light_sprites
-from .views import Pixels, View, halved, views_of
+from .views import Pixels, View, all_known, halved, views_of
 
 Tell = Callable[[str], None]
 Progress = Callable[[float, str], None]
@@ -61,7 +61,9 @@ _NEAR_LAW = 0.01
 SEARCH_WIDTH = 400
 
 
-def read_views(folder: Path, run: MergedRun, every: int = 1) -> tuple[View, ...]:
+def read_views(
+    folder: Path, run: MergedRun, every: int = 1, pool: ThreadPoolExecutor | None = None
+) -> tuple[View, ...]:
     """Read every n-th frame of each roll of a run, by rising constellation; the others are never opened.
 
     Raises
@@ -80,7 +82,7 @@ def read_views(folder: Path, run: MergedRun, every: int = 1) -> tuple[View, ...]
             f"ghost; use at most --every {max(1, (len(run.frames) - 1) // 2)}"
         )
     frames.sort(key=lambda each: (each.constellation_deg, each.roll_deg))
-    return views_of([read_frame(folder, info) for info in frames], largest)
+    return views_of(shared_out(partial(read_frame, folder), frames, pool=pool), largest)
 
 
 def masks_of(views: Sequence[View], pool: ThreadPoolExecutor | None = None) -> list[NDArray[np.bool_]]:
@@ -88,7 +90,7 @@ def masks_of(views: Sequence[View], pool: ThreadPoolExecutor | None = None) -> l
 
     def one(view: View) -> NDArray[np.bool_]:
         far = _off_light(view) > AROUND_LIGHT * view.size_px[0]
-        return np.asarray(far & np.isfinite(view.variance).all(axis=2))
+        return np.asarray(far & all_known(view.variance))
 
     return shared_out(one, views, pool=pool)
 
@@ -189,14 +191,14 @@ def find_ghosts(
     FlarewrightError
         When frames cannot be read or are too few, or a correction points at nothing.
     """
-    views = read_views(folder, run, every)
     known = corrections or Corrections()
     with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
+        views = read_views(folder, run, every, pool)
         dim = _dimmed_beside([], views, _star_of(views, pool), pool)
         times, small = _for_search(dim.views)
         iris = iris_of(dim.star)
         pointed = [candidate(each, small, 2.0**times, run) for each in known.add]
-        measured = [np.asarray(np.isfinite(view.variance).all(axis=2)) for view in small]
+        measured = [all_known(view.variance) for view in small]
         found = pursue(
             small, measured, most=most, first=pointed, iris=iris, pool=pool, tell=tell, progress=progress,
             journal=journal,
@@ -256,17 +258,18 @@ def fit_ghosts(
     FlarewrightError
         When frames cannot be read, or a ghost is none that is fitted here.
     """
-    views = read_views(folder, run, every)
     given = (*rough.ghosts, *rough.removed)
-    # without those that were removed the search for more would find them again, and the others would share their light
-    found = [
-        replace(_found(ghost, views), unwanted=k >= len(rough.ghosts))
-        for k, ghost in enumerate(given) if isinstance(ghost, AberrationGhost)
-    ]  # fmt: skip
-    if len(found) < len(given):
+    ghosts = [ghost for ghost in given if isinstance(ghost, AberrationGhost)]
+    if len(ghosts) < len(given):
         raise FlarewrightError("a Bezier ghost cannot be fitted over all constellations; take it out of the model")
     settling = how or Settling(rounds=1)
     with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
+        views = read_views(folder, run, every, pool)
+        # without those that were removed the search for more would find them again, and the others would share their
+        # light
+        found = [
+            replace(_found(ghost, views), unwanted=k >= len(rough.ghosts)) for k, ghost in enumerate(ghosts)
+        ]  # fmt: skip
         dim = _dimmed_beside(found, views, _star_of(views, pool), pool)
         iris = iris_of(dim.star)
         parts = iter(_parts(2 * again + 1, progress))
@@ -422,7 +425,7 @@ def _more(
 ) -> list[Found]:
     """Look for more ghosts beside the known ones, at the search's resolution."""
     times, small = _for_search(views)
-    measured = [np.asarray(np.isfinite(view.variance).all(axis=2)) for view in small]
+    measured = [all_known(view.variance) for view in small]
     found = pursue(
         small, measured, most=max(most, 0), known=[_sized(ghost, 0.5**times) for ghost in known], iris=iris, pool=pool,
         tell=tell, progress=progress, journal=journal,

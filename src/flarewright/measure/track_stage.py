@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
 
 from ..errors import FlarewrightError
@@ -12,10 +15,10 @@ from ..model.ghost_tracks import Tracks
 from .compact import compact
 from .numbers import channel_numbers
 from .shape import Shape
+from .shared_out import shared_out
 from .stages import beside, coarse, enlarged, read_views, with_rest
 from .together import Shapes, halvings
 from .track import follow
-from .views import View
 
 Tell = Callable[[float, str], None]
 
@@ -54,9 +57,11 @@ def track_ghosts(
     FlarewrightError
         When frames cannot be read or are too few, or a ghost has no aberrations to be followed by.
     """
-    views = _views(folder, run, model, every)
+    _check_size(run, model)
     times = halvings(run.size_px[0])
-    small = [coarse(view, times) for view in views]
+    with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
+        views = beside(read_views(folder, run, every, pool), model.halo, model.star, pool)
+        small = shared_out(partial(coarse, times=times), views, pool=pool)
     ghosts = [_shapes(ghost, 0.5**times) for ghost in _checked(model)]
     tracks = follow([ghost.name for ghost in model.ghosts], ghosts, small, threads=threads, tell=tell)
     return tracks if times == 0 else _enlarged(tracks, 2.0**times)
@@ -83,17 +88,22 @@ def compress_ghosts(
     names = {ghost.name for ghost in model.ghosts}
     if names != {track.name for track in tracks.ghosts}:
         raise FlarewrightError("the tracks are of other ghosts than the model's; run flarewright measure track again")
-    small = compact(model, tracks, _views(folder, run, model, every), threads=threads, tell=tell)
-    return with_rest(small, read_views(folder, run, every), threads)
+    _check_size(run, model)
+    with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
+        views = read_views(folder, run, every, pool)
+        dim = beside(views, model.halo, model.star, pool)
+    small = compact(model, tracks, dim, threads=threads, tell=tell)
+    # they need not be there beside what `with_rest` makes
+    del dim
+    return with_rest(small, views, threads)
 
 
-def _views(folder: Path, run: MergedRun, model: GhostModel, every: int) -> list[View]:
+def _check_size(run: MergedRun, model: GhostModel) -> None:
     if tuple(run.size_px) != tuple(model.size_px):
         raise FlarewrightError(
             f"the model was fitted to pictures of {model.size_px[0]}x{model.size_px[1]} pixels and the frames have "
             f"{run.size_px[0]}x{run.size_px[1]}; run flarewright measure fit again"
         )
-    return beside(read_views(folder, run, every), model.halo, model.star)
 
 
 def _checked(model: GhostModel) -> list[AberrationGhost]:

@@ -133,6 +133,13 @@ def distances(view: View, place: float, scale: float = 1.0) -> Floats:
     return np.asarray(np.hypot(x[None, :] - cosine * place, y[:, None] + sine * place), dtype=np.float64)
 
 
+def all_known(pixels: NDArray[np.floating]) -> NDArray[np.bool_]:
+    """Return where all three colours of a picture of shape (H, W, 3) are finite."""
+    # colour by colour: several times as fast as numpy's `all` over three
+    red, green, blue = (np.isfinite(pixels[..., m]) for m in range(3))
+    return np.asarray(red & green & blue)
+
+
 def halved(pixels: Pixels, times: int, variance: bool = False) -> Pixels:
     """Average a picture of shape (H, W, ...) over squares of 2**times pixels; a rest at the border is left out.
 

@@ -24,7 +24,7 @@ from .numbers import Floats
 from .replay import draw
 from .single import Spot, spots_of_model
 from .stages import beside, coarse, read_views, with_rest
-from .views import View
+from .views import View, all_known
 from .walch import circle, descend, window_of
 from .walch import draw as drawn
 
@@ -157,7 +157,7 @@ def _one(view: View, spot: Spot, before: tuple[Floats, Spot] | None, rounds: int
     if min(width, height) < _ROOM:
         return None
     part = np.s_[top : top + height, left : left + width]
-    known = np.asarray(np.isfinite(small.variance[part]).all(axis=2))
+    known = all_known(small.variance[part])
     if known.mean() < _MEASURED:
         return None
     window = left, top, width, height
