@@ -12,15 +12,20 @@ from flarewright.kernels.measure_pupil import FIRST_DISC, FIRST_G, LATERAL, SOFT
 NONE = np.zeros(0, np.int64)
 
 
+# f' and g'; f" and g" beside them; and how both grow with w
+UNEVEN, GROWING = (3.0, -1.2, 1.0, 0.7), (3.0, -1.2, 1.0, 0.7, 2.0, -3.0)
+
+
 def colourful(kind, discs: int = 1, lateral=(3.0, -1.2), variance: float = 0.2) -> np.ndarray:
     numbers = kind(discs)
     numbers[SOFT] = variance
-    numbers[LATERAL:] = lateral
+    numbers[LATERAL : LATERAL + len(lateral)] = lateral
     return numbers
 
 
-def wavelength_by_wavelength(numbers: np.ndarray, discs: int, count: int = 41) -> np.ndarray:
+def wavelength_by_wavelength(numbers: np.ndarray, discs: int, sigma: float = 0.5, count: int = 41) -> np.ndarray:
     """Draw the whole ghost at many wavelengths of a Gaussian band."""
+    f, g, bent_f, bent_g, f_grows, g_grows = numbers[LATERAL:]
     t = np.linspace(-2.2, 2.2, count)
     light = np.exp(-0.5 * t**2)
     light /= light.sum()
@@ -28,15 +33,15 @@ def wavelength_by_wavelength(numbers: np.ndarray, discs: int, count: int = 41) -
     picture = 0.0
     for place, part in zip(t, light, strict=True):
         one = numbers.copy()
-        one[0] += place * numbers[LATERAL]
-        one[FIRST_G] += place * numbers[LATERAL + 1]
+        one[0] += place * (f + sigma**2 * f_grows) + (place**2 - 1.0) * bent_f
+        one[FIRST_G] += place * (g + sigma**2 * g_grows) + (place**2 - 1.0) * bent_g
         one[LATERAL:] = 0.0
         picture = picture + part * draw_finely(one, discs)
     return picture
 
 
 @pytest.mark.parametrize("kind", [ghost, even, bladed])
-@pytest.mark.parametrize("lateral", [(3.0, -1.2), (0.3, 0.1), (-8.0, 2.0)])
+@pytest.mark.parametrize("lateral", [(3.0, -1.2), (0.3, 0.1), (-8.0, 2.0), UNEVEN, GROWING])
 def test_a_rim_of_many_wavelengths_is_that_of_ghosts_of_one_each(kind, lateral):
     numbers = colourful(kind, 1, lateral)
     expected, found = wavelength_by_wavelength(numbers, 1), draw_finely(numbers, 1)
@@ -45,8 +50,8 @@ def test_a_rim_of_many_wavelengths_is_that_of_ghosts_of_one_each(kind, lateral):
     def off(picture):
         return float(np.sqrt(((picture - expected) ** 2).mean()))
 
-    # what grows adds light: g' / g squared
-    grown = (lateral[1] / numbers[FIRST_G]) ** 2
+    # what grows adds light: g' / g squared, and twice as much what is uneven
+    grown = (np.abs(numbers[LATERAL + 1 :: 2]).sum() / numbers[FIRST_G]) ** 2
     # within the ghost light that curves is not spread
     assert off(found) < 0.001 * np.sqrt((expected**2).mean()) + 0.15 * off(plain), (off(found), off(plain))
     assert found.sum() == pytest.approx(expected.sum(), rel=grown + 5e-4)
@@ -54,7 +59,8 @@ def test_a_rim_of_many_wavelengths_is_that_of_ghosts_of_one_each(kind, lateral):
 
 def test_colour_that_shifts_and_widens_alike_leaves_one_side_sharp():
     numbers = np.zeros_like(ghost())
-    numbers[0], numbers[FIRST_G], numbers[20], numbers[LATERAL:] = 80.0, 30.0, 900.0, (4.0, 2.0)
+    numbers[0], numbers[FIRST_G], numbers[20] = 80.0, 30.0, 900.0
+    numbers[LATERAL : LATERAL + 2] = 4.0, 2.0
     upright = np.array([60.0, 70.0, 1.0, 0.0, 1.0])
     row = draw(numbers, 0, frame=upright)[70]
     # at half the field f' shifts by 2, and g' widens by 2: left they cancel, right they add up
@@ -65,7 +71,7 @@ def test_colour_that_shifts_and_widens_alike_leaves_one_side_sharp():
 
 
 @pytest.mark.parametrize("kind", [ghost, even, bladed])
-@pytest.mark.parametrize("lateral", [(3.0, -1.2), (-6.0, 1.5)])
+@pytest.mark.parametrize("lateral", [(3.0, -1.2), (-6.0, 1.5), UNEVEN, GROWING])
 def test_a_replay_draws_it_nearly_alike(kind, lateral):
     numbers = colourful(kind, 1, lateral, 0.3)
     fitted, replayed = draw_finely(numbers, 1), draw(numbers, 1)
@@ -73,8 +79,27 @@ def test_a_replay_draws_it_nearly_alike(kind, lateral):
     assert replayed.sum() == pytest.approx(fitted.sum(), rel=5e-3)
 
 
-def test_windows_hold_what_colour_moves():
-    numbers = colourful(ghost, 2, (14.0, 3.0), 1.0)
+def test_glass_that_parts_short_wavelengths_farther_leaves_a_tail_on_one_side():
+    numbers = np.zeros_like(ghost())
+    numbers[FIRST_G], numbers[20], numbers[LATERAL:] = 30.0, 900.0, (0.0, 2.0, 0.0, 1.0, 0.0, 0.0)
+    row = draw(numbers, 0, frame=np.array([60.0, 70.0, 1.0, 0.0, 1.0]))[70]
+    slope = np.abs(np.diff(row))[60:]
+    place = np.arange(slope.size)
+    middle = (slope * place).sum() / slope.sum()
+    spread = np.sqrt((slope * (place - middle) ** 2).sum() / slope.sum())
+    skewness = (slope * (place - middle) ** 3).sum() / slope.sum() / spread**3
+    t = np.linspace(-2.2, 2.2, 1001)
+    light = np.exp(-0.5 * t**2) / np.exp(-0.5 * t**2).sum()
+    t /= np.sqrt((light * t**2).sum())
+    away = 2.0 * t + (t**2 - 1.0)
+    assert middle == pytest.approx(29.0, abs=0.1)
+    assert spread == pytest.approx(np.sqrt((light * away**2).sum()), rel=0.05)
+    assert skewness == pytest.approx((light * away**3).sum() / (light * away**2).sum() ** 1.5, rel=0.1)
+
+
+@pytest.mark.parametrize("lateral", [(14.0, 3.0), (2.0, 0.0, 9.0, 2.0), (0.0, 0.0, 0.0, 0.0, 40.0, 9.0)])
+def test_windows_hold_what_colour_moves(lateral):
+    numbers = colourful(ghost, 2, lateral, 1.0)
     whole = draw_finely(numbers, 2)
     left, top, width, height = window_of(numbers, 2, 0.5, FRAME, *SIZE)
     plane = np.zeros((height, width + 1))
@@ -89,11 +114,16 @@ def test_both_signs_turned_it_is_the_same():
     assert np.allclose(draw_finely(one, 1), draw_finely(other, 1), atol=1e-12)
 
 
+def test_the_skew_keeps_its_sign_when_the_wavelengths_turn():
+    one, other = colourful(ghost, 1, GROWING), colourful(ghost, 1, (-3.0, 1.2, 1.0, 0.7, -2.0, 3.0))
+    assert np.allclose(draw_finely(one, 1), draw_finely(other, 1), atol=1e-12)
+
+
 @pytest.mark.parametrize("kind", [ghost, even, bladed])
 @pytest.mark.parametrize("discs", [0, 2])
 def test_derivatives_are_those_of_the_picture(discs, kind):
-    numbers = colourful(kind, discs, (3.0, -1.2), 0.4)
-    free = np.concatenate([np.arange(FIRST_DISC + 3 * discs), [SOFT, LATERAL, LATERAL + 1]])
+    numbers = colourful(kind, discs, GROWING, 0.4)
+    free = np.concatenate([np.arange(FIRST_DISC + 3 * discs), np.arange(SOFT, numbers.size)])
     plane = np.zeros((SIZE[1], SIZE[0] + 1))
     changes = np.zeros((SIZE[1], SIZE[0] + 1, free.size))
     draw_with_changes(numbers, discs, 0.5, free, FRAME, 0, 0, plane, changes)
@@ -105,5 +135,6 @@ def test_derivatives_are_those_of_the_picture(discs, kind):
         step[n] = 1e-4 if n == SOFT else 1e-5
         by_difference = (draw_finely(numbers + step, discs) - draw_finely(numbers - step, discs)) / (2.0 * step[n])
         off, scale = np.abs(by_difference - changes[:, :-1, q]), np.abs(by_difference).max()
-        # taps are computed, and cut off, anew for every variance
-        assert np.sqrt((off**2).mean()) < 2e-3 * scale if n == SOFT else off.max() < 1e-3 * scale + 1e-12, n
+        # taps are cut off anew for every variance, and a picture is taken to go on beyond its border as it is there
+        inside = slice(4, -4) if n == SOFT else slice(None)
+        assert off[inside, inside].max() < (3e-3 if n == SOFT else 1e-3) * scale + 1e-12, n

@@ -7,6 +7,7 @@ from flarewright.kernels._jit import for_python
 from flarewright.kernels.measure_changes import draw_with_changes
 from flarewright.kernels.measure_mesh import window_of
 from flarewright.kernels.measure_together import add_together, draw_together, windows_together
+from flarewright.measure.numbers import NUMBERS
 
 ghost_changes = for_python(measure_together.ghost_changes)
 
@@ -51,7 +52,7 @@ def test_sums_over_windows_are_those_over_whole_pictures():
 
 def test_ghosts_drawn_together_are_as_they_are_alone():
     sigma, frame, size = 0.7, np.array([20.0, 15.0, 0.8, 0.6, 1.0]), (48, 32)
-    parameters = np.zeros((3, 47))
+    parameters = np.zeros((3, NUMBERS))
     parameters[:, 10] = 5.0, 4.0, 6.0
     parameters[:, 20] = 30.0, 10.0, 20.0
     # the second lies outside the picture

@@ -195,7 +195,7 @@ def draw_changes(parameters, disc_count, sigma, free, frame, left, top, plane, o
     if span > 0:
         join(spots, span, densities)
     densities *= scale
-    shifts = np.empty((spokes, 2))
+    shifts = np.empty((spokes, 4))
     far = shifts_of(parameters, sigma, frame, pupil, shifts)
     band = wavelengths_of(far)
     draw_mesh(spots, densities, span, True, far == 0.0, left, top, width, height, plane)

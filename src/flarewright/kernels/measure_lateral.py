@@ -1,37 +1,56 @@
 """Lateral colour within a channel: a ghost's rim, as each of the channel's wavelengths draws it.
 
 A channel is a band of wavelengths, and each draws the ghost at its own place and in its own size. A pupil point p that
-lands at X for the band's middle lands at X + t D for a wavelength t standard deviations away, D = s f' + p g': by two
-numbers a rim is sharp on one side of the ghost and soft on the other. Within the ghost what moves in from one side
-moves out on the other, so the rim alone is drawn anew for each t, and what lies between the rim and where it moves to
-belongs to the cell beside it. In folds nothing is spread by colour.
+lands at X for the band's middle lands at X + t D + (t^2 - 1) E for a wavelength t standard deviations away, D = s f' +
+p g', E = s f" + p g", where f' and g' grow with w = s.s. By f' and g' a rim is sharp on one side of the ghost and soft
+on the other. By f" and g" it is soft unevenly: glass parts short wavelengths farther than long ones, and where a lens
+is corrected for colour both may land on the same side. Within the ghost what moves in from one side moves out on the
+other, so the rim alone is drawn anew for each t, and what lies between the rim and where it moves to belongs to the
+cell beside it. In folds nothing is spread by colour.
 """
 
 from math import ceil, exp, sqrt
 
 import numpy as np
 
-from ._jit import inner
+from ._jit import borrowing, inner
 from .measure_edges import add_edge, add_edge_changes
-from .measure_pupil import FIRST_DISC, LATERAL, SOFT, pupil_change, turned
+from .measure_pupil import FIRST_DISC, LATERAL, LATERAL_NUMBERS, SOFT, pupil_change, turned
 
 # the band is taken for a Gaussian: so many standard deviations to either side, in steps of so many pixels, few at most
 _ENDS, _STEP, _FEWEST, _MOST = 2.2, 0.8, 3, 15
+# how much farther E carries its ends than D of the same length does
+_BENT = 1.75
+
+
+@borrowing
+def _length(x, y):
+    return sqrt(x * x + y * y)
+
+
+@borrowing
+def _parting(parameters, m, sigma):
+    """Return f' and g' (m is 0), or f" and g" (1), at a field."""
+    f, g = parameters[LATERAL + 2 * m], parameters[LATERAL + 2 * m + 1]
+    if m == 0:
+        w = sigma * sigma
+        f += w * parameters[LATERAL + 4]
+        g += w * parameters[LATERAL + 5]
+    return f, g
 
 
 @inner
 def shifts_of(parameters, sigma, frame, pupil, shifts):
-    """Fill how far the rim moves with one standard deviation, pixels, (spokes, 2); return the farthest."""
-    f, g = parameters[LATERAL], parameters[LATERAL + 1]
+    """Fill D and E of the rim, pixels, (spokes, 4); return how far it moves with one standard deviation at most."""
     shifts[:] = 0.0
-    if f == 0.0 and g == 0.0:
-        return 0.0
     last, far = pupil.shape[0] - 1, 0.0
-    for j in range(shifts.shape[0]):
-        along, across = sigma * f + pupil[last, j, 0] * g, pupil[last, j, 1] * g
-        shifts[j, 0], shifts[j, 1] = turned(frame, along, across)
-        far = max(far, along * along + across * across)
-    return frame[4] * sqrt(far)
+    for j in range(shifts.shape[0] if parameters[LATERAL : LATERAL + LATERAL_NUMBERS].any() else 0):
+        for m in range(2):
+            f, g = _parting(parameters, m, sigma)
+            along, across = sigma * f + pupil[last, j, 0] * g, pupil[last, j, 1] * g
+            shifts[j, 2 * m], shifts[j, 2 * m + 1] = turned(frame, along, across)
+        far = max(far, _length(shifts[j, 0], shifts[j, 1]) + _BENT * _length(shifts[j, 2], shifts[j, 3]))
+    return far
 
 
 @inner
@@ -56,6 +75,12 @@ def wavelengths_of(far):
     return found
 
 
+@borrowing
+def _moved(place, t, by, bent):
+    """Return where a wavelength lands, by what D and E are in one direction."""
+    return place + t * by + (t * t - 1.0) * bent
+
+
 @inner
 def draw_rims(spots, shifts, band, densities, left, top, width, height, plane):
     """Draw a mesh's outline at every wavelength of a band; or moved by other shifts, so often, with so much light."""
@@ -65,10 +90,12 @@ def draw_rims(spots, shifts, band, densities, left, top, width, height, plane):
         for j in range(spokes):
             k = j + 1 if j + 1 < spokes else 0
             before = j - 1 if j > 0 else spokes - 1
-            x, y = spots[rings, j, 0] + t * shifts[j, 0], spots[rings, j, 1] + t * shifts[j, 1]
+            x = _moved(spots[rings, j, 0], t, shifts[j, 0], shifts[j, 2])
+            y = _moved(spots[rings, j, 1], t, shifts[j, 1], shifts[j, 3])
+            next_x = _moved(spots[rings, k, 0], t, shifts[k, 0], shifts[k, 2])
+            next_y = _moved(spots[rings, k, 1], t, shifts[k, 1], shifts[k, 3])
             add_edge(
-                x, y, spots[rings, k, 0] + t * shifts[k, 0], spots[rings, k, 1] + t * shifts[k, 1],
-                part * densities[rings - 1, j, 0], left, top, width, height, plane,
+                x, y, next_x, next_y, part * densities[rings - 1, j, 0], left, top, width, height, plane,
             )  # fmt: skip
             # the border between two cells goes on to where the outline is now
             step = part * (densities[rings - 1, j, 0] - densities[rings - 1, before, 0])
@@ -77,20 +104,26 @@ def draw_rims(spots, shifts, band, densities, left, top, width, height, plane):
 
 @inner
 def _shift_changes(parameters, sigma, free, frame, pupil, pupil_by, shifts_by):
-    """Fill the derivatives of `shifts_of`, (spokes, 2, Q), by the free parameters."""
-    last, g = pupil.shape[0] - 1, parameters[LATERAL + 1]
-    for j in range(shifts_by.shape[0]):
-        for q in range(free.size):
-            n = free[q]
-            along, across = 0.0, 0.0
-            if n == LATERAL:
-                along = sigma
-            elif n == LATERAL + 1:
-                along, across = pupil[last, j, 0], pupil[last, j, 1]
-            elif FIRST_DISC <= n < SOFT:
-                dxi, deta = pupil_change(n, sigma, pupil_by, last, j)
-                along, across = g * dxi, g * deta
-            shifts_by[j, 0, q], shifts_by[j, 1, q] = turned(frame, along, across)
+    """Fill the derivatives of `shifts_of`, (spokes, 4, Q), by the free parameters."""
+    last, w = pupil.shape[0] - 1, sigma * sigma
+    for m in range(2):
+        first = LATERAL + 2 * m
+        _, g = _parting(parameters, m, sigma)
+        for j in range(shifts_by.shape[0]):
+            for q in range(free.size):
+                n = free[q]
+                along, across = 0.0, 0.0
+                # f' and g' grow with w, f" and g" do not
+                grows = m == 0 and n >= LATERAL + 4
+                if n == first or (grows and n == LATERAL + 4):
+                    along = sigma
+                elif n == first + 1 or (grows and n == LATERAL + 5):
+                    along, across = pupil[last, j, 0], pupil[last, j, 1]
+                elif FIRST_DISC <= n < SOFT:
+                    dxi, deta = pupil_change(n, sigma, pupil_by, last, j)
+                    along, across = g * dxi, g * deta
+                part = w if grows else 1.0
+                shifts_by[j, 2 * m, q], shifts_by[j, 2 * m + 1, q] = turned(frame, part * along, part * across)
 
 
 @inner
@@ -100,7 +133,7 @@ def draw_rim_changes(
 ):  # fmt: skip
     """Draw the derivatives of `draw_rims` once."""
     rings, spokes, count = densities.shape[0], densities.shape[1], free.size
-    shifts_by = np.empty((spokes, 2, count))
+    shifts_by = np.empty((spokes, 4, count))
     _shift_changes(parameters, sigma, free, frame, pupil, pupil_by, shifts_by)
     moved, moved_by = np.empty((spokes, 2)), np.empty((spokes, 2, count))
     step, sweep = np.empty(count), np.empty((2, count))
@@ -108,9 +141,10 @@ def draw_rim_changes(
         t, part = band[n, 0], band[n, 1]
         for j in range(spokes):
             for m in range(2):
-                moved[j, m] = spots[rings, j, m] + t * shifts[j, m]
+                moved[j, m] = _moved(spots[rings, j, m], t, shifts[j, m], shifts[j, 2 + m])
                 for q in range(count):
-                    moved_by[j, m, q] = spots_by[rings, j, m, q] + t * shifts_by[j, m, q]
+                    by, bent = shifts_by[j, m, q], shifts_by[j, 2 + m, q]
+                    moved_by[j, m, q] = _moved(spots_by[rings, j, m, q], t, by, bent)
         for j in range(spokes):
             k = j + 1 if j + 1 < spokes else 0
             before = j - 1 if j > 0 else spokes - 1

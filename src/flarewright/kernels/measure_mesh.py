@@ -17,6 +17,7 @@ from .measure_pupil import (
     BLADES,
     FIRST_G,
     FIRST_I,
+    LATERAL,
     SOFT,
     TURN,
     at_field,
@@ -278,7 +279,7 @@ def _draw_soft_rim(spots, densities, variance, shifts, far, width, height, plane
     taps = np.empty(reach_of(most) + 1)
     taps_of(most, taps)
     # the unit normals of the sides, and of each corner the way that moves both of its sides by one
-    sides, away = np.empty((spokes, 2)), np.empty((spokes, 2))
+    sides, away = np.empty((spokes, 2)), np.zeros((spokes, 4))
     turn = 0.0
     for j in range(spokes):
         k = j + 1 if j + 1 < spokes else 0
@@ -396,12 +397,13 @@ def draw_ghosts(parameters, disc_counts, visible, sigma, frame, plane):
         # the model's irradiance is per pixel of the model: a finer picture keeps it
         densities *= visible[g] * frame[4] * frame[4]
         variance = parameters[g, SOFT] * frame[4] * frame[4]
-        shifts = np.empty((spokes, 2))
+        shifts = np.empty((spokes, 4))
         far = shifts_of(parameters[g], sigma, frame, pupil, shifts)
         if not (variance > 0.0 or far > 0.0):
             draw_mesh(spots, densities, span, False, True, 0, 0, width, height, plane)
             continue
-        if span > 0 and _least_radius(spots) > _WIDE * sqrt(variance + far * far):
+        even = parameters[g, LATERAL + 2] == 0.0 and parameters[g, LATERAL + 3] == 0.0
+        if even and span > 0 and _least_radius(spots) > _WIDE * sqrt(variance + far * far):
             # without folds, and wide: only the outline's step is steep enough to be seen spread
             draw_mesh(spots, densities, span, False, False, 0, 0, width, height, plane)
             _draw_soft_rim(spots, densities, variance, shifts, far, width, height, plane)
@@ -440,7 +442,7 @@ def touched(parameters, disc_count, sigma, frame, width, height):
     pupil, spots = _landed(parameters, disc_count, sigma, frame)
     if spots.shape[0] == 0:
         return 0, 0, 0, 0
-    far = shifts_of(parameters, sigma, frame, pupil, np.empty(spots.shape[1:]))
+    far = shifts_of(parameters, sigma, frame, pupil, np.empty((spots.shape[1], 4)))
     return _box(spots, reach_of(parameters[SOFT] * frame[4] * frame[4]) + beyond(far), width, height)
 
 
@@ -484,7 +486,7 @@ def parting_of(parameters, disc_count, sigma, frame):
     pupil, spots = _landed(parameters, disc_count, sigma, frame)
     if spots.shape[0] == 0:
         return 0.0
-    return shifts_of(parameters, sigma, frame, pupil, np.empty(spots.shape[1:])) / max(_least_radius(spots), 1e-9)
+    return shifts_of(parameters, sigma, frame, pupil, np.empty((spots.shape[1], 4))) / max(_least_radius(spots), 1e-9)
 
 
 @inner

@@ -17,7 +17,8 @@ from .measure_iris import ends, nearest_side, side_and_disc, side_corner
 TERMS = 10
 # parameters: f, g, intensity, then three a disc: centre by s, centre by s (s.s), radius; the blades of the iris, 0 for
 # a round one; the direction of a side's normal in the picture, radians counterclockwise from the right; the variance by
-# which the light is spread, pixels of the model squared; and f' and g' of lateral colour (`measure_lateral`)
+# which the light is spread, pixels of the model squared; and of lateral colour (`measure_lateral`) f', g', f", g", and
+# by how much f' and g' grow with w
 FIRST_G, FIRST_I, FIRST_DISC = TERMS, 2 * TERMS, 3 * TERMS
 DISC_NUMBERS = 3
 MOST_DISCS = 4
@@ -25,6 +26,7 @@ BLADES = FIRST_DISC + DISC_NUMBERS * MOST_DISCS
 TURN = BLADES + 1
 SOFT = TURN + 1
 LATERAL = SOFT + 1
+LATERAL_NUMBERS = 6
 
 
 @borrowing

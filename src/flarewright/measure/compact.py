@@ -10,7 +10,7 @@ from math import ceil, floor, isfinite, log10
 
 import numpy as np
 
-from ..kernels.measure_pupil import DISC_NUMBERS, FIRST_DISC, FIRST_G, LATERAL, SOFT
+from ..kernels.measure_pupil import DISC_NUMBERS, FIRST_DISC, FIRST_G, SOFT
 from ..model.ghost_model import AberrationGhost, Channel, Curve, Curves, GhostModel
 from ..model.ghost_tracks import GhostTrack, Tracks
 from .curves import Pose
@@ -140,7 +140,7 @@ def _fitted_numbers(ghost: AberrationGhost) -> Indices:
     end = FIRST_DISC + DISC_NUMBERS * len(ghost.green.discs)
     known = np.flatnonzero(told[:end] > 0.0)
     if known.size:
-        return np.concatenate([known, [SOFT, LATERAL, LATERAL + 1][: told.size - end]]).astype(np.int64)
+        return np.concatenate([known, np.arange(SOFT, SOFT + told.size - end)]).astype(np.int64)
     return free_numbers(2, len(ghost.green.discs), 2)
 
 

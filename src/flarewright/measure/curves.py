@@ -36,14 +36,14 @@ def posed(numbers: Floats, sigma: float, pose: Pose) -> Floats:
 
     Parameters
     ----------
-    numbers : ndarray, shape (47,)
+    numbers : ndarray, shape (51,)
     sigma : float
         Length of the field; with the light on the axis nothing shifts along it.
     pose : Pose
 
     Returns
     -------
-    ndarray, shape (47,)
+    ndarray, shape (51,)
     """
     out = numbers.copy()
     if sigma > 0.0:

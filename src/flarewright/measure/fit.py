@@ -66,7 +66,7 @@ class Fit:
 
     @property
     def uncertainty(self) -> Floats:
-        """Standard deviation of all 47 numbers; 0 for those that were not fitted."""
+        """Standard deviation of all 51 numbers; 0 for those that were not fitted."""
         deviation = np.zeros(NUMBERS)
         # pixels that the model misses by more than noise make all numbers less certain
         excess = max(self.doubt, self.cost / max(self.count - self.free.size, 1))

@@ -7,13 +7,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernels.measure_pupil import DISC_NUMBERS, FIRST_DISC, FIRST_G, FIRST_I, LATERAL, SOFT
+from ..kernels.measure_pupil import DISC_NUMBERS, FIRST_DISC, FIRST_G, FIRST_I, LATERAL, LATERAL_NUMBERS, SOFT
 from .numbers import Floats
 
 Indices = NDArray[np.int64]
 
 # by which wavelengths of a colour may shift a ghost and make it larger, part of its size
-_PART = np.array([1.0, 0.25])
+_PART = np.tile([1.0, 0.25], LATERAL_NUMBERS // 2)
 
 
 @dataclass(frozen=True)
@@ -22,7 +22,7 @@ class Shape:
 
     Attributes
     ----------
-    numbers : ndarray, shape (47,)
+    numbers : ndarray, shape (51,)
         See `kernels.measure_pupil`.
     discs : int
     """
@@ -44,14 +44,14 @@ def free_numbers(order: int, discs: int, intensity_order: int, soft: bool = Fals
     soft : bool
         Also how soft the borders are.
     lateral : bool
-        And how far the channel's wavelengths part.
+        And how far the channel's wavelengths part, how unevenly, and how that grows with the field.
     """
     geometry = {0: (0, 3), 1: (0, 1, 2, 3), 2: tuple(range(10))}[order]
     light = {0: (0,), 1: (0, 1, 2, 3), 2: tuple(range(10))}[intensity_order]
     picked = [*geometry, *(FIRST_G + k for k in geometry), *(FIRST_I + k for k in light)]
     picked += [FIRST_DISC + k for k in range(DISC_NUMBERS * discs)]
     picked += [SOFT] if soft else []
-    picked += [LATERAL, LATERAL + 1] if lateral else []
+    picked += range(LATERAL, LATERAL + LATERAL_NUMBERS) if lateral else []
     return np.array(picked, dtype=np.int64)
 
 
@@ -78,5 +78,5 @@ def parted(shape: Shape) -> Shape:
     numbers = shape.numbers.copy()
     if not numbers[LATERAL:].any():
         numbers[SOFT] *= 0.5
-        numbers[LATERAL:] = np.sqrt(numbers[SOFT])
+        numbers[LATERAL : LATERAL + 2] = np.sqrt(numbers[SOFT])
     return replace(shape, numbers=numbers)

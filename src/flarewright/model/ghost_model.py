@@ -55,9 +55,11 @@ class Channel(Frozen):
     discs : tuple of Disc
     soft_px : float
         Standard deviation of the Gaussian that spreads its light, pixels: borders are soft, for the light has a size.
-    lateral_px : tuple of float
-        By how much f and g grow with one standard deviation of the wavelengths that the colour is made of, pixels: each
-        draws the ghost at its own place and in its own size. The same with both signs turned.
+    lateral_px : tuple of 2 or 6 float
+        Of the wavelengths that the colour is made of each draws the ghost at its own place and in its own size: by f'
+        and g', pixels, f and g grow with one standard deviation; the same with both signs turned. Then f" and g", by
+        which they grow with t t - 1 for a wavelength t standard deviations away, and by how much f' and g' grow with w;
+        0 where these are not there.
     uncertainty : tuple of float
         Standard deviation of f, g, intensity and each disc's three numbers, in this order, of soft_px where that was
         fitted, and then of lateral_px where that was; 0 for numbers that were not fitted. Empty: unknown.
@@ -68,15 +70,18 @@ class Channel(Frozen):
     intensity: Ten
     discs: tuple[Disc, ...] = Field((), max_length=4)
     soft_px: float = Field(0.0, ge=0.0, le=1000.0)
-    lateral_px: tuple[Lateral, Lateral] = (0.0, 0.0)
+    lateral_px: tuple[Lateral, ...] = (0.0, 0.0)
     uncertainty: tuple[float, ...] = ()
 
     @model_validator(mode="after")
     def _count(self) -> Channel:
         numbers = 30 + 3 * len(self.discs)
-        if len(self.uncertainty) not in (0, numbers, numbers + 1, numbers + 3):
+        if len(self.lateral_px) not in (2, 6):
+            raise ValueError(f"lateral_px needs 2 numbers or 6, and has {len(self.lateral_px)}")
+        if len(self.uncertainty) not in (0, numbers, numbers + 1, numbers + 3, numbers + 7):
             raise ValueError(
-                f"uncertainty needs {numbers} numbers, one more with that of soft_px, three with lateral_px's, or none"
+                f"uncertainty needs {numbers} numbers, one more with that of soft_px, three or seven more with "
+                "lateral_px's too, or none"
             )
         return self
 
