@@ -185,7 +185,7 @@ def _fitted(start: Shape, views: list[View]) -> Fit | None:
     if not patches:
         return None
     # a rim's centre moves evenly with the field
-    free = free_numbers(2, shape.discs, 2, True, True)
+    free = free_numbers(2, shape.discs, 2, True, True, True)
     free = free[free != FIRST_DISC + 1]
     fit = refine(shape, patches, free, width=width, steps=20, error=0.0)
     while free.size > NUMBERS:

@@ -7,7 +7,7 @@ from test_measure_mesh import FRAME, SIZE, bladed, draw, draw_finely, even, ghos
 from flarewright.kernels.measure_changes import draw_with_changes
 from flarewright.kernels.measure_edges import sum_along_rows, sum_changes_along_rows
 from flarewright.kernels.measure_mesh import window_of
-from flarewright.kernels.measure_pupil import FIRST_DISC, FIRST_G, LATERAL, SOFT
+from flarewright.kernels.measure_pupil import BELOW, FIRST_DISC, FIRST_G, LATERAL, SOFT
 
 NONE = np.zeros(0, np.int64)
 
@@ -25,7 +25,7 @@ def colourful(kind, discs: int = 1, lateral=(3.0, -1.2), variance: float = 0.2) 
 
 def wavelength_by_wavelength(numbers: np.ndarray, discs: int, sigma: float = 0.5, count: int = 41) -> np.ndarray:
     """Draw the whole ghost at many wavelengths of a Gaussian band."""
-    f, g, bent_f, bent_g, f_grows, g_grows = numbers[LATERAL:]
+    f, g, bent_f, bent_g, f_grows, g_grows = numbers[LATERAL:BELOW]
     t = np.linspace(-2.2, 2.2, count)
     light = np.exp(-0.5 * t**2)
     light /= light.sum()
@@ -35,7 +35,7 @@ def wavelength_by_wavelength(numbers: np.ndarray, discs: int, sigma: float = 0.5
         one = numbers.copy()
         one[0] += place * (f + sigma**2 * f_grows) + (place**2 - 1.0) * bent_f
         one[FIRST_G] += place * (g + sigma**2 * g_grows) + (place**2 - 1.0) * bent_g
-        one[LATERAL:] = 0.0
+        one[LATERAL:BELOW] = 0.0
         picture = picture + part * draw_finely(one, discs)
     return picture
 
@@ -51,7 +51,7 @@ def test_a_rim_of_many_wavelengths_is_that_of_ghosts_of_one_each(kind, lateral):
         return float(np.sqrt(((picture - expected) ** 2).mean()))
 
     # what grows adds light: g' / g squared, and twice as much what is uneven
-    grown = (np.abs(numbers[LATERAL + 1 :: 2]).sum() / numbers[FIRST_G]) ** 2
+    grown = (np.abs(numbers[LATERAL + 1 : BELOW : 2]).sum() / numbers[FIRST_G]) ** 2
     # within the ghost light that curves is not spread
     assert off(found) < 0.001 * np.sqrt((expected**2).mean()) + 0.15 * off(plain), (off(found), off(plain))
     assert found.sum() == pytest.approx(expected.sum(), rel=grown + 5e-4)
@@ -81,7 +81,7 @@ def test_a_replay_draws_it_nearly_alike(kind, lateral):
 
 def test_glass_that_parts_short_wavelengths_farther_leaves_a_tail_on_one_side():
     numbers = np.zeros_like(ghost())
-    numbers[FIRST_G], numbers[20], numbers[LATERAL:] = 30.0, 900.0, (0.0, 2.0, 0.0, 1.0, 0.0, 0.0)
+    numbers[FIRST_G], numbers[20], numbers[LATERAL:BELOW] = 30.0, 900.0, (0.0, 2.0, 0.0, 1.0, 0.0, 0.0)
     row = draw(numbers, 0, frame=np.array([60.0, 70.0, 1.0, 0.0, 1.0]))[70]
     slope = np.abs(np.diff(row))[60:]
     place = np.arange(slope.size)
@@ -123,7 +123,7 @@ def test_the_skew_keeps_its_sign_when_the_wavelengths_turn():
 @pytest.mark.parametrize("discs", [0, 2])
 def test_derivatives_are_those_of_the_picture(discs, kind):
     numbers = colourful(kind, discs, GROWING, 0.4)
-    free = np.concatenate([np.arange(FIRST_DISC + 3 * discs), np.arange(SOFT, numbers.size)])
+    free = np.concatenate([np.arange(FIRST_DISC + 3 * discs), np.arange(SOFT, BELOW)])
     plane = np.zeros((SIZE[1], SIZE[0] + 1))
     changes = np.zeros((SIZE[1], SIZE[0] + 1, free.size))
     draw_with_changes(numbers, discs, 0.5, free, FRAME, 0, 0, plane, changes)

@@ -7,7 +7,7 @@ import pytest
 from planted_run import GHOSTS, LARGEST, NOISE, SIZE, shape, views
 
 from flarewright.kernels.measure_mesh import parting_of
-from flarewright.kernels.measure_pupil import FIRST_DISC, FIRST_I, LATERAL, SOFT
+from flarewright.kernels.measure_pupil import BELOW, FIRST_DISC, FIRST_I, LATERAL, SOFT
 from flarewright.measure import grow as growing
 from flarewright.measure import pursuit
 from flarewright.measure.compress import compress
@@ -141,7 +141,7 @@ def test_lateral_colour_comes_back_within_its_uncertainty_and_through_a_model():
         fits.append(refine(Shape(start), patches, free, width=SIZE[0], steps=40, offset=False, error=0.0))
     for fit in fits:
         turned = fit.shape.numbers.copy()
-        turned[LATERAL:] *= np.sign(turned[LATERAL])
+        turned[LATERAL:BELOW] *= np.sign(turned[LATERAL])
         assert np.abs((turned - numbers)[free] / fit.uncertainty[free]).max() < 4.0
         assert fit.cost / fit.count == pytest.approx(1.0, abs=0.03)
         assert fit.uncertainty[LATERAL:].max() < 0.3
@@ -156,11 +156,11 @@ def test_lateral_colour_comes_back_within_its_uncertainty_and_through_a_model():
 def test_uneven_and_growing_colour_comes_back_within_its_uncertainty_and_through_a_model():
     numbers = GHOSTS[0].numbers.copy()
     planted = (4.0, -1.0, 0.8, 0.6, 1.5, -1.5)
-    numbers[SOFT], numbers[LATERAL:] = 0.3, planted
+    numbers[SOFT], numbers[LATERAL:BELOW] = 0.3, planted
     shown = views((Shape(numbers),), angles=FEW)
     patches = patches_of(Shape(numbers), shown, 1)
     free, start = free_numbers(1, 0, 1, True, True), numbers.copy()
-    start[LATERAL:] = 3.0, -0.5, 0.0, 0.0, 0.0, 0.0
+    start[LATERAL:BELOW] = 3.0, -0.5, 0.0, 0.0, 0.0, 0.0
     fit = refine(Shape(start), patches, free, width=SIZE[0], steps=60, offset=False, error=0.0)
     assert fit.cost / fit.count == pytest.approx(1.0, abs=0.03)
     assert np.abs((fit.shape.numbers - numbers)[free] / fit.uncertainty[free]).max() < 4.0
@@ -181,7 +181,7 @@ def test_wavelengths_part_where_that_pays_and_where_one_asks():
     plain = grow(rough, shown, 1, most=Growth(discs=0))
     assert plain is not None
     apart = spread_by_colour(plain, shown, 1)
-    assert not plain.shape.numbers[LATERAL:].any()
+    assert not plain.shape.numbers[LATERAL:BELOW].any()
     # windows differ, for one is wider
     assert apart.cost / apart.count < 0.9 * plain.cost / plain.count
     assert np.abs(apart.shape.numbers[LATERAL : LATERAL + 2]) == pytest.approx([4.0, 1.0], abs=0.8)
@@ -221,7 +221,7 @@ def test_wavelengths_part_before_a_search_for_how_far():
     numbers[SOFT] = 0.5
     apart = parted(Shape(numbers))
     assert apart.numbers[SOFT] == 0.25
-    assert apart.numbers[LATERAL:].tolist() == [0.5, 0.5, 0.0, 0.0, 0.0, 0.0]
+    assert apart.numbers[LATERAL:BELOW].tolist() == [0.5, 0.5, 0.0, 0.0, 0.0, 0.0]
     assert np.array_equal(parted(apart).numbers, apart.numbers)
 
 

@@ -22,7 +22,20 @@ from .measure_mesh import (
     soften_mesh,
     steadied,
 )
-from .measure_pupil import FIRST_DISC, FIRST_G, FIRST_I, SOFT, TERMS, monomials, place, pupil_change, slopes, turned
+from .measure_pupil import (
+    BELOW,
+    FIRST_DISC,
+    FIRST_G,
+    FIRST_I,
+    SOFT,
+    TERMS,
+    below,
+    monomials,
+    place,
+    pupil_change,
+    slopes,
+    turned,
+)
 from .measure_soft import add_spreading
 
 
@@ -34,16 +47,22 @@ def _spot_changes(parameters, sigma, free, frame, pupil, pupil_by, spots_by):
     for i in range(pupil.shape[0]):
         for j in range(pupil.shape[1]):
             xi, eta = pupil[i, j, 0], pupil[i, j, 1]
-            monomials(xi * xi + eta * eta, xi * sigma, w, terms)
-            _, _, a_xi, a_eta, c_xi, c_eta = place(parameters, xi, eta, sigma)
+            u, v = xi * xi + eta * eta, xi * sigma
+            monomials(u, v, w, terms)
+            x, y, a_xi, a_eta, c_xi, c_eta = place(parameters, xi, eta, sigma)
+            value, told = below(parameters, v, w)
             for q in range(free.size):
                 n = free[q]
-                if n >= SOFT:
+                if n >= BELOW:
+                    # v and w stand behind the constant and u
+                    part = told * terms[n - BELOW + 2] / value
+                    along, across = -x * part, -y * part
+                elif n >= SOFT:
                     along, across = 0.0, 0.0
                 elif n < FIRST_G:
-                    along, across = sigma * terms[n], 0.0
+                    along, across = sigma * terms[n] / value, 0.0
                 elif n < FIRST_I:
-                    along, across = xi * terms[n - FIRST_G], eta * terms[n - FIRST_G]
+                    along, across = xi * terms[n - FIRST_G] / value, eta * terms[n - FIRST_G] / value
                 elif n < FIRST_DISC:
                     along, across = 0.0, 0.0
                 else:

@@ -21,6 +21,7 @@ from .measure_pupil import (
     SOFT,
     TURN,
     at_field,
+    below,
     border,
     level,
     place,
@@ -104,8 +105,9 @@ def land(parameters, pupil, sigma, frame, spots):
         for j in range(pupil.shape[1]):
             xi, eta = pupil[i, j, 0], pupil[i, j, 1]
             u, v = xi * xi + eta * eta, xi * sigma
-            spread = level(g, u, v)
-            along, across = sigma * level(f, u, v) + xi * spread, eta * spread
+            value, _ = below(parameters, v, sigma * sigma)
+            spread = level(g, u, v) / value
+            along, across = sigma * level(f, u, v) / value + xi * spread, eta * spread
             x, y = turned(frame, along, across)
             spots[i, j, 0], spots[i, j, 1] = frame[0] + x, frame[1] + y
 

@@ -1,9 +1,11 @@
 """The pupil of a measured ghost: a fan of points over the intersection of discs, and where they land on the sensor.
 
 A ghost of a lens of revolution maps a pupil point p and a field s to (x, y) = s f(p.p, p.s, s.s) + p g(p.p, p.s, s.s):
-no other form is symmetric. Its rims are the unit disc, or an iris of straight blades as large (`measure_iris`), and
-discs whose centres move with s, so that the open part of the pupil is convex; with discs alone it is mirrored at the
-line through s. Every point comes with its derivatives by the ghost's parameters.
+no other form is symmetric. Both f and g are a polynomial over 1 + b p.s + c s.s: where a ghost grows manyfold with the
+field a few terms of a polynomial follow it no longer, and these do (`benchmarks.measure.terms`). Its rims are
+the unit disc, or an iris of straight blades as large (`measure_iris`), and discs whose centres move with s, so that the
+open part of the pupil is convex; with discs alone it is mirrored at the line through s. Every point comes with its
+derivatives by the ghost's parameters.
 """
 
 from math import cos, pi, sin, sqrt
@@ -17,8 +19,8 @@ from .measure_iris import ends, nearest_side, side_and_disc, side_corner
 TERMS = 10
 # parameters: f, g, intensity, then three a disc: centre by s, centre by s (s.s), radius; the blades of the iris, 0 for
 # a round one; the direction of a side's normal in the picture, radians counterclockwise from the right; the variance by
-# which the light is spread, pixels of the model squared; and of lateral colour (`measure_lateral`) f', g', f", g", and
-# by how much f' and g' grow with w
+# which the light is spread, pixels of the model squared; of lateral colour (`measure_lateral`) f', g', f", g", and by
+# how much f' and g' grow with w; and b and c of what f and g are divided by
 FIRST_G, FIRST_I, FIRST_DISC = TERMS, 2 * TERMS, 3 * TERMS
 DISC_NUMBERS = 3
 MOST_DISCS = 4
@@ -27,6 +29,10 @@ TURN = BLADES + 1
 SOFT = TURN + 1
 LATERAL = SOFT + 1
 LATERAL_NUMBERS = 6
+BELOW = LATERAL + LATERAL_NUMBERS
+BELOW_NUMBERS = 2
+# what f and g are divided by is taken for no less
+_LEAST_BELOW = 0.05
 
 
 @borrowing
@@ -53,6 +59,13 @@ def at_field(c, at, w, out):
     out[0] = c[at] + c[at + 3] * w + c[at + 9] * w * w
     out[1], out[2] = c[at + 1] + c[at + 7] * w, c[at + 2] + c[at + 8] * w
     out[3], out[4], out[5] = c[at + 4], c[at + 5], c[at + 6]
+
+
+@borrowing
+def below(parameters, v, w):
+    """Return by what f and g are divided, and whether that is as the numbers say, or the least."""
+    value = 1.0 + parameters[BELOW] * v + parameters[BELOW + 1] * w
+    return (value, 1.0) if value > _LEAST_BELOW else (_LEAST_BELOW, 0.0)
 
 
 @borrowing
@@ -251,5 +264,10 @@ def place(parameters, xi, eta, sigma):
     g, gu, gv = slopes(parameters, FIRST_G, u, v, w)
     f_xi, f_eta = 2.0 * xi * fu + sigma * fv, 2.0 * eta * fu
     g_xi, g_eta = 2.0 * xi * gu + sigma * gv, 2.0 * eta * gu
-    along, across = sigma * f + xi * g, eta * g
-    return along, across, sigma * f_xi + g + xi * g_xi, sigma * f_eta + xi * g_eta, eta * g_xi, g + eta * g_eta
+    value, told = below(parameters, v, w)
+    along, across = (sigma * f + xi * g) / value, eta * g / value
+    by_xi = told * sigma * parameters[BELOW]
+    return (
+        along, across, (sigma * f_xi + g + xi * g_xi - along * by_xi) / value, (sigma * f_eta + xi * g_eta) / value,
+        (eta * g_xi - across * by_xi) / value, (g + eta * g_eta) / value,
+    )  # fmt: skip

@@ -36,14 +36,14 @@ def posed(numbers: Floats, sigma: float, pose: Pose) -> Floats:
 
     Parameters
     ----------
-    numbers : ndarray, shape (51,)
+    numbers : ndarray, shape (53,)
     sigma : float
         Length of the field; with the light on the axis nothing shifts along it.
     pose : Pose
 
     Returns
     -------
-    ndarray, shape (51,)
+    ndarray, shape (53,)
     """
     out = numbers.copy()
     if sigma > 0.0:

@@ -11,7 +11,7 @@ import numpy as np
 from ..kernels.measure_changes import draw_with_changes
 from ..kernels.measure_edges import sum_along_rows
 from ..kernels.measure_mesh import window_of
-from ..kernels.measure_pupil import FIRST_DISC, FIRST_G, FIRST_I, LATERAL, SOFT
+from ..kernels.measure_pupil import BELOW, FIRST_DISC, FIRST_G, FIRST_I, LATERAL, SOFT
 from .marquardt import NEAR, descend
 from .normal import inverse
 from .numbers import NUMBERS, Floats
@@ -29,6 +29,8 @@ MODEL_ERROR = 0.03
 _FIRST_ORDER, _HIGHER_ORDER, _LEAST_SIZE = 0.3, 0.15, 0.04
 _ANY, _BY_FIELD = 5.0, 0.3
 _SLOPES, _HIGHER_SLOPES = (0.15, 0.25, 0.5), 0.25
+# what f and g are divided by, its terms in v and w
+_BELOW = (0.3, 2.0)
 # what softness is usual, part of the picture's width
 _SOFTNESS = 0.005
 # pixels that miss a model alike: noise is every pixel's own, what cannot be drawn is not
@@ -66,7 +68,7 @@ class Fit:
 
     @property
     def uncertainty(self) -> Floats:
-        """Standard deviation of all 51 numbers; 0 for those that were not fitted."""
+        """Standard deviation of all 53 numbers; 0 for those that were not fitted."""
         deviation = np.zeros(NUMBERS)
         # pixels that the model misses by more than noise make all numbers less certain
         excess = max(self.doubt, self.cost / max(self.count - self.free.size, 1))
@@ -132,7 +134,8 @@ def priors(shape: Shape, free: Indices, width: int) -> Floats:
     spread[FIRST_I + 4 : FIRST_DISC] = _HIGHER_SLOPES * light
     spread[FIRST_DISC:] = 3.0
     spread[SOFT] = (_SOFTNESS * width) ** 2
-    spread[LATERAL:] = _SOFTNESS * width
+    spread[LATERAL:BELOW] = _SOFTNESS * width
+    spread[BELOW:] = _BELOW
     return np.asarray(1.0 / spread[free] ** 2)
 
 

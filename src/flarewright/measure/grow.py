@@ -43,6 +43,8 @@ class Growth:
         Part of the light that the model may miss.
     soft : bool
         Whether borders may be soft, once place and size are known.
+    below : bool
+        Whether place and size may be divided by a polynomial, once they are known.
     alike : bool
         See `fit.refine`.
     area : int
@@ -54,6 +56,7 @@ class Growth:
     discs: int = 2
     error: float = MODEL_ERROR
     soft: bool = True
+    below: bool = True
     alike: bool = True
     area: int = AREA
 
@@ -90,7 +93,7 @@ def grow(
         patches = patches_of(start, views, channel, beside=old, area=most.area)
         if not patches or not shows(start, views):
             return None
-        free = free_numbers(order, start.discs, light, most.soft and order > 0)
+        free = free_numbers(order, start.discs, light, most.soft and order > 0, below=most.below and order > 0)
         fit = refine(start, patches, free, width=width, steps=steps, error=most.error, alike=most.alike, pool=pool)
         return fit, patches
 

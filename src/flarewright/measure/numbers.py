@@ -9,13 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..kernels.measure_pupil import (
+    BELOW,
+    BELOW_NUMBERS,
     BLADES,
     DISC_NUMBERS,
     FIRST_DISC,
     FIRST_G,
     FIRST_I,
     LATERAL,
-    LATERAL_NUMBERS,
     SOFT,
     TURN,
 )
@@ -25,11 +26,11 @@ Floats = NDArray[np.float64]
 
 # of lateral colour's numbers these are written where the others are not needed
 _FEW_LATERAL = 2
-NUMBERS = LATERAL + LATERAL_NUMBERS
+NUMBERS = BELOW + BELOW_NUMBERS
 
 
 def channel_numbers(channel: Channel, blades: Blades | None) -> Floats:
-    """Return the numbers of one colour of a ghost, shape (51,), discs and blades that are not there 0."""
+    """Return the numbers of one colour of a ghost, shape (53,), discs and blades that are not there 0."""
     numbers = np.zeros(NUMBERS)
     numbers[:FIRST_G], numbers[FIRST_G:FIRST_I], numbers[FIRST_I:FIRST_DISC] = channel.f, channel.g, channel.intensity
     for k, disc in enumerate(channel.discs):
@@ -37,6 +38,7 @@ def channel_numbers(channel: Channel, blades: Blades | None) -> Floats:
         numbers[at : at + DISC_NUMBERS] = *disc.centre, disc.radius
     numbers[SOFT] = channel.soft_px**2
     numbers[LATERAL : LATERAL + len(channel.lateral_px)] = channel.lateral_px
+    numbers[BELOW:] = channel.below
     return with_blades(numbers, blades)
 
 
@@ -49,7 +51,7 @@ def with_blades(numbers: Floats, blades: Blades | None) -> Floats:
 
 
 def blades_of(numbers: Floats) -> Blades | None:
-    """Return the blades that numbers, shape (51,), tell of."""
+    """Return the blades that numbers, shape (53,), tell of."""
     if not numbers[BLADES]:
         return None
     return Blades(count=int(numbers[BLADES]), first_deg=round(float(np.degrees(numbers[TURN])), 6))
@@ -60,10 +62,10 @@ def channel_of(numbers: Floats, discs: int, uncertainty: Floats | None = None) -
 
     Parameters
     ----------
-    numbers : ndarray, shape (51,)
+    numbers : ndarray, shape (53,)
     discs : int
         How many of its discs are there.
-    uncertainty : ndarray, shape (51,), or None
+    uncertainty : ndarray, shape (53,), or None
     """
     end = FIRST_DISC + DISC_NUMBERS * discs
     ten = [cast(Ten, tuple(map(float, numbers[at : at + FIRST_G]))) for at in (0, FIRST_G, FIRST_I)]
@@ -74,20 +76,23 @@ def channel_of(numbers: Floats, discs: int, uncertainty: Floats | None = None) -
         # of a root; of one that is 0, as large as would be seen
         most = max(soft, float(np.sqrt(uncertainty[SOFT])), 1e-300)
         told += (float(uncertainty[SOFT]) / (2.0 * most),)
-        told += tuple(map(float, uncertainty[LATERAL : LATERAL + _told(uncertainty[LATERAL:], 0)]))
+        every = uncertainty[BELOW:].any()
+        told += tuple(map(float, uncertainty[LATERAL : NUMBERS if every else _written(uncertainty, LATERAL)]))
     return Channel(
         f=ten[0], g=ten[1], intensity=ten[2],
         discs=tuple(Disc(centre=(float(cut[0]), float(cut[1])), radius=float(cut[2])) for cut in cuts),
         soft_px=soft, uncertainty=told,
-        lateral_px=tuple(map(float, numbers[LATERAL : LATERAL + _told(numbers[LATERAL:], _FEW_LATERAL)])),
+        lateral_px=tuple(map(float, numbers[LATERAL : _written(numbers, LATERAL + _FEW_LATERAL)])),
+        below=cast(tuple[float, float], tuple(map(float, numbers[BELOW:]))),
     )  # fmt: skip
 
 
-def _told(lateral: Floats, least: int) -> int:
-    """Return how many numbers of lateral colour are written: the least, f' and g', or all."""
-    if lateral[_FEW_LATERAL:].any():
-        return LATERAL_NUMBERS
-    return _FEW_LATERAL if lateral.any() else least
+def _written(numbers: Floats, least: int) -> int:
+    """Return where the numbers of lateral colour that are written end: f' and g', or all; no earlier than `least`."""
+    few = LATERAL + _FEW_LATERAL
+    if numbers[few:BELOW].any():
+        return BELOW
+    return few if numbers[LATERAL:few].any() else least
 
 
 def bezier_numbers(ghost: BezierGhost, constellation_deg: float) -> Floats:

@@ -14,7 +14,7 @@ from .numbers import NUMBERS, channel_numbers
 
 Floats = NDArray[np.float64]
 
-# ghosts by their aberrations, their numbers, shape (3, G, 51), how many discs cut each, shape (3, G), and Walch's
+# ghosts by their aberrations, their numbers, shape (3, G, 53), how many discs cut each, shape (3, G), and Walch's
 Packed = tuple[tuple[AberrationGhost, ...], Floats, NDArray[np.int64], tuple[BezierGhost, ...]]
 
 
@@ -31,7 +31,7 @@ def pack(model: GhostModel) -> Packed:
 
 
 def posed_numbers(meshes: Sequence[AberrationGhost], numbers: Floats, constellation_deg: float, sigma: float) -> Floats:
-    """Return the numbers, shape (3, G, 51), as the ghosts' curves bend them at a constellation."""
+    """Return the numbers, shape (3, G, 53), as the ghosts' curves bend them at a constellation."""
     out = numbers
     for k, ghost in enumerate(meshes):
         if ghost.curves != Curves():
@@ -49,7 +49,7 @@ def one_colour(
 
     Parameters
     ----------
-    numbers : ndarray, shape (G, 51)
+    numbers : ndarray, shape (G, 53)
         At a constellation, from `posed_numbers`.
     counts : ndarray, shape (G,)
         How many discs cut each.

@@ -57,7 +57,7 @@ VOTERS = 50
 _FEW = 16
 # how far a candidate grows: most of what lies beside it is not known yet, so its misfit tells nothing of it, and
 # fine pictures no more than coarse ones
-_FIRST = Growth(order=1, discs=1, error=0.05, soft=False, alike=False, area=2500)
+_FIRST = Growth(order=1, discs=1, error=0.05, soft=False, below=False, alike=False, area=2500)
 
 
 def beginning(candidate: Candidate, views: Sequence[View], pixels: Sequence[Pixels]) -> Shape:

@@ -7,7 +7,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernels.measure_pupil import DISC_NUMBERS, FIRST_DISC, FIRST_G, FIRST_I, LATERAL, LATERAL_NUMBERS, SOFT
+from ..kernels.measure_pupil import (
+    BELOW,
+    BELOW_NUMBERS,
+    DISC_NUMBERS,
+    FIRST_DISC,
+    FIRST_G,
+    FIRST_I,
+    LATERAL,
+    LATERAL_NUMBERS,
+    SOFT,
+)
 from .numbers import Floats
 
 Indices = NDArray[np.int64]
@@ -22,7 +32,7 @@ class Shape:
 
     Attributes
     ----------
-    numbers : ndarray, shape (51,)
+    numbers : ndarray, shape (53,)
         See `kernels.measure_pupil`.
     discs : int
     """
@@ -31,7 +41,9 @@ class Shape:
     discs: int = 0
 
 
-def free_numbers(order: int, discs: int, intensity_order: int, soft: bool = False, lateral: bool = False) -> Indices:
+def free_numbers(
+    order: int, discs: int, intensity_order: int, soft: bool = False, lateral: bool = False, below: bool = False
+) -> Indices:
     """Return which numbers to fit.
 
     Parameters
@@ -45,13 +57,16 @@ def free_numbers(order: int, discs: int, intensity_order: int, soft: bool = Fals
         Also how soft the borders are.
     lateral : bool
         And how far the channel's wavelengths part, how unevenly, and how that grows with the field.
+    below : bool
+        And what place and size are divided by.
     """
     geometry = {0: (0, 3), 1: (0, 1, 2, 3), 2: tuple(range(10))}[order]
     light = {0: (0,), 1: (0, 1, 2, 3), 2: tuple(range(10))}[intensity_order]
     picked = [*geometry, *(FIRST_G + k for k in geometry), *(FIRST_I + k for k in light)]
     picked += [FIRST_DISC + k for k in range(DISC_NUMBERS * discs)]
     picked += [SOFT] if soft else []
-    picked += range(LATERAL, LATERAL + LATERAL_NUMBERS) if lateral else []
+    picked += range(LATERAL, BELOW) if lateral else []
+    picked += range(BELOW, BELOW + BELOW_NUMBERS) if below else []
     return np.array(picked, dtype=np.int64)
 
 
@@ -66,7 +81,7 @@ def stepped(shape: Shape, free: Indices, step: Floats) -> Shape:
     numbers[SOFT] = min(max(numbers[SOFT], 0.0), 0.25 * numbers[FIRST_G] ** 2)
     # and what grows much by colour would add light
     wide = np.abs(numbers[FIRST_G]) * _PART
-    numbers[LATERAL:] = np.clip(numbers[LATERAL:], -wide, wide)
+    numbers[LATERAL:BELOW] = np.clip(numbers[LATERAL:BELOW], -wide, wide)
     return replace(shape, numbers=numbers)
 
 
@@ -76,7 +91,7 @@ def parted(shape: Shape) -> Shape:
     Wavelengths that part one way look as those that part the other way: from where they do not, no search would begin.
     """
     numbers = shape.numbers.copy()
-    if not numbers[LATERAL:].any():
+    if not numbers[LATERAL:BELOW].any():
         numbers[SOFT] *= 0.5
         numbers[LATERAL : LATERAL + 2] = np.sqrt(numbers[SOFT])
     return replace(shape, numbers=numbers)

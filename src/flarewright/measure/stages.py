@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ..errors import FlarewrightError
 from ..io.merged import read_frame
-from ..kernels.measure_pupil import FIRST_DISC, FIRST_I, LATERAL, SOFT
+from ..kernels.measure_pupil import BELOW, FIRST_DISC, FIRST_I, LATERAL, SOFT
 from ..model.capture import FrameInfo, MergedRun
 from ..model.corrections import Corrections
 from ..model.ghost_model import AberrationGhost, Blades, GhostModel, Halo, Reference, Star
@@ -118,7 +118,7 @@ def enlarged(shape: Shape, factor: float) -> Shape:
     numbers[:FIRST_I] *= factor
     numbers[FIRST_I:FIRST_DISC] *= factor**2
     numbers[SOFT] *= factor**2
-    numbers[LATERAL:] *= factor
+    numbers[LATERAL:BELOW] *= factor
     return replace(shape, numbers=numbers)
 
 

@@ -43,8 +43,9 @@ Lateral = Annotated[float, Field(ge=-1000.0, le=1000.0)]
 class Channel(Frozen):
     """One colour of a ghost: where each point p of its pupil lands, and how bright it is.
 
-    (x, y) = s f + p g; f, g and the intensity are polynomials of u = p.p, v = p.s, w = s.s with the ten terms
-    1, u, v, w, uu, uv, vv, uw, vw, ww. The pupil is the unit disc, or the ghost's `blades`, cut by `discs`.
+    (x, y) = (s f + p g) / (1 + b v + c w); f, g and the intensity are polynomials of u = p.p, v = p.s, w = s.s
+    with the ten terms 1, u, v, w, uu, uv, vv, uw, vw, ww. The pupil is the unit disc, or the ghost's `blades`, cut by
+    `discs`.
 
     Attributes
     ----------
@@ -60,9 +61,12 @@ class Channel(Frozen):
         and g', pixels, f and g grow with one standard deviation; the same with both signs turned. Then f" and g", by
         which they grow with t t - 1 for a wavelength t standard deviations away, and by how much f' and g' grow with w;
         0 where these are not there.
+    below : tuple of 2 float
+        b and c.
     uncertainty : tuple of float
         Standard deviation of f, g, intensity and each disc's three numbers, in this order, of soft_px where that was
-        fitted, and then of lateral_px where that was; 0 for numbers that were not fitted. Empty: unknown.
+        fitted, then of lateral_px where that was, and of six numbers of it and `below` where this was; 0 for numbers
+        that were not fitted. Empty: unknown.
     """
 
     f: Ten
@@ -71,6 +75,7 @@ class Channel(Frozen):
     discs: tuple[Disc, ...] = Field((), max_length=4)
     soft_px: float = Field(0.0, ge=0.0, le=1000.0)
     lateral_px: tuple[Lateral, ...] = (0.0, 0.0)
+    below: tuple[float, float] = (0.0, 0.0)
     uncertainty: tuple[float, ...] = ()
 
     @model_validator(mode="after")
@@ -78,10 +83,10 @@ class Channel(Frozen):
         numbers = 30 + 3 * len(self.discs)
         if len(self.lateral_px) not in (2, 6):
             raise ValueError(f"lateral_px needs 2 numbers or 6, and has {len(self.lateral_px)}")
-        if len(self.uncertainty) not in (0, numbers, numbers + 1, numbers + 3, numbers + 7):
+        if len(self.uncertainty) not in (0, numbers, numbers + 1, numbers + 3, numbers + 7, numbers + 9):
             raise ValueError(
                 f"uncertainty needs {numbers} numbers, one more with that of soft_px, three or seven more with "
-                "lateral_px's too, or none"
+                "lateral_px's too, nine more with below's, or none"
             )
         return self
 
