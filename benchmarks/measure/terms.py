@@ -1,4 +1,4 @@
-"""What ghosts of real prescriptions are like: the ten-term numbers of whole ghosts, by tracing their rays.
+"""What ghosts of real prescriptions are like: the numbers of whole ghosts, by tracing their rays.
 
     python -m benchmarks.measure.terms LENS ... [--f-number 5.6]
 
@@ -7,6 +7,9 @@ of every two-reflection path are traced at constellations from the axis to the c
 f and g by least squares, p being where a ray passes the iris (of a path that passes it several times, where its rim is
 tightest), and the part of its light that reaches the sensor for the intensity. A path counts where its rays fill the
 iris, at four constellations and more: of one that rims cut to a rest, the numbers of the whole pupil are not told.
+
+How far from its rays each form of the map is that a ghost may have is told beside them: f and g polynomials of first or
+second order, alone or over 1 + b v + c w.
 """
 
 from __future__ import annotations
@@ -36,6 +39,35 @@ _LEAST = 4
 # of the squares, what keeps numbers that the rays do not tell at 0
 _RIDGE = 1e-6
 _PERCENTILES = (50, 75, 90, 95)
+# forms of the map: how many terms f and g have each, and which of u, v, w stand in what they are divided by
+_FORMS = {
+    "first order": (4, ()), "second order": (10, ()), "first order over v, w": (4, (2, 3)),
+    "second order over v, w": (10, (2, 3)), "second order over u, v, w": (10, (1, 2, 3)),
+}  # fmt: skip
+# rounds in which what a ray misses is weighed by what it is divided by
+_ROUNDS = 4
+
+
+@dataclass(frozen=True)
+class _Rays:
+    """Rays of a whole ghost at all its constellations: p, shape (N, 2), s, places (N, 2), and light (N,)."""
+
+    p: Floats
+    s: Floats
+    places: Floats
+    light: Floats
+
+    @property
+    def ten(self) -> Floats:
+        """The ten terms, shape (N, 10)."""
+        return ten_terms((self.p**2).sum(axis=1), self.p[:, 1] * self.s, self.s**2).T
+
+    def maps(self, ten: Floats) -> tuple[Floats, Floats]:
+        """Return what terms of f, and then of g, add across and along the light's direction, (N, 2 K) each."""
+        return (
+            np.concatenate([np.zeros_like(ten), self.p[:, :1] * ten], axis=1),
+            np.concatenate([self.s[:, None] * ten, self.p[:, 1:] * ten], axis=1),
+        )
 
 
 @dataclass(frozen=True)
@@ -48,8 +80,8 @@ class _Seen:
     light: Floats
 
 
-def terms_of(setup: Setup) -> dict[str, Floats]:
-    """Return f, g and intensity of a lens' whole ghosts, shape (30,) each: pixels, and parts of the mean light."""
+def whole_ghosts(setup: Setup) -> dict[str, _Rays]:
+    """Trace the rays of a lens' whole ghosts."""
     seen: dict[str, list[_Seen]] = {}
     largest, per_mm = max(setup.angles_deg), setup.size_px[0] / setup.sensor_width_mm
     for pose in poses(setup)[_EVERY // 3 :: _EVERY]:
@@ -63,27 +95,44 @@ def terms_of(setup: Setup) -> dict[str, Floats]:
                     _Seen(field(pose.constellation_deg, largest), rays.stops[open_] / shot.opening.radius,
                           per_mm * np.stack([rays.x, rays.y], axis=1)[open_], rays.weight[open_])
                 )  # fmt: skip
-    found = {name: _solved(each) for name, each in seen.items()}
-    return {name: numbers for name, numbers in found.items() if numbers is not None}
+    found = {name: _gathered(each) for name, each in seen.items()}
+    return {name: rays for name, rays in found.items() if rays is not None}
 
 
-def _solved(seen: list[_Seen]) -> Floats | None:
+def _gathered(seen: list[_Seen]) -> _Rays | None:
     # light is along y; rays are of the half with x > 0
     reach = [[np.quantile(np.hypot(*each.pupil[:, k].T), 0.98) for k in range(each.pupil.shape[1])] for each in seen]
     at = int(np.argmax(np.mean(reach, axis=0)))
     whole = [each for each in seen if _fills(each.pupil[:, at])]
     if len(whole) < _LEAST:
         return None
-    p = np.concatenate([each.pupil[:, at] for each in whole])
-    s = np.concatenate([np.full(len(each.pupil), each.s) for each in whole])
-    u, v, w = (p**2).sum(axis=1), p[:, 1] * s, s * s
-    ten = ten_terms(u, v, w).T
-    along = np.concatenate([s[:, None] * ten, p[:, 1:] * ten], axis=1)
-    across = np.concatenate([np.zeros_like(ten), p[:, :1] * ten], axis=1)
-    places = np.concatenate([each.places for each in whole])
-    light = np.concatenate([each.light for each in whole])
-    map_ = _least_squares(np.concatenate([along, across]), np.concatenate([places[:, 1], places[:, 0]]))
-    return np.concatenate([map_, _least_squares(ten, light / light.mean())])
+    return _Rays(
+        np.concatenate([each.pupil[:, at] for each in whole]),
+        np.concatenate([np.full(len(each.pupil), each.s) for each in whole]),
+        np.concatenate([each.places for each in whole]), np.concatenate([each.light for each in whole]),
+    )  # fmt: skip
+
+
+def terms_of(rays: _Rays) -> Floats:
+    """Return f, g and intensity of a ghost, shape (30,): pixels, and parts of the mean light."""
+    map_ = _least_squares(np.concatenate(rays.maps(rays.ten)), rays.places.T.ravel())
+    return np.concatenate([map_, _least_squares(rays.ten, rays.light / rays.light.mean())])
+
+
+def missed_by(rays: _Rays, terms: int, below: tuple[int, ...]) -> float:
+    """Return how far from its rays a form of the map is, root mean square, pixels; see `_FORMS`."""
+    divides = rays.ten[:, list(below)]
+    basis = np.concatenate([
+        np.concatenate([part, -rays.places[:, m : m + 1] * divides], axis=1)
+        for m, part in enumerate(rays.maps(rays.ten[:, :terms]))
+    ])  # fmt: skip
+    weight, value = np.ones(len(basis)), np.ones(len(divides))
+    for _ in range(_ROUNDS if below else 1):
+        numbers = np.linalg.lstsq(basis * weight[:, None], rays.places.T.ravel() * weight, rcond=1e-12)[0]
+        value = 1.0 + divides @ numbers[2 * terms :]
+        weight = np.tile(1.0 / np.maximum(np.abs(value), 1e-3), 2)
+    off = (basis @ numbers - rays.places.T.ravel()).reshape(2, -1) / value
+    return float(np.sqrt((off**2).sum(axis=0).mean()))
 
 
 def _fills(p: Floats) -> bool:
@@ -124,10 +173,14 @@ def main() -> None:
     parser.add_argument("--f-number", type=float, default=5.6)
     given = parser.parse_args()
     setups = [setup_of(lens, 360, 100, given.f_number).steady for lens in given.lens]
-    numbers = np.array([each for setup in setups for each in terms_of(setup).values()])
+    ghosts = [rays for setup in setups for rays in whole_ghosts(setup).values()]
+    numbers = np.array([terms_of(rays) for rays in ghosts])
     print(f"{len(numbers)} whole ghosts of {len(setups)} lenses at f/{given.f_number:g}; percentiles {_PERCENTILES}")
     for name, values in spread(numbers, 360).items():
         print(f"{name:24}", "  ".join(f"{value:7.3f}" for value in np.percentile(values, _PERCENTILES)))
+    for name, (terms, below) in _FORMS.items():
+        off = [missed_by(rays, terms, below) for rays in ghosts]
+        print(f"{name + ', px':24}", "  ".join(f"{value:7.3f}" for value in np.percentile(off, _PERCENTILES)))
 
 
 if __name__ == "__main__":

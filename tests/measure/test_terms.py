@@ -1,9 +1,11 @@
 """What a fit expects of ghosts, against traced ghosts of a lens."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from benchmarks.measure.shoot import setup_of
-from benchmarks.measure.terms import TERMS, terms_of
+from benchmarks.measure.terms import TERMS, missed_by, terms_of, whole_ghosts
 
 from flarewright.measure.fit import priors
 from flarewright.measure.numbers import NUMBERS
@@ -13,11 +15,17 @@ WIDTH = 360
 
 
 @pytest.fixture(scope="module")
-def traced():
+def ghosts():
+    """Rays of a lens' whole ghosts."""
+    return list(whole_ghosts(setup_of("flektogon-35", WIDTH, 100, 5.6).steady).values())
+
+
+@pytest.fixture(scope="module")
+def traced(ghosts):
     """Numbers of a lens' whole ghosts over the standard deviations that a fit takes them to have, shape (paths, 30)."""
-    lens = setup_of("flektogon-35", WIDTH, 100, 5.6).steady
     found = []
-    for numbers in terms_of(lens).values():
+    for rays in ghosts:
+        numbers = terms_of(rays)
         shape = Shape(np.concatenate([numbers, np.zeros(NUMBERS - 30)]))
         found.append(numbers * np.sqrt(priors(shape, np.arange(30), WIDTH)))
     return np.abs(np.array(found))
@@ -34,3 +42,26 @@ def test_aberrations_of_first_order_are_not_expected_to_be_much_larger_than_they
     # f's u, g's u and v, brightness' u and v: what nine in ten do not exceed is not far below
     for k in (1, 11, 12, 21, 22):
         assert np.quantile(traced[:, k], 0.98) > 0.2, k
+
+
+def test_what_place_and_size_are_divided_by_follows_ghosts_that_terms_do_not(ghosts):
+    for terms in (4, 10):
+        plain = np.array([missed_by(rays, terms, ()) for rays in ghosts])
+        divided = np.array([missed_by(rays, terms, (2, 3)) for rays in ghosts])
+        assert (divided < 1.05 * plain).all()
+        for quantile in (0.5, 0.9):
+            assert np.quantile(divided, quantile) < 0.7 * np.quantile(plain, quantile)
+    # a ghost that grows manyfold: the rest of ten terms is seen, and gone
+    worst = int(np.argmax([missed_by(rays, 10, ()) / missed_by(rays, 10, (2, 3)) for rays in ghosts]))
+    assert missed_by(ghosts[worst], 10, (2, 3)) < 0.3 * missed_by(ghosts[worst], 10, ())
+
+
+def test_a_map_that_is_divided_is_found_to_be_that(ghosts):
+    rays = ghosts[0]
+    ten = rays.ten
+    numbers = np.array([40.0, 3.0, -2.0, 9.0, 25.0, 1.0, -3.0, 2.0])
+    across, along = rays.maps(ten[:, :4])
+    value = 1.0 + ten[:, [2, 3]] @ np.array([0.2, -0.6])
+    planted = replace(rays, places=np.stack([across @ numbers, along @ numbers], axis=1) / value[:, None])
+    assert missed_by(planted, 4, (2, 3)) < 1e-6
+    assert missed_by(planted, 10, ()) > 1e-3
