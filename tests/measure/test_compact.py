@@ -10,7 +10,15 @@ from scipy.interpolate import CubicSpline
 from test_track import ANGLES, drawn, thrice
 
 from flarewright.io.ghost_model_file import read_ghost_model, write_ghost_model
-from flarewright.measure.compact import compact, curves_of, held_error, numbers_in, rounded, written_numbers
+from flarewright.measure.compact import (
+    compact,
+    curves_of,
+    fitted_numbers,
+    held_error,
+    numbers_in,
+    rounded,
+    written_numbers,
+)
 from flarewright.measure.curves import Pose, posed, spline_basis, value_at
 from flarewright.measure.fit import cost_of, refine, render
 from flarewright.measure.found import Found
@@ -55,6 +63,22 @@ def test_a_curve_is_as_bent_as_its_values():
     found = [value_at(bent, angle, (0.0, 20.0)) for angle in at]
     assert np.sqrt(np.mean((found - wave) ** 2)) < 0.02
     assert smooth_curve(at[:2], at[:2], error[:2], (0.0, 20.0), usual=1.0, spread=0.5) is None
+
+
+@pytest.mark.parametrize("extra", [{}, {"soft": True}, {"soft": True, "lateral": True}, {"soft": True, "below": True}])
+def test_the_numbers_that_were_free_are_told_by_their_uncertainty(extra):
+    free, numbers = free_numbers(1, 2, 1, **extra), shape(-80.0, 20.0, 0.5).numbers
+    # two discs, their radii
+    numbers[[32, 35]] = 1.0
+    uncertainty = np.zeros(NUMBERS)
+    uncertainty[free] = 0.1
+    channel = channel_of(numbers, 2, uncertainty)
+    ghost = AberrationGhost(name="1", red=channel, green=channel, blue=channel, visible_deg=(0.0, 9.0))
+    assert np.array_equal(fitted_numbers(ghost), free)
+    # of a ghost without uncertainty any may have been
+    bare = channel.replace(uncertainty=())
+    untold = AberrationGhost(name="1", red=bare, green=bare, blue=bare, visible_deg=(0.0, 9.0))
+    assert np.array_equal(fitted_numbers(untold), free_numbers(2, 2, 2))
 
 
 def fitted(seed=0):

@@ -125,7 +125,7 @@ def _fewer(
     rest = [rest_of(out, views, m, pool) for m in range(CHANNELS)]
     for done, k in enumerate(by_light(out)):
         old = out[k]
-        new = _smaller(old, _fitted_numbers(kept[k]), views, rest, pool)
+        new = _smaller(old, fitted_numbers(kept[k]), views, rest, pool)
         for m in range(CHANNELS):
             exchange(old.shapes[m], new.shapes[m], old, views, rest[m], pool)
         out[k] = new
@@ -134,13 +134,14 @@ def _fewer(
     return out
 
 
-def _fitted_numbers(ghost: AberrationGhost) -> Indices:
-    """Return which numbers of a ghost the fit was free to choose."""
+def fitted_numbers(ghost: AberrationGhost) -> Indices:
+    """Return which numbers of a ghost the fit was free to choose, by what is told of their uncertainty."""
     told = np.array(ghost.green.uncertainty)
     end = FIRST_DISC + DISC_NUMBERS * len(ghost.green.discs)
-    known = np.flatnonzero(told[:end] > 0.0)
+    known = np.flatnonzero(told > 0.0)
     if known.size:
-        return np.concatenate([known, np.arange(SOFT, SOFT + told.size - end)]).astype(np.int64)
+        # softness and what follows it stand behind discs that are not there
+        return np.where(known < end, known, known - end + SOFT).astype(np.int64)
     return free_numbers(2, len(ghost.green.discs), 2)
 
 
