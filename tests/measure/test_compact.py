@@ -10,6 +10,7 @@ from scipy.interpolate import CubicSpline
 from test_track import ANGLES, drawn, thrice
 
 from flarewright.io.ghost_model_file import read_ghost_model, write_ghost_model
+from flarewright.kernels.measure_pupil import BELOW
 from flarewright.measure.compact import (
     compact,
     curves_of,
@@ -30,7 +31,7 @@ from flarewright.measure.replay import replay
 from flarewright.measure.shape import Shape, free_numbers
 from flarewright.measure.smooth import smooth_curve
 from flarewright.measure.stages import enlarged
-from flarewright.measure.together import halvings
+from flarewright.measure.together import halvings, measure_together
 from flarewright.measure.track import follow
 from flarewright.model.ghost_model import AberrationGhost, Curves, GhostModel
 
@@ -202,6 +203,23 @@ def test_wide_pictures_are_asked_in_small_and_shifts_told_in_full_pixels():
         (curves,) = curves_of([found], [(0.0, LARGEST)], seen, pool, lambda *_: None)
     assert value_at(curves.along_px, 12.0, (0.0, LARGEST)) == pytest.approx(4.0, abs=0.05)
     assert value_at(curves.brightness, 12.0, (0.0, LARGEST)) == pytest.approx(1.3, abs=0.01)
+
+
+def test_a_shift_is_in_pixels_whatever_place_and_size_are_divided_by():
+    one = shape(-50.0, 16.0, 1.0)
+    one.numbers[BELOW:] = 0.2, -0.6
+    (view,) = views((), angles=(0.8 * LARGEST,))
+    x = np.arange(view.pixels.shape[1]) + 0.5
+    middles = []
+    for along in (0.0, 6.0):
+        light = render(replace(one, numbers=posed(one.numbers, view.sigma, Pose(1.0, along, 1.0))), view)
+        middles.append((light * x).sum() / light.sum())
+    assert middles[1] - middles[0] == pytest.approx(6.0 * view.frame[2], rel=0.03)
+    # and the same shift is what a view is asked for
+    shifted = render(replace(one, numbers=posed(one.numbers, view.sigma, Pose(1.0, 2.0, 1.0))), view)
+    seen = view.showing(np.repeat(shifted[..., None], 3, axis=2).astype(np.float32))
+    found = measure_together([(one, one, one)], [Pose()], seen)
+    assert found.poses[0].along_px == pytest.approx(2.0, abs=0.05)
 
 
 def test_rounding_moves_no_picture_though_numbers_alone_are_vague():

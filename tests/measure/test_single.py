@@ -99,6 +99,25 @@ def test_aberrations_move_and_widen_the_disc():
     assert one.place_px == pytest.approx(100.0)
 
 
+def test_what_place_and_size_are_divided_by_makes_the_disc_larger():
+    zero = (0.0,) * 9
+    channel = Channel(f=(100.0, *zero), g=(20.0, *zero), intensity=(1.0, *zero), below=(0.0, -0.5))
+    ghost = AberrationGhost(name="a", red=channel, green=channel, blue=channel, visible_deg=(0.0, 20.0))
+    (one,) = spots_of_model(model(ghost), 20.0)
+    assert (one.place_px, one.radius_px) == pytest.approx((200.0, 40.0))
+    assert one.rgb == pytest.approx((1.0 / 1600.0,) * 3)
+    # with b the half of the pupil towards the light is larger: the mean of 1 / (1 + b v) is above 1
+    bent = channel.replace(below=(0.4, -0.5))
+    ghost = AberrationGhost(name="a", red=bent, green=bent, blue=bent, visible_deg=(0.0, 20.0))
+    (one,) = spots_of_model(model(ghost), 20.0)
+    p = np.linspace(-1.0, 1.0, 801)
+    x, y = (each[np.hypot(*np.meshgrid(p, p)) <= 1.0] for each in np.meshgrid(p, p))
+    lands = (100.0 + 20.0 * x) / (0.5 + 0.4 * x)
+    assert one.place_px == pytest.approx(lands.mean(), rel=0.01)
+    upwards = y * 20.0 * y / (0.5 + 0.4 * x)
+    assert one.radius_px == pytest.approx(abs((x * lands + upwards).sum()) / (x**2 + y**2).sum(), rel=0.02)
+
+
 def test_a_bezier_ghost_is_a_disc_too():
     numbers = [0.0] * 19
     numbers[0], numbers[2], numbers[3], numbers[4], numbers[16] = 40.0, 12.0, 10.0, 14.0, 0.5

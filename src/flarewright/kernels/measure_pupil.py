@@ -32,7 +32,7 @@ LATERAL_NUMBERS = 6
 BELOW = LATERAL + LATERAL_NUMBERS
 BELOW_NUMBERS = 2
 # what f and g are divided by is taken for no less
-_LEAST_BELOW = 0.05
+LEAST_BELOW = 0.05
 
 
 @borrowing
@@ -65,7 +65,7 @@ def at_field(c, at, w, out):
 def below(parameters, v, w):
     """Return by what f and g are divided, and whether that is as the numbers say, or the least."""
     value = 1.0 + parameters[BELOW] * v + parameters[BELOW + 1] * w
-    return (value, 1.0) if value > _LEAST_BELOW else (_LEAST_BELOW, 0.0)
+    return (value, 1.0) if value > LEAST_BELOW else (LEAST_BELOW, 0.0)
 
 
 @borrowing

@@ -7,7 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from ..kernels.measure_pupil import FIRST_DISC, FIRST_G, FIRST_I
+from ..kernels.measure_pupil import BELOW, FIRST_DISC, FIRST_G, FIRST_I, LEAST_BELOW
 from ..model.ghost_model import Curve, Curves
 from .numbers import Floats
 
@@ -46,11 +46,15 @@ def posed(numbers: Floats, sigma: float, pose: Pose) -> Floats:
     ndarray, shape (53,)
     """
     out = numbers.copy()
-    if sigma > 0.0:
-        out[0] += pose.along_px / sigma
+    out[0] += pose.along_px * by_shift(numbers, sigma)
     out[FIRST_G:FIRST_I] *= pose.size
     out[FIRST_I:FIRST_DISC] *= pose.brightness
     return out
+
+
+def by_shift(numbers: Floats, sigma: float) -> float:
+    """Return how much f grows where the middle of a ghost shifts by one pixel; 0 with the light on the axis."""
+    return max(1.0 + float(numbers[BELOW + 1]) * sigma**2, LEAST_BELOW) / sigma if sigma > 0.0 else 0.0
 
 
 def pose_at(curves: Curves, constellation_deg: float, visible_deg: tuple[float, float]) -> Pose:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from ..errors import FlarewrightError
 from ..kernels.measure_hough import search
+from ..kernels.measure_pupil import LEAST_BELOW
 from ..model.ghost_model import AberrationGhost, GhostModel
 from .curves import pose_at
 from .find import LEVEL, Slopes, candidates, rim_outline, slopes_of
@@ -210,7 +211,8 @@ def _disc(ghost: AberrationGhost, model: GhostModel, constellation_deg: float) -
     u, v, w = px * px + py * py, px * s, np.full(px.size, s * s)
     terms = ten_terms(u, v, w)
     # green tells the shape, every colour its light
-    f, g = (np.array(numbers) @ terms for numbers in (ghost.green.f, ghost.green.g))
+    below = np.maximum(1.0 + ghost.green.below[0] * v + ghost.green.below[1] * w, LEAST_BELOW)
+    f, g = (np.array(numbers) @ terms / below for numbers in (ghost.green.f, ghost.green.g))
     radius = float(((px * (s * f + px * g) + py * py * g).sum()) / u.sum())
     pose = pose_at(ghost.curves, constellation_deg, ghost.visible_deg)
     radius *= pose.size

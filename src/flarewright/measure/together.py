@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ..kernels.measure_mesh import window_of
 from ..kernels.measure_pupil import FIRST_G, FIRST_I
 from ..kernels.measure_together import add_together, draw_together, windows_together
-from .curves import Pose, posed
+from .curves import Pose, by_shift, posed
 from .fit import MODEL_ERROR
 from .found import CHANNELS
 from .normal import inverse, solution
@@ -215,7 +215,7 @@ def _colour(shapes: Sequence[Shape], poses: Sequence[Pose], view: View) -> _Draw
     windows, pixels = windows[:seen], np.empty((count, PER_GHOST))
     # a ghost that is not seen has no place either: its light, not below a tenth, scales what place and size change
     levels = np.array([max(pose.brightness, 0.1) for pose in poses])
-    shifts = levels / view.sigma if view.sigma > 0.0 else 0.0 * levels
+    shifts = levels * [by_shift(each, view.sigma) for each in numbers]
     growths = levels[:, None] * np.reshape([shape.numbers[FIRST_G:FIRST_I] for shape in shapes], (-1, _FREE.size - 1))
     room = _ROOM.some(largest * (_FREE.size + 1))
     draw_together(parameters, discs, view.sigma, view.frame, _FREE, windows, shifts, growths, room, pixels)
