@@ -119,8 +119,11 @@ def terms_of(rays: _Rays) -> Floats:
     return np.concatenate([map_, _least_squares(rays.ten, rays.light / rays.light.mean())])
 
 
-def missed_by(rays: _Rays, terms: int, below: tuple[int, ...]) -> float:
-    """Return how far from its rays a form of the map is, root mean square, pixels; see `_FORMS`."""
+def mapped_by(rays: _Rays, terms: int, below: tuple[int, ...]) -> tuple[float, Floats]:
+    """Return how far from its rays a form of the map is, root mean square, pixels, and the numbers that it divides by.
+
+    Forms as in `_FORMS`; least squares of numerator less place times denominator, weighed by the last denominator.
+    """
     divides = rays.ten[:, list(below)]
     basis = np.concatenate([
         np.concatenate([part, -rays.places[:, m : m + 1] * divides], axis=1)
@@ -132,7 +135,7 @@ def missed_by(rays: _Rays, terms: int, below: tuple[int, ...]) -> float:
         value = 1.0 + divides @ numbers[2 * terms :]
         weight = np.tile(1.0 / np.maximum(np.abs(value), 1e-3), 2)
     off = (basis @ numbers - rays.places.T.ravel()).reshape(2, -1) / value
-    return float(np.sqrt((off**2).sum(axis=0).mean()))
+    return float(np.sqrt((off**2).sum(axis=0).mean())), numbers[2 * terms :]
 
 
 def _fills(p: Floats) -> bool:
@@ -179,8 +182,11 @@ def main() -> None:
     for name, values in spread(numbers, 360).items():
         print(f"{name:24}", "  ".join(f"{value:7.3f}" for value in np.percentile(values, _PERCENTILES)))
     for name, (terms, below) in _FORMS.items():
-        off = [missed_by(rays, terms, below) for rays in ghosts]
-        print(f"{name + ', px':24}", "  ".join(f"{value:7.3f}" for value in np.percentile(off, _PERCENTILES)))
+        off, divides = zip(*(mapped_by(rays, terms, below) for rays in ghosts), strict=True)
+        told = {f"{name}, px": np.array(off)}
+        told |= {f"  by {TERMS[k]}": np.abs([each[n] for each in divides]) for n, k in enumerate(below)}
+        for row, values in told.items():
+            print(f"{row:32}", "  ".join(f"{value:7.3f}" for value in np.percentile(values, _PERCENTILES)))
 
 
 if __name__ == "__main__":

@@ -118,7 +118,7 @@ def priors(shape: Shape, free: Indices, width: int) -> Floats:
 
     Notes
     -----
-    `benchmarks.measure.terms` traces them: of 636 whole ghosts of nine lenses at f/5.6 nine in ten have aberrations of
+    `benchmarks.measure.terms` traces them, and what they are best divided by: of 636 whole ghosts of nine lenses at f/5.6 nine in ten have aberrations of
     first order below 0.1 to 0.4 of their size (but f's v, 0.8), three in four of any higher order below 0.1, and
     brightness that changes by less than 0.25 over the pupil; at f/2.8 about twice as much.
     """
