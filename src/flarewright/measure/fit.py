@@ -118,9 +118,10 @@ def priors(shape: Shape, free: Indices, width: int) -> Floats:
 
     Notes
     -----
-    `benchmarks.measure.terms` traces them, and what they are best divided by: of 636 whole ghosts of nine lenses at f/5.6 nine in ten have aberrations of
+    `benchmarks.measure.terms` traces them: of 636 whole ghosts of nine lenses at f/5.6 nine in ten have aberrations of
     first order below 0.1 to 0.4 of their size (but f's v, 0.8), three in four of any higher order below 0.1, and
-    brightness that changes by less than 0.25 over the pupil; at f/2.8 about twice as much.
+    brightness that changes by less than 0.25 over the pupil; at f/2.8 about twice as much. Of 140 of five lenses three
+    in four are best divided by 1 + b v + c w with b below 0.35 and c below 1.0, nine in ten by 0.6 and 2.2.
     """
     size = max(float(np.abs(shape.numbers[FIRST_G])), _LEAST_SIZE * width)
     light = max(float(np.abs(shape.numbers[FIRST_I])), 1e-12)
