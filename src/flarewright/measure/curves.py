@@ -7,9 +7,9 @@ from functools import lru_cache
 
 import numpy as np
 
-from ..kernels.measure_pupil import BELOW, FIRST_DISC, FIRST_G, FIRST_I, LEAST_BELOW
+from ..kernels.measure_pupil import BELOW, FIRST_DISC, FIRST_G, FIRST_I
 from ..model.ghost_model import Curve, Curves
-from .numbers import Floats
+from .numbers import Floats, divided_by
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,10 @@ def posed(numbers: Floats, sigma: float, pose: Pose) -> Floats:
 
 def by_shift(numbers: Floats, sigma: float) -> float:
     """Return how much f grows where the middle of a ghost shifts by one pixel; 0 with the light on the axis."""
-    return max(1.0 + float(numbers[BELOW + 1]) * sigma**2, LEAST_BELOW) / sigma if sigma > 0.0 else 0.0
+    if not sigma > 0.0:
+        return 0.0
+    b, c = numbers[BELOW:]
+    return float(divided_by(b, c, np.array(0.0), np.array(sigma**2))) / sigma
 
 
 def pose_at(curves: Curves, constellation_deg: float, visible_deg: tuple[float, float]) -> Pose:

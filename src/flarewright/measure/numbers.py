@@ -17,6 +17,7 @@ from ..kernels.measure_pupil import (
     FIRST_G,
     FIRST_I,
     LATERAL,
+    LEAST_BELOW,
     SOFT,
     TURN,
 )
@@ -110,6 +111,11 @@ def bezier_numbers(ghost: BezierGhost, constellation_deg: float) -> Floats:
 def ten_terms(u: Floats, v: Floats, w: Floats) -> Floats:
     """Return the terms of a ghost's polynomials, shape (10, N), in the order of its numbers; see `measure_pupil`."""
     return np.stack([np.ones_like(u), u, v, w, u * u, u * v, v * v, u * w, v * w, w * w])
+
+
+def divided_by(b: float, c: float, v: Floats, w: Floats) -> Floats:
+    """Return what a ghost's place and size are divided by where v and w are these; see `measure_pupil`."""
+    return np.maximum(1.0 + b * v + c * w, LEAST_BELOW)
 
 
 def field(constellation_deg: float, largest_deg: float) -> float:

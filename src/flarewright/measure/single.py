@@ -14,11 +14,10 @@ from numpy.typing import NDArray
 
 from ..errors import FlarewrightError
 from ..kernels.measure_hough import search
-from ..kernels.measure_pupil import LEAST_BELOW
 from ..model.ghost_model import AberrationGhost, GhostModel
 from .curves import pose_at
 from .find import LEVEL, Slopes, candidates, rim_outline, slopes_of
-from .numbers import Floats, bezier_numbers, field, frame, ten_terms, visible
+from .numbers import Floats, bezier_numbers, divided_by, field, frame, ten_terms, visible
 from .views import Pixels, View, distances
 
 # of the best possible vote, what a circle needs to be proposed, and how far above chance
@@ -211,7 +210,7 @@ def _disc(ghost: AberrationGhost, model: GhostModel, constellation_deg: float) -
     u, v, w = px * px + py * py, px * s, np.full(px.size, s * s)
     terms = ten_terms(u, v, w)
     # green tells the shape, every colour its light
-    below = np.maximum(1.0 + ghost.green.below[0] * v + ghost.green.below[1] * w, LEAST_BELOW)
+    below = divided_by(*ghost.green.below, v, w)
     f, g = (np.array(numbers) @ terms / below for numbers in (ghost.green.f, ghost.green.g))
     radius = float(((px * (s * f + px * g) + py * py * g).sum()) / u.sum())
     pose = pose_at(ghost.curves, constellation_deg, ghost.visible_deg)
