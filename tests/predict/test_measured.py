@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from flarewright.cli.app import run
-from flarewright.cli.predict_flares import is_model, model_flare
-from flarewright.io.ghost_model_file import write_ghost_model
+from flarewright.cli.predict_flares import model_flare
+from flarewright.io.ghost_model_file import names_ghost_model, write_ghost_model
 from flarewright.measure.replay import replay
 from flarewright.model.ghost_model import BezierGhost, GhostModel, Halo, Reference
 from flarewright.optics.color import luminance_weights
@@ -35,7 +35,7 @@ def file(tmp_path):
 
 
 def test_its_flare_is_the_replayed_ghosts_per_lux(file):
-    assert is_model(str(file))
+    assert names_ghost_model(str(file))
     flare = model_flare(planted(), "camera.json", 36.0, 0.02, 160)
     ghosts = next(layer for layer in replay(planted(), 12.0, roll_deg=40.0) if layer.name == "ghosts")
     np.testing.assert_allclose(flare.picture(12.0, 40.0), ghosts.pixels / 10.0, rtol=1e-5, atol=1e-12)

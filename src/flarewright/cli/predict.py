@@ -11,7 +11,7 @@ import typer
 
 from ..errors import ProjectError
 from .common import check_place, console, pair, print_json, progress_bar, remembered, tell, write_text
-from .predict_flares import SHOWN_PX, is_model, lens_flares, model_flares
+from .predict_flares import SHOWN_PX, lens_flares, model_flares
 from .predict_scene import SceneWishes, is_scene, predict_scene
 
 if TYPE_CHECKING:
@@ -162,7 +162,9 @@ def predict(
     _refuse(scene_flags, "a lens or a measured flare", "give a scene file")
     wanted = _wanted(to, roll, tolerance, samples, check, bins, _setting(illuminance, luminance), output)
     size = _sensor(sensor)
-    if is_model(subject):
+    from ..io.ghost_model_file import names_ghost_model
+
+    if names_ghost_model(subject):
         measured = {"--glare": glare or None, "--quality": quality, "--check": check}
         _refuse({**lens_flags, **measured}, "a measured flare", "it was measured")
         if unit_per_cd_m2 is not None and not 0.0 < unit_per_cd_m2 < math.inf:

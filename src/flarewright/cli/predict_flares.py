@@ -25,11 +25,6 @@ _OTHER_SHAPE = 0.03
 SHOWN_NM, JUDGED_NM = 15, 9
 
 
-def is_model(subject: str) -> bool:
-    """Whether a word on the command line names a measured flare: no lens is read from JSON."""
-    return subject.lower().endswith(".json") and Path(subject).is_file()
-
-
 def _refuse_others(path: str) -> None:
     """Refuse JSON that is plainly no ghost model, of whose keys a list would be no help."""
     text = Path(path).read_text("utf-8", errors="ignore")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -14,6 +14,7 @@ from .common import print_json, refused_as_json, tell
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from ..model import Project
     from ..render.prepare import Settled
 
 
@@ -22,33 +23,47 @@ def check(
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
     """Check a project and its lens, and tell every mistake at once; exit code 2 when it cannot be rendered."""
+    from ..io.project_file import read_project
+    from ..measure.rendering import is_measured
+
     with refused_as_json(file, as_json), naming(file):
-        settled = _settled(file)
+        project = read_project(file)
+        found = _measured(project) if is_measured(project) else _of_lens(_settled(file, project))
     if as_json:
-        print_json(
-            {
-                "file": str(file),
-                "usable": True,
-                "lens": settled.lens.name,
-                "efl_mm": settled.order.efl,
-                "f_number": settled.order.f_number,
-                "remarks": list(settled.remarks),
-            }
-        )
+        print_json({"file": str(file), "usable": True, **found})
         return
-    tell(settled.remarks)
-    project, order = settled.project, settled.order
+    tell(found["remarks"])
     lights = f"{len(project.lights)} light{'s' if len(project.lights) > 1 else ''}"
     size = "x".join(str(side) for side in project.camera.size_px)
-    print(
-        f"{file}: usable, {settled.lens.name} at f/{order.f_number:g}, {lights}, {size} pixels, {project.quality.mode}"
-    )
+    opened = "" if found["f_number"] is None else f" at f/{found['f_number']:g}"
+    mode = "measured" if is_measured(project) else project.quality.mode
+    print(f"{file}: usable, {found['lens']}{opened}, {lights}, {size} pixels, {mode}")
 
 
-def _settled(file: Path) -> Settled:
-    """Read a project and everything that its render reads; all that is wrong with it is one error."""
+def _measured(project: Project) -> dict[str, Any]:
+    """Check a project of a measured flare; tell of it what is told of one with a lens."""
+    from ..measure.rendering import check_measured, efl_mm, flare_of
+
+    check_measured(project)
+    flare = flare_of(project)
+    f_number = flare.model.reference.f_number if project.f_number is None else project.f_number
+    return {
+        "lens": flare.name, "efl_mm": efl_mm(project, flare.model), "f_number": f_number,
+        "remarks": list(flare.model.remarks),
+    }  # fmt: skip
+
+
+def _of_lens(settled: Settled) -> dict[str, Any]:
+    return {
+        "lens": settled.lens.name, "efl_mm": settled.order.efl, "f_number": settled.order.f_number,
+        "remarks": list(settled.remarks),
+    }  # fmt: skip
+
+
+def _settled(file: Path, project: Project) -> Settled:
+    """Read everything that a project's render reads; all that is wrong with it is one error."""
     from ..io.mask_image import read_mask
-    from ..io.project_file import ProjectFileError, read_project
+    from ..io.project_file import ProjectFileError
     from ..io.sentences import summary
     from ..optics.pack import resolve_coatings
     from ..render.art import resolve_art
@@ -57,7 +72,7 @@ def _settled(file: Path) -> Settled:
     from ..render.scatter import check_scatter
     from ..render.starburst_pass import read_soil
 
-    settled = settle(read_project(file))
+    settled = settle(project)
     project, mask = settled.project, settled.iris.mask
     stages: list[Callable[[], object]] = [
         lambda: resolve_coatings(settled.lens, settled.coating),

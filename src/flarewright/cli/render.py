@@ -24,6 +24,7 @@ EPILOG = (
     "-o shot.exr\n\n"
     "flarewright render heliar-tronnier --light sun@10,5 --light -12,2 --light-size 3x2 --distance inf --distance 900 "
     "--spectrum d65 --spectrum rgb:1,0.6,0.2 -o room.exr\n\n"
+    "flarewright render model.json --light 12,7 --mute 3 -o measured.exr\n\n"
     "flarewright render --project shot.toml --quality draft -o test.exr"
 )
 
@@ -36,7 +37,9 @@ def render(
     output: Annotated[
         Path, typer.Option("-o", "--output", metavar="OUT.exr", help="The EXR file.", rich_help_panel=_OUT)
     ],
-    lens: Annotated[str | None, typer.Argument(metavar="LENS", help="A shipped lens or a lens file.")] = None,
+    lens: Annotated[
+        str | None, typer.Argument(metavar="LENS", help="A shipped lens, a lens file, or a measured flare (.json).")
+    ] = None,
     project: Annotated[
         Path | None, typer.Option(metavar="FILE", help="A project file; flags given beside it win over it.")
     ] = None,
@@ -478,9 +481,16 @@ def _render(project: Project, threads: int | None, run: ReferenceRun | None, led
     """Render with a progress bar where someone looks at it."""
     import sys
 
+    from ..io.ghost_model_file import names_ghost_model
     from ..render.first_run import compile_for_render
     from ..render.render import render as render_project
 
+    if names_ghost_model(project.lens):
+        from ..measure.rendering import render_measured
+
+        if ledger:
+            raise ProjectError(f"{project.lens} is a measured flare, whose light no ledger follows; leave --ledger out")
+        return render_measured(project)
     compile_for_render(project, threads)
     if not sys.stderr.isatty():
         return render_project(project, threads=threads, run=run, ledger=ledger)

@@ -14,6 +14,7 @@ from pydantic import ValidationError
 from ..errors import FlarewrightError, GlassError, LensError
 from ..io.coating_text import UNCOATED, coating_from, format_coating
 from ..io.media import attach
+from ..measure.rendering import efl_mm, flare_of, is_measured
 from ..model import AsLens, CoatingChoice, Iris, Lens, PerRow, Position, Preset, Project, Row, Stop, Surface
 from ..model.art import Art
 from ..optics.image_height import image_heights
@@ -344,7 +345,9 @@ def choose_lens(project: Project, lens: str | Lens) -> Project:
     known = as_lens(lens)
     efl = first_order(known).efl
     try:
-        old = first_order(as_lens(project.lens)).efl
+        old = (
+            efl_mm(project, flare_of(project).model) if is_measured(project) else first_order(as_lens(project.lens)).efl
+        )
     except FlarewrightError:
         old = efl
     lights = tuple(
@@ -361,6 +364,10 @@ def choose_lens(project: Project, lens: str | Lens) -> Project:
         design=None,
     )  # fmt: skip
     return changed
+
+
+def _efl(project: Project) -> float:
+    return efl_mm(project, flare_of(project).model) if is_measured(project) else first_order(as_lens(project.lens)).efl
 
 
 def first_coating(lens: Lens) -> CoatingChoice:

@@ -8,6 +8,7 @@ from typing import Any
 from ..errors import ProjectError
 from ..io.project_file import parse_coating_choice
 from ..io.spectrum_text import parse_spectrum
+from ..measure.rendering import check_measured, is_measured
 from ..model import BlackBody, Everywhere, Holdout, Iris, Light, PerRow, Project, QuarterWave, Surface
 from ..render.prepare import as_lens, settle
 
@@ -66,6 +67,10 @@ def set_fields(project: Project, values: dict[str, Any]) -> Project:
     known = {"f_number", "zoom"}
     if unknown := set(values) - known:
         raise ProjectError(f"{', '.join(sorted(unknown))} cannot be set here; known are {', '.join(sorted(known))}")
+    if is_measured(project):
+        changed = _with(project, **values)
+        check_measured(changed)
+        return changed
     if (f_number := values.get("f_number")) is not None:
         values = {**values, "f_number": max(f_number, as_lens(project.lens).f_number)}
     changed = _with(project, **values)

@@ -16,15 +16,17 @@ from .. import __version__
 from ..errors import FlarewrightError, LensError, OutputError, ProjectError
 from ..io.atomic import write_atomically
 from ..io.exr import write_exr
+from ..io.ghost_model_file import names_ghost_model
 from ..io.lens_writer import format_lens
 from ..io.library import lens_path, near_names, shipped
 from ..io.project_file import project_from_data, project_text, read_project
 from ..io.project_text import LENS_SUFFIXES
 from ..io.text_file import read_toml
+from ..measure.rendering import render_any
 from ..model import Camera, Iris, Lens, Light, Preset, Project
-from ..render.prepare import complete_lens, first_order, load_lens, settle
-from ..render.render import render
+from ..render.prepare import complete_lens, first_order, load_lens
 from .edit_lens import first_coating, own_lens
+from .measured import check_any, project_for_measured
 from .pictures import pictures
 from .seen import Seen
 
@@ -60,7 +62,7 @@ def project_for_lens(lens: str | Lens) -> Project:
 
 
 def open_any(text: str) -> tuple[Project, str | None]:
-    """Open a project file, a lens file, or a shipped lens by its name.
+    """Open a project file, a lens file, a measured flare, or a shipped lens by its name.
 
     Parameters
     ----------
@@ -80,8 +82,10 @@ def open_any(text: str) -> tuple[Project, str | None]:
     path = Path(text).expanduser()
     if path.suffix.lower() == ".toml" and path.is_file() and _is_project(read_toml_of(path)):
         project = read_project(path)
-        settle(project)
+        check_any(project)
         return project, str(path.resolve())
+    if names_ghost_model(str(path)):
+        return project_for_measured(str(path.resolve())), None
     found = lens_path(text)
     name = found.stem if found.stem in shipped() and not path.exists() else str(path.resolve())
     return project_for_lens(name), None
@@ -169,8 +173,8 @@ def imported(name: str, data: bytes, folder: Path) -> Imported:
     plain = Path(name).name or "dropped"
     if suffix not in (*LENS_SUFFIXES, *PICTURES):
         raise LensError(
-            f"{plain} cannot be opened here: drop a lens (.toml, .lens, .zmx), a project (.toml), or a background "
-            "picture (.exr, .png, .jpg)"
+            f"{plain} cannot be opened here: drop a lens (.toml, .lens, .zmx), a measured flare (.json), a project "
+            "(.toml), or a background picture (.exr, .png, .jpg)"
         )
     # a name of its own for other contents: what undo leads back to must stay as it was
     folder = folder / hashlib.sha256(data).hexdigest()[:12]
@@ -185,11 +189,13 @@ def imported(name: str, data: bytes, folder: Path) -> Imported:
             table = read_toml_of(path)
             if _is_project(table):
                 found = project_from_data(table, folder=folder, where=plain)
-                settle(found)
+                check_any(found)
                 for image in pictures(found):
                     if Path(image.path).parent == folder and not Path(image.path).is_file():
                         raise ProjectError(f"{image.path} does not exist")
                 return Imported(project=found)
+        if names_ghost_model(str(path)):
+            return Imported(project=project_for_measured(str(path)))
         lens = load_lens(path, remarks=remarks)
     except FlarewrightError as error:
         # the folder is ours, and means nothing to a person
@@ -262,7 +268,7 @@ def command_line(file: str, project: Project) -> str:
 
 def export_picture(project: Project, path: Path, progress: Callable[[float, str], None] | None = None) -> None:
     """Render a project at its own size and quality into an EXR with its layers."""
-    rendering = render(project, progress=progress)
+    rendering = render_any(project, progress=progress)
     write_exr(
         path, rendering.layers, project.camera.size_px, pixel_type=project.output.pixel_type,
         metadata={"version": __version__, "project": project_text(project)},

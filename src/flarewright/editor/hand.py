@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import FlarewrightError
+from ..measure.rendering import is_measured
 from ..model import Project
 from ..render.display import view_sum
 from ..render.moving import Sheet, Still, moving_picture
@@ -49,6 +50,11 @@ class Moved:
     project: Project
     jpeg: bytes
     seconds: float
+
+
+def _by_matrices(project: Project, view: View) -> bool:
+    """Tell whether pictures of a moving hand share sheets: of a lens, as it is."""
+    return not (view.grey or view.unclipped or is_measured(project))
 
 
 class Hand:
@@ -130,7 +136,7 @@ class Hand:
             view, scale = session.view, 1.0 if held else TARGET_SCALE
             bare = target_project(project)
             still, levels = None, levels_at(self.screen.match, project)
-            if not view.grey and not view.unclipped:
+            if _by_matrices(project, view):
                 stage = studio.moving_stage(bare, scale, levels)
                 still = moving_picture(stage, (*self._target_sheets, *self._sheets))
             if still is None:
@@ -151,7 +157,7 @@ class Hand:
 
     def _drawn(self, project: Project, view: View) -> Picture | Still:
         scale, levels = SCALES[self._scale], levels_at(self.screen.match, project)
-        if not view.grey and not view.unclipped:
+        if _by_matrices(project, view):
             still = moving_picture(studio.moving_stage(project, scale, levels), self._sheets)
             if still is not None:
                 self._sheets = still.sheets

@@ -14,6 +14,7 @@ from math import atan, atan2, cos, degrees, hypot, log, radians, sin, tan
 import numpy as np
 from numpy.typing import NDArray
 
+from ..measure.rendering import is_measured
 from ..model import Light, Project
 from .jobs import Check
 from .seen import see
@@ -90,7 +91,12 @@ def with_rung(ladder: Ladder | None, rung: Rung) -> Ladder:
 
 
 def missing(ladder: Ladder | None, project: Project) -> list[float]:
-    """Return the angles that are not measured yet, those first that are nearest to the light."""
+    """Return the angles that are not measured yet, those first that are nearest to the light.
+
+    Of a measured flare there are none: its drafts have the ghosts of its final pictures.
+    """
+    if is_measured(project):
+        return []
     known = set() if ladder is None else {one.angle_deg for one in ladder.rungs}
     here = _angle(_brightest(project))
     return sorted((angle for angle in ANGLES_DEG if angle not in known), key=lambda angle: abs(angle - here))

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..measure.rendering import is_measured, render_any
 from ..model import Art, Layer, Output, Project, Quality, Rule
-from ..render.render import render
 from .studio import Grade, spread, staged
 
 Floats = NDArray[np.float32]
@@ -87,7 +87,7 @@ def see(project: Project, grade: Grade, progress: Callable[[float, str], None] |
             mode="final", wavelengths=3, paths=quality.paths, tolerance_px=1.0, ringing="off", screen=True
         )
     stage = stage.replace(art=art, quality=quality, output=Output(layers="ghosts", starburst=False))
-    rendering = render(stage, progress=progress)
+    rendering = render_any(stage, progress=progress)
     width, height = stage.camera.size_px
     across = stage.camera.sensor[0] / width
     ghosts = [
@@ -157,9 +157,10 @@ def alone(project: Project, ghost: str, grade: Grade) -> Floats:
     quality = stage.quality
     if grade == "final":
         # rings go beyond the ghost's border, faintly and far
-        quality = quality.replace(wavelengths=3, ringing="off")
+        # and what no ghost explains is none of it
+        quality = quality.replace(wavelengths=3, ringing="off", screen=quality.screen or is_measured(stage))
     stage = stage.replace(art=only, quality=quality, output=Output(layers="passes", starburst=False))
-    layers = [layer for layer in render(stage).layers if layer.name.startswith("ghosts")]
+    layers = [layer for layer in render_any(stage).layers if layer.name.startswith("ghosts")]
     return _lit(spread(layers, stage.camera.size_px))
 
 

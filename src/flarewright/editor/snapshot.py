@@ -6,6 +6,7 @@ from typing import Any
 
 from ..errors import FlarewrightError
 from ..io.spectrum_text import spectrum_text
+from ..measure.rendering import is_measured
 from ..model import Design, Project
 from ..render.prepare import as_lens
 from .edit_ghosts import hand, soloed
@@ -14,6 +15,7 @@ from .edit_path import length_s
 from .edit_shot import coating_text, iris_of
 from .edit_wishes import wish_names
 from .history import History, before_mask, design_before_added, design_before_scratch
+from .measured import measured_facts, measured_lens
 from .screen import Screen
 from .shown import FALSE_COLOURS, aces_available
 from .solving import Solver
@@ -35,7 +37,7 @@ def state_of(screen: Screen, solver: Solver) -> dict[str, Any]:
     """
     session = screen.session
     project, history = session.project, session.history
-    table = prescription(project)
+    table = measured_facts(project) if is_measured(project) else prescription(project)
     shown = screen.picture
     return {
         "revision": session.revision,
@@ -103,6 +105,8 @@ def solve_of(solver: Solver) -> dict[str, Any]:
 
 
 def _lens(project: Project, facts: dict[str, float], problem: str) -> dict[str, Any]:
+    if is_measured(project):
+        return measured_lens(project) | {"facts": facts, "problem": problem}
     try:
         lens = as_lens(project.lens)
     except FlarewrightError:

@@ -14,12 +14,12 @@ from numpy.typing import NDArray
 
 from ..errors import FlarewrightError
 from ..io.library import lens_path
+from ..measure.rendering import is_measured, render_any
 from ..model import Art, Layer, Lens, Light, Output, Project, Quality, Rule
 from ..render.display import auto_exposure
 from ..render.edge_rings import untabled
 from ..render.ghosts_final import SCREEN_PX
 from ..render.prepare import load_lens
-from ..render.render import render
 from ..render.working import working_ghosts
 from .view import View
 
@@ -128,7 +128,7 @@ def staged(
     -------
     Project
     """
-    if isinstance(project.lens, str):
+    if isinstance(project.lens, str) and not is_measured(project):
         project = project.replace(lens=_loaded(project.lens, lens_path(project.lens).stat().st_mtime_ns))
     size = view_size(project, scale) if room is None else rest_size(project, room)
     camera = project.camera.replace(size_px=size, sensor_mm=project.camera.sensor)
@@ -151,6 +151,8 @@ def staged(
 
 def _slow_rings(project: Project) -> bool:
     """Tell whether a project's rings are out of reach of a screen; its lens is at hand."""
+    if is_measured(project):
+        return False
     assert isinstance(project.lens, Lens)
     iris = project.iris or project.lens.iris
     image = (iris is not None and iris.mask is not None) or (project.dirt.in_ghosts and not project.dirt.clean)
@@ -207,7 +209,7 @@ def take(
         light = spread([layer], size)
         seconds = time.perf_counter() - begun
         return Picture(project, "working", light, np.zeros_like(light), seconds, grey=look.grey)
-    rendering = render(stage.replace(art=_levelled(stage.art, levels)), progress=progress)
+    rendering = render_any(stage.replace(art=_levelled(stage.art, levels)), progress=progress)
     parts = [layer for layer in rendering.layers if layer.name != "beauty"]
     ghosts = spread([layer for layer in parts if layer.name.startswith("ghosts")], size)
     rest = spread([layer for layer in parts if not layer.name.startswith("ghosts")], size)
@@ -354,8 +356,8 @@ def ghost_gain(picture: Picture, match: Match) -> tuple[float, float, float]:
 
 
 def lens_name(project: Project) -> str:
-    """Return the name of a project's lens, which stays while it is edited."""
-    return _prescription(project).name
+    """Return the name of a project's lens, which stays while it is edited; of a measured flare, where it lies."""
+    return str(project.lens) if is_measured(project) else _prescription(project).name
 
 
 def _prescription(project: Project) -> Lens:

@@ -45,6 +45,11 @@ def _read(path: str | Path, what: str, record: type[Record], largest: int = LARG
     return found
 
 
+def names_ghost_model(what: object) -> bool:
+    """Tell whether a word in a lens' place names a measured flare: no lens is read from JSON."""
+    return isinstance(what, str) and what.lower().endswith(".json") and Path(what).is_file()
+
+
 def read_ghost_model(path: str | Path) -> GhostModel:
     """Read a measured flare.
 

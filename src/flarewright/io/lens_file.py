@@ -77,6 +77,11 @@ def read_lens(path: str | Path) -> LensReading | RawLens | RawSequence:
         return zmx.read_zmx(path)
     if suffix == ".toml" or Path(path).is_dir() or not Path(path).exists():
         return read_lens_toml(path)
+    if suffix == ".json":
+        raise LensError(
+            f"{path} is JSON, which no lens is read from: a measured flare has no prescription, but can be rendered, "
+            "replayed, predicted from, and opened in the editor"
+        )
     raise LensError(
         f"{path} is not of a kind that can be read: Flarewright reads .toml (its own), .lens and .zmx files"
     )

@@ -87,14 +87,7 @@ def replay(
     -----
     Walch 2017, section 8.2: the constellation chooses the numbers, the roll turns the ghosts about the axis.
     """
-    low, high = model.constellation_deg
-    if not low - BEYOND_DEG <= constellation_deg <= high + BEYOND_DEG:
-        raise FlarewrightError(
-            f"the model was measured from {low:g} to {high:g} degrees; it cannot tell the flare at "
-            f"{constellation_deg:g}: {_remedy(model, constellation_deg, roll_deg)}"
-        )
-    if not np.isfinite(roll_deg):
-        raise FlarewrightError(f"roll {roll_deg:g} is no direction; choose degrees between -360 and 360")
+    within_reach(model, constellation_deg, roll_deg)
     size = size_px or model.size_px
     about: dict[str, str | float] = {"constellation_deg": constellation_deg, "roll_deg": roll_deg}
     parts = _held(pack(model), model, constellation_deg, roll_deg, size)
@@ -106,6 +99,29 @@ def replay(
     singles = _single(model, constellation_deg, roll_deg, size, gain) if single else []
     drawn = (whole, *layers, *singles)
     return drawn if colors == "camera" else tuple(_in_rec709(layer, model) for layer in drawn)
+
+
+def within_reach(model: GhostModel, constellation_deg: float, roll_deg: float) -> None:
+    """Refuse a place of the light that was not measured, or is none.
+
+    Parameters
+    ----------
+    model : GhostModel
+    constellation_deg, roll_deg : float
+
+    Raises
+    ------
+    FlarewrightError
+        When the constellation lies outside what was measured, or the roll is no direction.
+    """
+    low, high = model.constellation_deg
+    if not low - BEYOND_DEG <= constellation_deg <= high + BEYOND_DEG:
+        raise FlarewrightError(
+            f"the model was measured from {low:g} to {high:g} degrees; it cannot tell the flare at "
+            f"{constellation_deg:g}: {_remedy(model, constellation_deg, roll_deg)}"
+        )
+    if not np.isfinite(roll_deg):
+        raise FlarewrightError(f"roll {roll_deg:g} is no direction; choose degrees between -360 and 360")
 
 
 def _remedy(model: GhostModel, constellation_deg: float, roll_deg: float) -> str:

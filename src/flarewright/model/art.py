@@ -11,11 +11,13 @@ from pydantic import AfterValidator, Field, StrictBool, ValidationInfo, field_va
 from .base import Frozen
 
 _ROW = r"(?:sensor|\d+)"
+# a path by its mirrors, or a measured ghost by its number
+_NAME = rf"(?:{_ROW}(?:-{_ROW})+|\d+)"
 SELECTOR = re.compile(
     r"(?P<opposite>not\s+)?"
     r"(?:(?P<all>all)|row:(?P<row>\d{1,4})|largest:(?P<largest>[1-9]\d{0,5})|brightest:(?P<brightest>[1-9]\d{0,5})|"
     r"bounded:(?P<bounded>stop|entrance)|"
-    rf"(?P<names>{_ROW}(?:-{_ROW})+(?:,{_ROW}(?:-{_ROW})+)*))"
+    rf"(?P<names>{_NAME}(?:,{_NAME})*))"
 )
 """How ghosts are chosen; what each form means stands at `Rule`."""
 
@@ -47,10 +49,10 @@ class Rule(Frozen):
     Attributes
     ----------
     select : str
-        "all"; path names "7-3" or "7-3,8-2"; "row:7": paths that reflect at row 7; "brightest:5", "largest:10": by
-        throughput and by rms radius as `flarewright ghosts` lists them; "bounded:stop", "bounded:entrance": by what
-        it says bounds them; "not " before any of these: all others. Ghosts of four reflections are named like
-        "7-3-5-2", and are never among the largest or brightest.
+        "all"; path names "7-3" or "7-3,8-2", of a measured flare its ghosts' numbers; "row:7": paths that reflect at
+        row 7; "brightest:5", "largest:10": by throughput and by rms radius as `flarewright ghosts` lists them;
+        "bounded:stop", "bounded:entrance": by what it says bounds them; "not " before any of these: all others.
+        Ghosts of four reflections are named like "7-3-5-2", and are never among the largest or brightest.
     enable : bool or None
         False leaves the ghosts out, True brings back what an earlier rule left out.
     gain : float

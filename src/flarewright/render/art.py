@@ -302,6 +302,11 @@ def _chosen(facts: _Facts, select: str, where: str) -> list[str]:
     lens = facts.settled.lens
     if match["names"]:
         chosen = set(match["names"].split(","))
+        if single := sorted(name for name in chosen if "-" not in name):
+            raise ProjectError(
+                f"{where}: {single[0]} is no path of {lens.name}; name two rows like 7-3, or the paths of one, "
+                f"row:{single[0]}"
+            )
         if facts.settled.sensor is None and (dark := sorted(name for name in chosen if "sensor" in name)):
             raise ProjectError(
                 f"{where}: there is no ghost {dark[0]} while the sensor reflects nothing; set "

@@ -152,7 +152,7 @@ def render(
         whole = beauty(passes, project.camera.size_px)
     layers = (whole,) if project.output.layers == "beauty" else (whole, *passes, *others)
     # the beauty is endless where a pass is
-    _refuse_endless((whole, *others))
+    refuse_endless((whole, *others))
     # line by line: what has light shows it soon
     if not any(line.any() for layer in passes for line in layer.pixels):
         told = (*told, BLACK if any(shot.share > 0.0 for shot in shots) else HIDDEN)
@@ -171,8 +171,18 @@ def render(
     )
 
 
-def _refuse_endless(layers: Sequence[Layer]) -> None:
-    """Refuse a picture whose values no file can hold."""
+def refuse_endless(layers: Sequence[Layer]) -> None:
+    """Refuse a picture whose values no file can hold.
+
+    Parameters
+    ----------
+    layers : sequence of Layer
+
+    Raises
+    ------
+    ProjectError
+        A value of one of them is infinite, or none.
+    """
     for layer in layers:
         # a sum is endless where one of its parts is; that of squares is made soonest, but may be where none is
         values = layer.pixels.ravel()
@@ -423,4 +433,4 @@ def _light_summary(project: Project, number: int, parts: list[tuple[Shot, Direct
     }
 
 
-__all__ = ["Rendering", "render"]
+__all__ = ["Rendering", "refuse_endless", "render"]

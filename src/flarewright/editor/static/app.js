@@ -9,6 +9,7 @@ import { irisPanel } from './panel_iris.js';
 import { lensPanel } from './panel_lens.js';
 import { libraryPanel } from './panel_library.js';
 import { lightPanel } from './panel_light.js';
+import { panelOfLens } from './of_lens.js';
 import { player } from './player.js';
 import { targetPanel } from './panel_target.js';
 
@@ -184,7 +185,7 @@ app.hint = () => {
   $('hint').textContent = app.ghost ? `Ghost ${app.ghost}${place}` : '';
 };
 app.places = latest(async () => {
-  if (app.tab !== 'target') return;
+  if (app.tab !== 'target' || app.state?.lens.measured) return;
   try { app.view.places = (await get('/api/places')).places; } catch { app.view.places = []; }
   panels.target.update?.(app.state);
   app.view.redraw();
@@ -202,10 +203,11 @@ let shut = localStorage.getItem('section') === 'shut';
 const drawing = h('div', { class: 'drawing' });
 const told = h('span');
 const fold = button('', () => { shut = !shut; localStorage.setItem('section', shut ? 'shut' : 'open'); folded(); drawSection(); }, { kind: 'quiet', tip: 'Show or hide the cross-section (X).' });
-function folded() { $('section').classList.toggle('shut', shut); fold.textContent = shut ? 'show section' : 'hide'; app.view.redraw(); }
+function folded() { const none = Boolean(app.state?.lens.measured); $('section').classList.toggle('shut', shut || none); fold.hidden = none; fold.textContent = shut ? 'show section' : 'hide'; app.view.redraw(); }
 const drawSection = latest(async () => {
   if (!app.state) return;
-  if (shut) { told.replaceChildren(...facts(app.state)); return; }
+  folded();
+  if (shut || app.state.lens.measured) { told.replaceChildren(...facts(app.state)); return; }
   const { ghost } = app;
   const answer = await fetch(`/api/section${ghost ? `?ghost=${encodeURIComponent(ghost)}` : ''}`);
   // a lens that makes no image keeps the drawing of before
@@ -238,7 +240,7 @@ function header() {
   exposed.className = 'exposure';
   $('bar').append(
     h('span', { class: 'brand' }, 'Flarewright'),
-    button('Open', openFile, { tip: 'Open a project, a lens file or a lens by its name (O).', id: 'open' }),
+    button('Open', openFile, { tip: 'Open a project, a lens file, a measured flare, or a lens by its name (O).', id: 'open' }),
     button('Save', () => save(), { tip: 'Save the project file (Ctrl+S).', id: 'save' }),
     button('Export ▾', (event) => menu(event.currentTarget, exports), { id: 'export', tip: 'The project under another name, pictures, lens, table of ghosts, or the command that renders the saved project.' }),
     file, h('span', { class: 'split' }), undo, redo, h('span', { class: 'gap' }), exposed, auto, look,
@@ -320,7 +322,7 @@ function asking(title, words, value, path, done = () => {}) {
   box.focus(); box.select();
 }
 const saved = (state) => toast(state.told, 'good', 4500, '/api/save');
-function openFile() { asking('Open', 'A project file, a lens file, or a lens’ name. Files can also be dropped on the page.', '', '/api/open'); }
+function openFile() { asking('Open', 'A project file, a lens file, a measured flare, or a lens’ name. Files can also be dropped on the page.', '', '/api/open'); }
 function saveAs() { asking('Save', 'Where the project file shall lie, like shot.toml.', app.state.file ?? 'flare.toml', '/api/save', saved); }
 async function save() {
   const text = app.state.file;
@@ -343,14 +345,16 @@ function working(words, part) {
 }
 app.status = status;
 const GRADES = { moving: 'moving, by matrices', draft: 'draft, by matrices', soon: 'final for the screen, by traced rays', final: 'final, by traced rays', working: 'working view, by matrices' };
+const MEASURED = { moving: 'moving, its ghosts and glow', draft: 'its ghosts and glow', soon: 'its ghosts and glow', final: 'measured, with all that was photographed' };
 const FIRST = 'drawing the first picture; the very first on a machine takes some ten seconds';
 function gradeWords({ grade: drawn, seconds, number, current, problem }) {
   const { mover, shownGrade, shownNumber } = app.view;
+  const named = app.state.lens.measured ? MEASURED : GRADES;
   if (!drawn) return problem ? 'no picture yet' : FIRST;
   if (problem) return 'the last good picture';
   // what a hand holds is of no project yet, but it is what is shown
-  if (!mover.live && !current) return shownGrade === 'moving' ? GRADES.moving : 'the picture before, until the new one is drawn';
-  const words = GRADES[shownGrade] ?? GRADES[drawn];
+  if (!mover.live && !current) return shownGrade === 'moving' ? named.moving : 'the picture before, until the new one is drawn';
+  const words = named[shownGrade] ?? named[drawn];
   if (shownNumber !== number || !seconds) return words;
   return `${words} · ${seconds < 1 ? `${Math.round(seconds * 1000)} ms` : `${seconds.toFixed(1)} s`}`;
 }
@@ -367,8 +371,8 @@ function status() {
 
 // --------------------------------------------------------------------------------------------------------------- tabs
 const panels = {
-  light: lightPanel(app), ghosts: ghostPanel(app), lens: lensPanel(app), iris: irisPanel(app),
-  coating: coatingPanel(app), target: targetPanel(app), library: libraryPanel(app),
+  light: lightPanel(app), ghosts: ghostPanel(app), lens: panelOfLens(lensPanel(app)), iris: panelOfLens(irisPanel(app)),
+  coating: panelOfLens(coatingPanel(app)), target: panelOfLens(targetPanel(app)), library: libraryPanel(app),
 };
 const NAMES = { light: 'Light', ghosts: 'Ghosts', lens: 'Lens', iris: 'Iris', coating: 'Coating', target: 'Target', library: 'Library' };
 app.panels = panels;

@@ -1,6 +1,7 @@
 // Lights, camera, view.
 import { holdoutGroup } from './group_holdout.js';
 import { pathGroup } from './group_path.js';
+import { ofLens } from './of_lens.js';
 import { button, choice, entry, group, h, refill, slider, tick } from './ui.js';
 
 const SPECTRA = [['d65', 'Daylight D65'], ['equal-energy', 'Equal energy'], ['black-body:3200', 'Tungsten 3200 K'], ['black-body:5600', 'Black body 5600 K'], ['black-body:2000', 'Candle 2000 K'], ['lines:589.0,589.6', 'Sodium lamp'], ['rgb:1,0.25,0.1', 'Red light'], ['rgb:0.15,0.4,1', 'Blue light']];
@@ -27,8 +28,8 @@ export function lightPanel(app) {
     choose, across, up,
     slider({ label: 'Intensity', tip: 'Irradiance that the light gives on a plane facing it; all ghosts of it scale with this.', min: 0, max: 10, step: 0.01, curve: 2, name: 'intensity', get: (s) => one(s).intensity, set: (intensity, held) => set({ intensity }, held) }),
     choice({ label: 'Spectrum', tip: 'What wavelengths it sends: coatings reflect each differently, so the spectrum colours the ghosts.', name: 'spectrum', options: SPECTRA, get: (s) => one(s).spectrum, set: (spectrum) => set({ spectrum }) }),
-    slider({ label: 'Disc', tip: 'Angle across the light: 0 is a point, 0.53° the sun. A wide light softens every ghost by its own image of it.', min: 0, max: 10, step: 0.01, curve: 2, unit: '°', get: (s) => one(s).diameter_deg, set: (diameter_deg, held) => set({ diameter_deg }, held) }),
-    entry({ label: 'Distance', tip: 'From the first vertex; left empty the light is so far away that its rays are parallel.', unit: 'mm', placeholder: 'far', name: 'distance', get: (s) => one(s).distance, set: (distance) => set({ distance }) }),
+    ofLens(slider({ label: 'Disc', tip: 'Angle across the light: 0 is a point, 0.53° the sun. A wide light softens every ghost by its own image of it.', min: 0, max: 10, step: 0.01, curve: 2, unit: '°', get: (s) => one(s).diameter_deg, set: (diameter_deg, held) => set({ diameter_deg }, held) })),
+    ofLens(entry({ label: 'Distance', tip: 'From the first vertex; left empty the light is so far away that its rays are parallel.', unit: 'mm', placeholder: 'far', name: 'distance', get: (s) => one(s).distance, set: (distance) => set({ distance }) })),
   ]);
   const path = pathGroup(app);
   const hiding = holdoutGroup(app);
@@ -37,25 +38,25 @@ export function lightPanel(app) {
   const picker = h('input', { type: 'file', accept: '.exr,.png,.jpg,.jpeg', hidden: true });
   picker.addEventListener('change', async () => { if (picker.files[0]) await app.importFile(picker.files[0]); picker.value = ''; });
   const seeing = group('View', [
-    tick({ label: 'Grey', name: 'grey', tip: 'Every ghost reflects alike, whatever its coating, so that ghosts which coatings hide can be seen and pulled (G).', get: (s) => s.view.grey, set: (grey) => view({ grey }) }),
-    tick({ label: 'No entrance clip', name: 'unclipped', tip: 'The first surface has no rim: ghosts appear that the entrance hides at this angle (E).', get: (s) => s.view.unclipped, set: (unclipped) => view({ unclipped }) }),
+    ofLens(tick({ label: 'Grey', name: 'grey', tip: 'Every ghost reflects alike, whatever its coating, so that ghosts which coatings hide can be seen and pulled (G).', get: (s) => s.view.grey, set: (grey) => view({ grey }) })),
+    ofLens(tick({ label: 'No entrance clip', name: 'unclipped', tip: 'The first surface has no rim: ghosts appear that the entrance hides at this angle (E).', get: (s) => s.view.unclipped, set: (unclipped) => view({ unclipped }) })),
     tick({ label: 'Safe frame', name: 'safe', tip: 'Lines at 90 % and 80 % of the frame (H).', get: (s) => s.view.safe_frame, set: (safe_frame) => view({ safe_frame }) }),
     { element: h('div', { class: 'row', tip: 'A picture under the flare, to judge it in its scene; light adds, so it is added before the view. It is no part of any file.' }, h('label', {}, 'Background'), h('div', { class: 'fields' }, button('Choose…', () => picker.click()), button('None', () => view({ plate: null })), plate, picker)), update: (s) => { plate.textContent = s.view.plate ? s.view.plate.split(/[\\/]/).pop() : ''; } },
     slider({ label: 'Its brightness', tip: 'Stops of the background alone.', min: -8, max: 8, step: 0.1, digits: 1, unit: 'stops', get: (s) => s.view.plate_stops, set: (plate_stops) => view({ plate_stops }) }),
   ]);
   const camera = (values, held = '') => app.lively('set_camera', { values }, held);
   const shot = group('Camera', [
-    slider({ label: 'f-number', tip: 'Closing the iris makes the ghosts that it bounds smaller, each with the same brightness; the starburst grows.', min: 0.7, max: 32, step: 0.1, digits: 1, curve: 2, name: 'f_number', get: (s) => s.lens.f_number ?? s.lens.open, set: (value, held) => app.lively('set_fields', { values: { f_number: value } }, held) }),
-    choice({ label: 'Zoom position', tip: 'The positions that the lens file knows: gaps between its groups change.', options: (s) => [['', 'as its rows stand'], ...(s.lens.positions ?? []).map((name) => [name, name])], get: (s) => s.lens.zoom ?? '', set: (zoom) => app.deed('set_fields', { values: { zoom: zoom || null } }).catch(() => {}) }),
+    ofLens(slider({ label: 'f-number', tip: 'Closing the iris makes the ghosts that it bounds smaller, each with the same brightness; the starburst grows.', min: 0.7, max: 32, step: 0.1, digits: 1, curve: 2, name: 'f_number', get: (s) => s.lens.f_number ?? s.lens.open, set: (value, held) => app.lively('set_fields', { values: { f_number: value } }, held) }), (s) => Boolean(s.lens.open)),
+    ofLens(choice({ label: 'Zoom position', tip: 'The positions that the lens file knows: gaps between its groups change.', options: (s) => [['', 'as its rows stand'], ...(s.lens.positions ?? []).map((name) => [name, name])], get: (s) => s.lens.zoom ?? '', set: (zoom) => app.deed('set_fields', { values: { zoom: zoom || null } }).catch(() => {}) })),
     choice({ label: 'Picture', tip: 'Pixels of the rendered file; the viewport shows its shape.', name: 'size', options: SIZES, get: (s) => s.camera.size_px.join('x'), set: (text) => { const size = pair(text).map(Math.round); const key = sensorOf(app.state.camera); camera({ size_px: size, ...(SENSORS.some(([known]) => known && known === key) ? { sensor_mm: fitted(key, size) } : {}) }); } }),
-    choice({ label: 'Sensor', tip: 'A smaller sensor sees a smaller part of the same flare. As much of it is used as has the shape of the picture.', name: 'sensor', options: SENSORS, get: (s) => sensorOf(s.camera), set: (key) => camera({ sensor_mm: key ? fitted(key, app.state.camera.size_px) : null }) }),
-    entry({ label: 'Focus distance', tip: 'Plane in focus in front of the lens; focusing moves the sensor, and the ghosts with it.', unit: 'mm', placeholder: 'infinity', get: (s) => s.camera.focus_distance, set: (focus_distance) => camera({ focus_distance }) }),
-    slider({ label: 'Sensor reflects', tip: 'The sensor mirrors light back into the lens, which makes ghosts of its own.', min: 0, max: 0.3, step: 0.005, digits: 3, get: (s) => s.camera.sensor_reflectance, set: (sensor_reflectance, held) => camera({ sensor_reflectance }, held) }),
+    ofLens(choice({ label: 'Sensor', tip: 'A smaller sensor sees a smaller part of the same flare. As much of it is used as has the shape of the picture.', name: 'sensor', options: SENSORS, get: (s) => sensorOf(s.camera), set: (key) => camera({ sensor_mm: key ? fitted(key, app.state.camera.size_px) : null }) })),
+    ofLens(entry({ label: 'Focus distance', tip: 'Plane in focus in front of the lens; focusing moves the sensor, and the ghosts with it.', unit: 'mm', placeholder: 'infinity', get: (s) => s.camera.focus_distance, set: (focus_distance) => camera({ focus_distance }) })),
+    ofLens(slider({ label: 'Sensor reflects', tip: 'The sensor mirrors light back into the lens, which makes ghosts of its own.', min: 0, max: 0.3, step: 0.005, digits: 3, get: (s) => s.camera.sensor_reflectance, set: (sensor_reflectance, held) => camera({ sensor_reflectance }, held) })),
   ]);
   const work = group('Final picture', [
-    slider({ label: 'Wavelengths', tip: 'Traced wavelengths: glass bends each differently, so few of them show as steps of colour.', min: 3, max: 31, step: 1, digits: 0, get: (s) => s.quality.wavelengths, set: (wavelengths, held) => app.lively('set_quality', { values: { wavelengths } }, held) }),
-    choice({ label: 'Rings in ghosts', tip: 'Diffraction at the iris draws rings into the ghosts; Collins’ integral does it for each ghost by its own matrix.', options: [['off', 'off'], ['collins', 'exact (Collins)'], ['frft', 'Hullin’s estimate']], get: (s) => s.quality.ringing, set: (ringing) => app.deed('set_quality', { values: { ringing } }).catch(() => {}) }),
-    choice({ label: 'Reflections', tip: 'Four reflections make fainter ghosts; they are found by chance and drawn by rays.', options: [['2', 'two'], ['4', 'two and four']], get: (s) => String(s.quality.orders), set: (orders) => app.deed('set_quality', { values: { orders: Number(orders) } }).catch(() => {}) }),
+    ofLens(slider({ label: 'Wavelengths', tip: 'Traced wavelengths: glass bends each differently, so few of them show as steps of colour.', min: 3, max: 31, step: 1, digits: 0, get: (s) => s.quality.wavelengths, set: (wavelengths, held) => app.lively('set_quality', { values: { wavelengths } }, held) })),
+    ofLens(choice({ label: 'Rings in ghosts', tip: 'Diffraction at the iris draws rings into the ghosts; Collins’ integral does it for each ghost by its own matrix.', options: [['off', 'off'], ['collins', 'exact (Collins)'], ['frft', 'Hullin’s estimate']], get: (s) => s.quality.ringing, set: (ringing) => app.deed('set_quality', { values: { ringing } }).catch(() => {}) })),
+    ofLens(choice({ label: 'Reflections', tip: 'Four reflections make fainter ghosts; they are found by chance and drawn by rays.', options: [['2', 'two'], ['4', 'two and four']], get: (s) => String(s.quality.orders), set: (orders) => app.deed('set_quality', { values: { orders: Number(orders) } }).catch(() => {}) })),
     slider({ label: 'Ghosts ×', tip: 'Artist’s factor on all ghosts; 1 is physics.', min: 0, max: 10, step: 0.01, curve: 2, get: (s) => s.pass_gain.ghosts ?? 1, set: (gain, held) => app.lively('set_pass_gain', { name: 'ghosts', gain }, held) }),
     slider({ label: 'Starburst ×', tip: 'Artist’s factor on the direct image and its diffraction; 1 is physics.', min: 0, max: 10, step: 0.01, curve: 2, get: (s) => s.pass_gain.starburst ?? 1, set: (gain, held) => app.lively('set_pass_gain', { name: 'starburst', gain }, held) }),
   ]);

@@ -59,12 +59,15 @@ export function viewport(canvas, app) {
     const before = k ? known[k - 1] : 1;
     return before + (at - k) * (known[k] - before);
   };
+  // where the optical axis meets the picture: a measured one need not be its middle
+  const axis = () => app.state.lens.axis_mm ?? [0, 0];
   const place = (light) => {
     const slopes = light.field_deg.map((deg) => Math.tan(deg * Math.PI / 180));
     const part = efl() * distortion(Math.hypot(...slopes), light);
-    return slopes.map((slope) => part * slope);
+    return slopes.map((slope, k) => axis()[k] + part * slope);
   };
-  function anglesAt(mm, light) {
+  function anglesAt(at, light) {
+    const mm = at.map((each, k) => each - axis()[k]);
     const reach = Math.hypot(...mm) / efl();
     let [near, far] = [0, Math.tan(STEEPEST * Math.PI / 180)];
     for (let k = 0; k < 40; k++) {

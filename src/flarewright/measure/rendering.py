@@ -1,0 +1,425 @@
+"""A project in whose lens' place stands a measured flare: the layers that a render of a lens would give.
+
+`render_any` is what command line and editor call; which of the two a project is, they need not ask.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from math import prod
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import ProjectError
+from ..io.ghost_model_file import names_ghost_model, read_ghost_model
+from ..model import D65, Camera, Layer, Light, Project
+from ..model.ghost_model import GhostModel
+from ..model.replay_camera import ReplayCamera
+from ..optics.color import luminance_weights, xyz_to_rgb_matrix
+from ..optics.constellation import constellation_and_roll
+from ..optics.holdout import hidden_at
+from ..optics.spectrum import spectrum_xyz
+from ..render.art import graded
+from ..render.compose import beauty
+from ..render.holdout import read_plates
+from ..render.render import BLACK, HIDDEN, PIXEL_BYTES, Progress, Rendering, refuse_endless, render
+from ..render.room import need, spare_bytes
+from .chosen import Rgb, ghost_gains
+from .numbers import fit_in
+from .placing import brightness
+from .replay import draw, light_px, replay, within_reach
+
+Floats = NDArray[np.float64]
+
+_LUMINANCE = luminance_weights("rec709")
+# of a project, of its camera and of its lights: what only a prescription can answer
+_OF_LENSES = ("iris", "coating", "dirt", "starburst", "zoom", "filter", "imperfection", "scatter")
+_OF_CAMERAS = (
+    "sensor_distance", "focus_distance", "cover_glass", "sensor_reflectance", "sensor_grating", "squeeze", "desqueeze",
+)  # fmt: skip
+_OF_LIGHTS = ("distance", "diameter_deg", "shape")
+# a pass of art direction, and the layers it stands for: what is left of ghosts goes with them
+_PASSES = {"ghosts": "ghosts", "residual": "ghosts", "starburst": "starburst", "halo": "scatter"}
+# pixels that are wider than high by more than this are no square ones
+_OBLONG = 0.03
+UNIT = "values are in the captures' unit: a light of intensity 1 is the one that was photographed"
+OWN_COLOURS = "the model does not know its camera's colours: the captures' red, green and blue stand for linear Rec.709"
+TINTED = "what the lens' coatings make of another spectrum is not known: the flare is tinted by the light's colour"
+LIGHT_ITSELF = "the light's own image is part of a measured halo and residual, so starburst = false leaves it there"
+
+
+@dataclass(frozen=True)
+class MeasuredFlare:
+    """A ghost model as a renderer takes it.
+
+    Attributes
+    ----------
+    name : str
+    model : GhostModel
+    bare : GhostModel
+        Without what no ghost explains.
+    """
+
+    name: str
+    model: GhostModel
+    bare: GhostModel
+
+
+@dataclass(frozen=True)
+class _Seen:
+    """A light as the flare answers it: where it stands, and what a unit of its flare comes to in the picture."""
+
+    light: Light
+    constellation_deg: float
+    roll_deg: float
+    place_px: tuple[float, float]
+    part: float
+    colours: Floats
+
+
+def is_measured(project: Project) -> bool:
+    """Tell whether a measured flare stands in the place of a project's lens."""
+    return names_ghost_model(project.lens)
+
+
+def flare_of(project: Project) -> MeasuredFlare:
+    """Read the measured flare of a project; one that was read before is at hand.
+
+    Parameters
+    ----------
+    project : Project
+        Of which `is_measured` is true.
+
+    Returns
+    -------
+    MeasuredFlare
+
+    Raises
+    ------
+    FlarewrightError
+        The file is no ghost model.
+    """
+    path = str(project.lens)
+    return _read(path, Path(path).stat().st_mtime_ns)
+
+
+@lru_cache(maxsize=2)
+def _read(path: str, changed_ns: int) -> MeasuredFlare:
+    del changed_ns
+    model = read_ghost_model(path)
+    return MeasuredFlare(Path(path).name, model, cast(GhostModel, model.replace(sprites=())))
+
+
+def render_any(project: Project, *, threads: int | None = None, progress: Progress | None = None) -> Rendering:
+    """Render a project, be it of a lens or of a measured flare.
+
+    Parameters
+    ----------
+    project : Project
+    threads, progress
+        As `render.render.render`.
+
+    Returns
+    -------
+    Rendering
+
+    Raises
+    ------
+    FlarewrightError
+        When the project cannot be rendered.
+    """
+    if is_measured(project):
+        return render_measured(project, progress=progress)
+    return render(project, threads=threads, progress=progress)
+
+
+def render_measured(project: Project, *, progress: Progress | None = None) -> Rendering:
+    """Draw the measured flare of a project.
+
+    Parameters
+    ----------
+    project : Project
+        Draft quality, and `quality.screen`, leave out what no ghost explains, which takes most of the time.
+    progress : callable, optional
+        As of `render.render.render`.
+
+    Returns
+    -------
+    Rendering
+        Layers "beauty", "ghosts", "starburst", "halo" and "residual" as far as the model has them, and single ghosts.
+        In the captures' unit; a light of intensity 1 is the one that was photographed. As many pixels show the
+        captures' field across the picture's width.
+
+    Raises
+    ------
+    FlarewrightError
+        The file is no ghost model, the project asks for what only a prescription can answer, a light lies outside what
+        was measured, or a rule chooses what there is not.
+
+    Notes
+    -----
+    Walch 2017, section 8.2; a change of f-number brightens by equation 8.3. A light's spectrum can only tint what was
+    photographed: each of red, green and blue is multiplied by the light's own, of daylight D65 (1, 1, 1). Tests:
+    tests/measure/test_rendering.py.
+    """
+    _refuse_what_lenses_have(project)
+    flare, size = flare_of(project), project.camera.size_px
+    need(prod(size) * PIXEL_BYTES * 6, spare_bytes())
+    seen = tuple(_seen(project, flare, light) for light in project.lights)
+    gains = ghost_gains(
+        project.art, [ghost.name for ghost in flare.model.ghosts], lambda kind: _ranked(flare, seen, size, kind),
+        flare.name,
+    )  # fmt: skip
+    whole = project.quality.mode != "draft" and not project.quality.screen
+    parts: dict[str, Layer] = {}
+    singles: dict[str, Layer] = {}
+    for k, one in enumerate(seen):
+        if progress is not None:
+            progress(k / len(seen), one.light.name)
+        drawn = replay(flare.model if whole else flare.bare, one.constellation_deg, roll_deg=one.roll_deg, size_px=size)
+        # but for the beauty
+        for layer in drawn[1:]:
+            _add(parts, _coloured(layer, one.colours))
+        if project.output.layers == "ghosts":
+            for layer in _singles(flare, one, size):
+                _add(singles, _coloured(layer, one.colours))
+    if gains:
+        # what grows beyond all numbers is refused below
+        with np.errstate(over="ignore", invalid="ignore"):
+            parts["ghosts"] = _ghosts_by_hand(flare, seen, gains, size)
+            _keep_above_0(parts)
+    if not project.output.starburst:
+        parts.pop("starburst", None)
+    by_pass = {} if project.art.physical else project.art.gain
+    with np.errstate(over="ignore", invalid="ignore"):
+        passes = [graded(layer, by_pass.get(_PASSES[name], 1.0)) for name, layer in parts.items()]
+        others = [
+            graded(layer, by_pass.get("ghosts", 1.0)) for layer in _brightest(project, singles, gains)
+        ]  # fmt: skip
+        total = beauty(passes, size)
+    refuse_endless((total, *others))
+    layers = (total,) if project.output.layers == "beauty" else (total, *passes, *others)
+    summary = _summary(project, flare, seen, gains)
+    return Rendering(project, layers, summary, _remarks(project, flare, seen, total))
+
+
+def check_measured(project: Project) -> None:
+    """Refuse a project of a measured flare that cannot be drawn, without drawing it; raises as `render_measured`."""
+    _refuse_what_lenses_have(project)
+    flare = flare_of(project)
+    for light in project.lights:
+        seen = _seen(project, flare, light)
+        within_reach(flare.model, seen.constellation_deg, seen.roll_deg)
+    names = [ghost.name for ghost in flare.model.ghosts]
+    ghost_gains(project.art, names, lambda _: names, flare.name)
+
+
+def _refuse_what_lenses_have(project: Project) -> None:
+    """Refuse what a measured flare cannot answer, rather than leave it without effect."""
+    name = Path(str(project.lens)).name
+    plain = Project(lens=project.lens, lights=project.lights)
+    asked = [key for key in _OF_LENSES if getattr(project, key) != getattr(plain, key)]
+    asked += [f"camera.{key}" for key in _OF_CAMERAS if getattr(project.camera, key) != getattr(Camera(), key)]
+    for k, light in enumerate(project.lights):
+        bare = Light(field_deg=light.field_deg)
+        asked += [f"lights[{k}].{key}" for key in _OF_LIGHTS if getattr(light, key) != getattr(bare, key)]
+    if project.quality.mode == "reference":
+        asked.append('quality.mode = "reference"')
+    if project.quality.orders != plain.quality.orders:
+        asked.append("quality.orders")
+    if abs(project.camera.pixel_aspect - 1.0) > _OBLONG:
+        (width, height), (across, _) = project.camera.size_px, project.camera.sensor
+        raise ProjectError(
+            f"{name} was measured in square pixels: a picture of {width}x{height} is one of a sensor of {across:g}x"
+            f"{across * height / width:.4g} mm; give that, or leave the sensor out"
+        )
+    if asked:
+        raise ProjectError(
+            f"{name} is a measured flare, which has no prescription and shows the light that was photographed: "
+            f"{asked[0]} has no meaning there; leave it out"
+        )
+
+
+def _seen(project: Project, flare: MeasuredFlare, light: Light) -> _Seen:
+    """Find out where a light stands for the flare, what hides it, and what its flare is multiplied by."""
+    model, size = flare.model, project.camera.size_px
+    slopes = np.tan(np.radians(light.field_deg))
+    angle, roll = (float(each) for each in constellation_and_roll(np.eye(3), np.array([*slopes, 1.0])))
+    low, high = model.constellation_deg
+    if not low <= angle <= high and low <= -angle <= high:
+        # photographed on the other side alone: half a turn away it is the same flare
+        angle, roll = -angle, roll + 180.0
+    zoom, top = fit_in(model, size)
+    x, y = light_px(model, angle, roll)
+    place = x * zoom, y * zoom + top
+    part = 1.0
+    for holdout, hidden in read_plates(project, light):
+        sides = np.array(hidden.shape[::-1])
+        beside = (np.array(place) - 0.5 * np.array(size)) / (np.array(size) * holdout.overscan)
+        part *= 1.0 - hidden_at(hidden, sides * (0.5 + beside))
+    gain = light.intensity * part
+    if project.f_number is not None:
+        gain *= brightness(model.reference, ReplayCamera(f_number=project.f_number))
+    return _Seen(light, angle, roll, place, part, gain * _colours(project, model, light))
+
+
+def _colours(project: Project, model: GhostModel, light: Light) -> Floats:
+    """Return the matrix from the captures' colours to those of the picture, with the light's tint between them."""
+    rec709 = np.eye(3) if model.to_rec709 is None else np.array(model.to_rec709)
+    # tabulated daylight misses the white point by some 1e-4: it tints nothing
+    tint, daylight = (xyz_to_rgb_matrix("rec709") @ spectrum_xyz(each) for each in (light.spectrum, D65()))
+    found = (tint / daylight)[:, None] * rec709
+    if project.output.colorspace != "rec709":
+        found = xyz_to_rgb_matrix(project.output.colorspace) @ np.linalg.inv(xyz_to_rgb_matrix("rec709")) @ found
+    return np.asarray(found)
+
+
+def _coloured(layer: Layer, colours: Floats) -> Layer:
+    return replace(layer, pixels=np.asarray(layer.pixels @ colours.T.astype(np.float32)), about={})
+
+
+def _add(layers: dict[str, Layer], layer: Layer) -> None:
+    """Add a layer's light to that of the same name; the window grows to hold both."""
+    other = layers.get(layer.name)
+    if other is None:
+        layers[layer.name] = layer
+        return
+    x, y = min(layer.window[0], other.window[0]), min(layer.window[1], other.window[1])
+    right = max(one.window[0] + one.window[2] for one in (layer, other))
+    bottom = max(one.window[1] + one.window[3] for one in (layer, other))
+    pixels = np.zeros((bottom - y, right - x, 3), dtype=np.float32)
+    for one in (other, layer):
+        left, top, width, height = one.window
+        pixels[top - y : top - y + height, left - x : left - x + width] += one.pixels
+    layers[layer.name] = Layer(layer.name, pixels, (x, y, right - x, bottom - y))
+
+
+def _ghosts_by_hand(
+    flare: MeasuredFlare, seen: Sequence[_Seen], gains: dict[str, Rgb | None], size: tuple[int, int]
+) -> Layer:
+    """Draw the ghosts of all lights, those together whose light is multiplied alike."""
+    alike: dict[Rgb, list[str]] = {}
+    for ghost in flare.model.ghosts:
+        gain = gains.get(ghost.name, (1.0, 1.0, 1.0))
+        if gain is not None:
+            alike.setdefault(gain, []).append(ghost.name)
+    pixels = np.zeros((size[1], size[0], 3), dtype=np.float32)
+    for gain, names in alike.items():
+        some = cast(GhostModel, flare.bare.replace(ghosts=[one for one in flare.bare.ghosts if one.name in names]))
+        for one in seen:
+            light = draw(some, one.constellation_deg, one.roll_deg, size)
+            pixels += (light @ (np.array(gain)[:, None] * one.colours).T).astype(np.float32)
+    return Layer("ghosts", pixels, (0, 0, *size))
+
+
+def _keep_above_0(parts: dict[str, Layer]) -> None:
+    """Let what is left take no more light away than there is: it also mends ghosts that rules have left out."""
+    rest = parts.get("residual")
+    if rest is not None:
+        others = sum(layer.pixels for name, layer in parts.items() if name != "residual")
+        parts["residual"] = replace(rest, pixels=np.maximum(rest.pixels, -np.asarray(others)))
+
+
+def _singles(flare: MeasuredFlare, one: _Seen, size: tuple[int, int]) -> list[Layer]:
+    drawn = replay(flare.bare, one.constellation_deg, roll_deg=one.roll_deg, size_px=size, single=True)
+    return [layer for layer in drawn if layer.name.startswith("ghost.")]
+
+
+def _ranked(flare: MeasuredFlare, seen: Sequence[_Seen], size: tuple[int, int], kind: str) -> list[str]:
+    """Return ghosts by their light in the picture, or by how far it is spread, the most first."""
+    found: dict[str, float] = {}
+    for one in seen:
+        for layer in _singles(flare, one, size):
+            light = np.maximum(_coloured(layer, one.colours).pixels @ _LUMINANCE, 0.0)
+            name, total = layer.name.removeprefix("ghost."), float(light.sum())
+            if total <= 0.0:
+                continue
+            if kind == "brightest":
+                found[name] = found.get(name, 0.0) + total
+            else:
+                found[name] = max(found.get(name, 0.0), _spread_px(light / total))
+    return sorted(found, key=lambda name: -found[name])
+
+
+def _spread_px(part: Floats) -> float:
+    """Return the root mean square distance of light from its middle, pixels; `part` sums to 1."""
+    squares = 0.0
+    for along in (part.sum(axis=0), part.sum(axis=1)):
+        at = np.arange(along.size)
+        squares += float(along @ (at - along @ at) ** 2)
+    return float(np.sqrt(squares))
+
+
+def _brightest(project: Project, singles: dict[str, Layer], gains: dict[str, Rgb | None]) -> list[Layer]:
+    """Return the layers of single ghosts that are wanted, with what rules make of them; the brightest first."""
+    (width, height), (across, down) = project.camera.size_px, project.camera.sensor
+    area = across * down / (width * height)
+    kept = []
+    for name, layer in singles.items():
+        gain = gains.get(name.removeprefix("ghost."), (1.0, 1.0, 1.0))
+        if gain is not None:
+            pixels = np.asarray(layer.pixels * np.array(gain, dtype=np.float32))
+            flux = float((pixels.astype(np.float64) @ _LUMINANCE).sum()) * area
+            kept.append(replace(layer, pixels=pixels, about={"flux_mm2": flux}))
+    kept.sort(key=lambda layer: -float(layer.about["flux_mm2"]))
+    return kept[: project.output.brightest]
+
+
+def _summary(
+    project: Project, flare: MeasuredFlare, seen: Sequence[_Seen], gains: dict[str, Rgb | None]
+) -> dict[str, Any]:
+    (width, height), (across, down) = project.camera.size_px, project.camera.sensor
+    model = flare.model
+    muted = sum(gain is None for gain in gains.values())
+    return {
+        "lens": flare.name,
+        "measured": True,
+        "efl_mm": efl_mm(project, model),
+        "f_number": model.reference.f_number if project.f_number is None else project.f_number,
+        "size_px": [width, height],
+        "sensor_mm": [across, down],
+        "quality": "measured",
+        "physical": project.art.physical or not (gains or project.art.gain),
+        "lights": [
+            {
+                "name": one.light.name,
+                "field_deg": list(one.light.field_deg),
+                "constellation_deg": one.constellation_deg,
+                "roll_deg": one.roll_deg,
+                **({"visible": one.part} if one.part < 1.0 else {}),
+                "direct_position_mm": [
+                    (one.place_px[0] - 0.5 * width) * across / width, (0.5 * height - one.place_px[1]) * down / height,
+                ],
+            }
+            for one in seen
+        ],
+        "ghosts": {"known": len(model.ghosts), "muted": muted},
+    }  # fmt: skip
+
+
+def efl_mm(project: Project, model: GhostModel) -> float:
+    """Return the focal length of a measured flare, mm, for a sensor of the project's width."""
+    return model.focal_px * project.camera.sensor[0] / model.size_px[0]
+
+
+def _remarks(project: Project, flare: MeasuredFlare, seen: Sequence[_Seen], total: Layer) -> tuple[str, ...]:
+    told = [UNIT]
+    if flare.model.to_rec709 is None:
+        told.append(OWN_COLOURS)
+    if any(one.light.spectrum != D65() for one in seen):
+        told.append(TINTED)
+    if not project.output.starburst:
+        told.append(LIGHT_ITSELF)
+    if not total.pixels.any():
+        told.append(BLACK if any(one.part > 0.0 for one in seen) else HIDDEN)
+    return tuple(told)
+
+
+__all__ = [
+    "MeasuredFlare", "check_measured", "efl_mm", "flare_of", "is_measured", "render_any", "render_measured",
+]  # fmt: skip
