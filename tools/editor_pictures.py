@@ -1,4 +1,7 @@
-"""Make the pictures of docs/editor.md: `python tools/editor_pictures.py [FOLDER]`. Needs the extra e2e and Chromium."""
+"""Make the pictures of docs/editor.md: `python tools/editor_pictures.py [FOLDER [MODEL]]`.
+
+With a ghost model the picture of a measured flare alone, for no model ships. Needs the extra e2e and Chromium.
+"""
 
 from __future__ import annotations
 
@@ -100,13 +103,24 @@ def panels(tab: Tab, folder: Path) -> None:
     shoot(tab, folder / "editor-keys.jpg")
 
 
+def measured(tab: Tab, folder: Path) -> None:
+    """Choose a ghost of a measured flare."""
+    tab.page.mouse.click(*tab.at(0.36, 0.55))
+    tab.until("flarewright.ghost && flarewright.view.outline")
+    tab.tab("ghosts")
+    tab.rest()
+    shoot(tab, folder / "editor-measured.jpg")
+
+
 def main() -> None:
     """Start an editor of its own, and leave nothing behind but the pictures."""
     folder = Path(sys.argv[1]) if len(sys.argv) > 1 else ROOT / "docs" / "images"
+    model = sys.argv[2:3]
     with tempfile.TemporaryDirectory() as state, browser() as chrome:
-        editor = Editor(state)
+        editor = Editor(state, *model)
         try:
-            panels(Tab(chrome.new_page(viewport={"width": 1280, "height": 720}), editor), folder)
+            visit = measured if model else panels
+            visit(Tab(chrome.new_page(viewport={"width": 1280, "height": 720}), editor), folder)
         finally:
             editor.end()
 

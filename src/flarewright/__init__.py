@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from .errors import ProjectError as ProjectError
     from .io.exr import write_exr as write_exr
     from .io.project_file import read_project as read_project
+    from .measure.rendering import render_measured as render_measured
     from .model import D65 as D65
     from .model import Art as Art
     from .model import AsLens as AsLens
@@ -71,6 +72,7 @@ _HOMES = {
     ),
     ".io.exr": ("write_exr",),
     ".io.project_file": ("read_project",),
+    ".measure.rendering": ("render_measured",),
     ".render.analysis": ("ghosts", "paraxial"),
     ".render.prepare": ("load_lens",),
     ".render.render": ("Rendering",),

@@ -267,6 +267,8 @@ def test_the_command_renders_it_and_its_project(project, tmp_path, capfd, monkey
     (tmp_path / "shot.toml").write_text(project_text(muted, folder=tmp_path), "utf-8")
     assert 'lens = "model.json"' in (tmp_path / "shot.toml").read_text("utf-8")
     assert read_project("shot.toml") == muted
+    assert run(["project", "init", "model.json", "--light", f"{x},{y}", "-o", "new.toml"]) == 0
+    assert read_project("new.toml") == project.replace(lens="model.json", camera=Camera(size_px=(160, 90)))
     assert run(["project", "check", "shot.toml"]) == 0
     assert "model.json at f/2, 1 light, 160x90 pixels, measured" in capfd.readouterr().out
     assert run(["render", "--project", "shot.toml", "-o", "again.exr"]) == 0

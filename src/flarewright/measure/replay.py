@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import lru_cache
 from typing import Literal, cast
@@ -231,8 +232,12 @@ def draw_packed(
         there = _there(model, meshes, constellation_deg)
         numbers = posed_numbers(meshes, numbers, constellation_deg, sigma)
         planes = np.zeros((3, height, width + 1))
-        for m in range(3):
-            draw_ghosts(numbers[m], counts[m], there, sigma, placed, planes[m])
+        # colours know nothing of each other, and neither kernel nor interpreter holds one up for another
+        with ThreadPoolExecutor(3) as pool:
+            for drawn in [
+                pool.submit(draw_ghosts, numbers[m], counts[m], there, sigma, placed, planes[m]) for m in range(3)
+            ]:
+                drawn.result()
         sum_into(planes, pixels)
     for ghost, part in zip(curves, _there(model, curves, constellation_deg), strict=True):
         if part > 0.0:
