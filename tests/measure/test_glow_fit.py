@@ -75,6 +75,47 @@ def test_star_has_its_spikes_direction_width_and_law():
     assert np.abs(got / expected - 1.0).max() < 0.4
 
 
+def off(found, truth, rings):
+    """Return by how many stated standard deviations a law of the distance misses the truth, green."""
+    radius = np.array(found.radius_px)
+    true = (halo_radiance if isinstance(truth, Halo) else star_radiance)(
+        truth, radius * np.cos(np.radians(11.0)), radius * np.sin(np.radians(11.0))
+    )
+    missed = np.array(found.radiance) - true
+    return np.abs(missed / np.array(found.uncertainty))[rings, 1]
+
+
+def test_halo_and_star_are_as_far_off_as_they_say():
+    some = shown(star=False)
+    halo = fit_halo(some, [view.pixels for view in some])
+    assert len(halo.uncertainty) == len(halo.radiance)
+    # the last one stands for all beyond
+    assert np.quantile(off(halo, HALO, slice(0, -1)), 0.9) < 3.0
+    # and they are no excuse: a seventh of the light at most, where it is even all around
+    assert (np.array(halo.uncertainty) < 0.15 * np.array(halo.radiance))[:-1].all()
+    some = shown(star=True)
+    star = fit_star(register(some, [view.pixels for view in some], 0.5))
+    assert len(star.uncertainty) == len(star.radiance)
+    # near the light, where spikes run together, it is badly known and says so; far off, well
+    seen = np.array(star.radius_px) < 90.0
+    assert np.median(off(star, STAR, seen)) < 3.0
+    part = np.array(star.uncertainty)[seen, 1] / np.array(star.radiance)[seen, 1]
+    assert part[0] > 0.3
+    assert part[-1] < 0.05
+
+
+def test_an_uneven_halo_is_known_less_well():
+    some = shown(star=False)
+    even = fit_halo(some, [view.pixels for view in some])
+    lopsided = []
+    for view in some:
+        x, y = offsets(view.light_px, SIZE, 1.0)
+        light = 1.0 + 0.3 * np.cos(np.arctan2(y, x))
+        lopsided.append(replace(view, pixels=(view.pixels * light[..., None]).astype(np.float32)))
+    uneven = fit_halo(lopsided, [view.pixels for view in lopsided])
+    assert np.median(np.array(uneven.uncertainty) / np.array(even.uncertainty)) > 1.5
+
+
 def test_light_along_the_line_of_ghosts_makes_no_star_of_two_spikes():
     some = shown(star=True)
     known = register(some, [view.pixels for view in some], 0.5)

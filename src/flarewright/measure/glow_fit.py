@@ -25,6 +25,9 @@ LOW = 0.3
 # the halo's pictures are halved so often: noise would pull a low quantile down
 _HALVINGS = 2
 _RINGS = 20
+# parts of a ring whose difference tells how well its light is known, and standard deviations of a normal law by its
+# median distance from the median
+_SECTORS, _MAD = 12, 1.4826
 # rows of the registered picture that are sorted at once
 _BAND = 16
 # there is no more halo than anything shows: the part of a ring that may be darker, the part of the views that may
@@ -47,6 +50,8 @@ _MOST_BLADES = 20
 # how strong halo and star are is learned from about so many pixels of a view, in so many rounds; the part of them that
 # their laws may miss
 _SAMPLES, _ROUNDS, _GLOW_ERROR = 8000, 12, 0.1
+# quantile of the directions that is taken for light between spikes
+_GAPS = 0.1
 # part of the noise that halo or star must reach somewhere for their strength to be asked
 _SEEN = 0.1
 
@@ -149,20 +154,41 @@ def fit_halo(
     right, up = known.polar()
     radius = np.hypot(right, up)
     seen = shared_out(_around, views, pool=pool)
+    sector = np.floor(_SECTORS * (np.arctan2(up, right) / (2.0 * np.pi) + 0.5)).astype(np.int64) % _SECTORS
     far, side = float(radius.max()), known.side
-    middles, levels = [], []
+    middles, levels, errors = [], [], []
     for inner, outer in pairwise(np.geomspace(side, far + side, _RINGS + 1)):
-        ring = known.picture[(radius >= inner) & (radius < outer)]
-        ring = ring[np.isfinite(ring).all(axis=1)]
+        here = (radius >= inner) & (radius < outer) & all_known(known.picture)
+        ring = known.picture[here]
         if len(ring) >= 4:
+            middle = np.median(ring, axis=0)
+            level = np.minimum(middle, _darkest(seen, inner, outer))
             middles.append(float(np.sqrt(inner * outer)))
-            levels.append(np.minimum(np.median(ring, axis=0), _darkest(seen, inner, outer)))
+            levels.append(level)
+            # where darker places tell, what lies beside them does not
+            errors.append(np.hypot(_differ(ring, sector[here]), middle - level))
     if len(middles) < 3 or not max(level.max() for level in levels) > 0.0:
         return None
     # the outermost ring's level holds to the corners
     middles.append(2.0 * far)
-    levels.append(levels[-1])
-    return Halo(radius_px=tuple(middles), radiance=tuple(_rgb(level) for level in levels))
+    return Halo(
+        radius_px=tuple(middles), radiance=tuple(_rgb(level) for level in (*levels, levels[-1])),
+        uncertainty=tuple(_rgb(error) for error in (*errors, errors[-1])),
+    )  # fmt: skip
+
+
+def _differ(ring: Pixels, sector: NDArray[np.int64]) -> Floats:
+    """Return the standard error of a ring's median by how far its sectors' medians differ, shape (3,)."""
+    each = [np.median(ring[sector == k], axis=0) for k in range(_SECTORS) if np.any(sector == k)]
+    return _error_of_median(np.array(each))
+
+
+def _error_of_median(values: Floats) -> Floats:
+    """Return the standard error of a median by the spread of what it is taken of, along the first axis."""
+    if len(values) < 2:
+        return np.asarray(np.abs(values[0]))
+    spread = _MAD * np.nanmedian(np.abs(values - np.nanmedian(values, axis=0)), axis=0)
+    return np.asarray(np.sqrt(0.5 * np.pi / len(values)) * spread)
 
 
 @dataclass(frozen=True)
@@ -340,7 +366,12 @@ def _fit_star(known: Registered) -> Star | None:
     if np.quantile(standing, _HIDDEN, method="lower") < _SPIKY:
         return None
     # a ridge's height over what lies between, and its width by the light across it
-    height = np.nan_to_num(np.nanmedian(np.nanmax(ring[:, near], axis=2), axis=1) - np.nanmedian(ring, axis=1))
+    tops = np.nanmax(ring[:, near], axis=2)
+    low = np.nanmedian(ring, axis=1)
+    height = np.nan_to_num(np.nanmedian(tops, axis=1) - low)
+    # near the light spikes fill the gaps between them, and what lies there is no more than light without them
+    filled = low - np.nanquantile(ring, _GAPS, axis=1)
+    error = np.nan_to_num(np.hypot(_error_of_median(tops.swapaxes(0, 1)), filled), nan=np.inf)
     step = 2.0 * np.pi / _DIRECTIONS
     half = max(int(0.4 * _DIRECTIONS / spikes), 3)
     across = (ridges[:, None] + np.arange(-half, half + 1)) % _DIRECTIONS
@@ -352,9 +383,14 @@ def _fit_star(known: Registered) -> Star | None:
     beyond = height[-1] * np.exp(np.minimum(slope, -1.0) * np.log(end / radii[-1]))
     radius = (*map(float, radii[::3]), float(radii[-1]), float(end))
     levels = [_rgb(each) for each in (*height[::3], height[-1], beyond)]
+    # beyond, at least as badly known as where it was seen last
+    part = np.minimum(error[-1] / np.maximum(height[-1], 1e-30), 1.0)
+    errors = [_rgb(np.minimum(each, top)) for each, top in zip(error, height, strict=True)]
+    errors = [*errors[::3], errors[-1], _rgb(np.maximum(part, 0.5) * beyond)]
     return Star(
         spikes=spikes, first_deg=float(np.degrees(first)) % (360.0 / spikes),
         width_px=max(float(np.nanmedian(widths)), 0.4), radius_px=radius, radiance=tuple(levels),
+        uncertainty=tuple(errors),
     )  # fmt: skip
 
 

@@ -218,9 +218,11 @@ def _by_constellation(what: str, constellation_deg: Sequence[float]) -> None:
         raise ValueError(f"the constellations of {what} must rise")
 
 
-def _along_radii(what: str, radius_px: Sequence[float], radiance: Sequence[Rgb3]) -> None:
+def _along_radii(what: str, radius_px: Sequence[float], radiance: Sequence[Rgb3], uncertainty: Sequence[Rgb3]) -> None:
     if len(radius_px) != len(radiance):
         raise ValueError(f"{what} needs one radiance for each radius, not {len(radiance)} for {len(radius_px)}")
+    if uncertainty and len(uncertainty) != len(radiance):
+        raise ValueError(f"{what} needs an uncertainty for each radiance or none, not {len(uncertainty)}")
     if radius_px[0] <= 0.0:
         raise ValueError(f"{what}'s radius_px must be above 0")
     if any(b <= a for a, b in pairwise(radius_px)):
@@ -236,6 +238,8 @@ class Halo(Frozen):
         Rising distances from the light's image.
     radiance : tuple of Rgb
         At those distances; in between the logarithms are interpolated, beyond the last it is 0.
+    uncertainty : tuple of Rgb
+        Standard deviations of `radiance`, by how far directions differ; empty: not known.
     strength : tuple of (float, float)
         Rising constellations, degrees, and how much of the halo there is; linear between them; empty: 1 throughout.
     even : tuple of (float, Rgb)
@@ -245,12 +249,13 @@ class Halo(Frozen):
 
     radius_px: tuple[float, ...] = Field(min_length=2)
     radiance: tuple[Rgb3, ...]
+    uncertainty: tuple[Rgb3, ...] = ()
     strength: tuple[tuple[float, float], ...] = ()
     even: tuple[tuple[float, Rgb3], ...] = ()
 
     @model_validator(mode="after")
     def _rising(self) -> Halo:
-        _along_radii("a halo", self.radius_px, self.radiance)
+        _along_radii("a halo", self.radius_px, self.radiance, self.uncertainty)
         _by_constellation("a halo's strength", [angle for angle, _ in self.strength])
         _by_constellation("a halo's even", [angle for angle, _ in self.even])
         return self
@@ -271,6 +276,8 @@ class Star(Frozen):
         Rising distances from the light's image.
     radiance : tuple of Rgb
         On a spike's ridge at those distances, as in `Halo`.
+    uncertainty : tuple of Rgb
+        Standard deviations of `radiance`, by how far spikes differ; empty: not known.
     strength : tuple of (float, float)
         As in `Halo`: the lens' rims shade the light's image, and with it the star.
     """
@@ -280,11 +287,12 @@ class Star(Frozen):
     width_px: float = Field(gt=0.0)
     radius_px: tuple[float, ...] = Field(min_length=2)
     radiance: tuple[Rgb3, ...]
+    uncertainty: tuple[Rgb3, ...] = ()
     strength: tuple[tuple[float, float], ...] = ()
 
     @model_validator(mode="after")
     def _rising(self) -> Star:
-        _along_radii("a star", self.radius_px, self.radiance)
+        _along_radii("a star", self.radius_px, self.radiance, self.uncertainty)
         _by_constellation("a star's strength", [angle for angle, _ in self.strength])
         return self
 
