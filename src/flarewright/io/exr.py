@@ -14,9 +14,7 @@ corner, for which `full_windows=True` writes every layer at the size of the pict
 from __future__ import annotations
 
 import os
-import sys
 from collections.abc import Mapping, Sequence
-from contextlib import redirect_stdout
 from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
@@ -30,6 +28,7 @@ from ..errors import FlarewrightError, OutputError
 from ..model.camera import Colorspace
 from ..model.layer import Layer
 from .atomic import write_atomically
+from .quiet import quiet
 
 HALF_MAX = 65504.0
 """The largest number that 16-bit floating point holds."""
@@ -199,7 +198,7 @@ def _opened(path: str | PathLike[str]) -> Any:
     import OpenEXR
 
     try:
-        with _ONE_READS, redirect_stdout(sys.stderr):
+        with _ONE_READS, quiet():
             file = OpenEXR.File(str(path), separate_channels=True)
             whole = len(OpenEXR.File(str(path), header_only=True).parts)
     except RuntimeError as error:

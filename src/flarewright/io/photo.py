@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from ..errors import FlarewrightError, OutputError, optional
 from ..model.capture import Matrix3
+from .quiet import quiet
 
 _RAW = (".dng", ".cr2", ".cr3", ".nef", ".arw", ".raf", ".rw2", ".orf", ".pef", ".srw", ".raw", ".crw", ".nrw", ".3fr")
 _TIFF = (".tif", ".tiff")
@@ -307,7 +308,7 @@ def _to_rec709(raw: Any) -> Matrix3 | None:
 @contextmanager
 def _raw(rawpy: Any, path: Path) -> Iterator[Any]:
     try:
-        with rawpy.imread(str(path)) as raw:
+        with quiet(), rawpy.imread(str(path)) as raw:
             yield raw
     except (rawpy.LibRawError, OSError, ValueError) as error:
         raise FlarewrightError(f"{path} cannot be read as a RAW file ({_short(error)}): copy it again") from None
