@@ -5,7 +5,8 @@ import pytest
 
 from flarewright.kernels.measure_changes import draw_with_changes
 from flarewright.kernels.measure_edges import sum_along_rows, sum_changes_along_rows
-from flarewright.kernels.measure_mesh import draw_ghosts, window_of
+from flarewright.kernels.measure_ghosts import draw_ghosts
+from flarewright.kernels.measure_mesh import window_of
 from flarewright.kernels.measure_pupil import BELOW, BLADES, FIRST_DISC, FIRST_G, FIRST_I, TURN
 from flarewright.measure.numbers import NUMBERS
 

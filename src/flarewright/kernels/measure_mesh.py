@@ -12,12 +12,11 @@ import numpy as np
 
 from ._jit import borrowing, compiled, inner
 from .measure_edges import add_edge
-from .measure_lateral import beyond, draw_rims, shifts_of, wavelengths_of
+from .measure_lateral import beyond, shifts_of
 from .measure_pupil import (
     BLADES,
     FIRST_G,
     FIRST_I,
-    LATERAL,
     SOFT,
     TURN,
     at_field,
@@ -41,8 +40,6 @@ _LEAST_RINGS, _MOST_RINGS = 3, 16
 _EVEN, _STEP = 4.0, 0.05
 _ROUND, _AROUND = 16, 16
 _RINGS = (2, 3, 4, 6, 8, 12, 16)
-# of a replay's soft ghosts: from how many standard deviations of softness a radius is wide, and what weight is none
-_WIDE, _FAINT = 12.0, 5e-4
 
 
 @inner
@@ -148,7 +145,7 @@ def join(spots, span, densities):
 
 
 @inner
-def _cells(parameters, sigma, pupil, spots, span, densities):
+def fill_cells(parameters, sigma, pupil, spots, span, densities):
     """Fill what `fill_densities` and `join` would: light of a cell's part of the pupil over its area on the sensor."""
     rings, spokes = densities.shape[0], densities.shape[1]
     light, wedge = np.empty(6), np.empty(spokes)
@@ -260,7 +257,7 @@ def draw_mesh(spots, densities, span, fine, rim, left, top, width, height, plane
 
 
 @borrowing
-def _least_radius(spots):
+def least_radius(spots):
     """Return how far the nearest point of a mesh's outline is from its middle."""
     rings = spots.shape[0] - 1
     least = 1e300
@@ -268,47 +265,6 @@ def _least_radius(spots):
         dx, dy = spots[rings, j, 0] - spots[0, 0, 0], spots[rings, j, 1] - spots[0, 0, 1]
         least = min(least, dx * dx + dy * dy)
     return sqrt(least)
-
-
-@inner
-def _draw_soft_rim(spots, densities, variance, shifts, far, width, height, plane):
-    """Draw an outline many times, moved outwards and inwards, by the weights of its spread.
-
-    Where it is softest by whole pixels; `shifts` and `far` as `measure_lateral.shifts_of` fills and returns them.
-    """
-    rings, spokes = densities.shape[0], densities.shape[1]
-    most = variance + far * far
-    taps = np.empty(reach_of(most) + 1)
-    taps_of(most, taps)
-    # the unit normals of the sides, and of each corner the way that moves both of its sides by one
-    sides, away = np.empty((spokes, 2)), np.zeros((spokes, 4))
-    turn = 0.0
-    for j in range(spokes):
-        k = j + 1 if j + 1 < spokes else 0
-        ax, ay, bx, by = spots[rings, j, 0], spots[rings, j, 1], spots[rings, k, 0], spots[rings, k, 1]
-        turn += ax * by - ay * bx
-        length = max(sqrt((bx - ax) ** 2 + (by - ay) ** 2), 1e-12)
-        sides[j, 0], sides[j, 1] = (by - ay) / length, (ax - bx) / length
-    if turn < 0.0:
-        sides *= -1.0
-    for j in range(spokes):
-        before = j - 1 if j > 0 else spokes - 1
-        x, y = sides[j, 0] + sides[before, 0], sides[j, 1] + sides[before, 1]
-        stretch = 2.0 / max(x * x + y * y, 1.0)
-        if far > 0.0:
-            outwards = (x * shifts[j, 0] + y * shifts[j, 1]) ** 2 / max(x * x + y * y, 1.0)
-            stretch *= sqrt(min((variance + outwards) / most, 1.0))
-        away[j, 0], away[j, 1] = stretch * x, stretch * y
-    # what is too faint to be drawn is shared by the others: the steps shall add up to the whole
-    last = 0
-    total = taps[0]
-    while last + 1 < taps.size and taps[last + 1] >= _FAINT:
-        last += 1
-        total += 2.0 * taps[last]
-    moves = np.empty((2 * last + 1, 2))
-    for n in range(-last, last + 1):
-        moves[n + last, 0], moves[n + last, 1] = n, taps[abs(n)] / total
-    draw_rims(spots, away, moves, densities, 0, 0, width, height, plane)
 
 
 @inner
@@ -361,70 +317,6 @@ def grain(parameters, disc_count, sigma, frame, fine):
     return spokes, few, span
 
 
-@compiled
-def draw_ghosts(parameters, disc_counts, visible, sigma, frame, plane):
-    """Draw ghosts of one channel on one plane, as a replay needs them.
-
-    Parameters
-    ----------
-    parameters : ndarray, shape (G, N), float64
-        Padded; see `measure_pupil`.
-    disc_counts : ndarray, shape (G,), int64
-    visible : ndarray, shape (G,), float64
-        Gain of each ghost at this field; 0 leaves it out.
-    sigma : float
-        The field over the model's largest.
-    frame : ndarray, shape (5,)
-        Axis x and y in pixels, cosine and sine of the roll, pixels per pixel of the model.
-    plane : ndarray, shape (H, W + 1), float64
-        Added to: differences along rows (`measure_edges.sum_along_rows`), flux per pixel.
-    """
-    height, width = plane.shape[0], plane.shape[1] - 1
-    none = np.empty((0, 0, 0, 0))
-    for g in range(parameters.shape[0]):
-        if visible[g] == 0.0:
-            continue
-        spokes, rings, span = grain(parameters[g], disc_counts[g], sigma, frame, False)
-        if spokes == 0:
-            continue
-        pupil, spots = np.empty((rings + 1, spokes, 2)), np.empty((rings + 1, spokes, 2))
-        if not fill_mesh(parameters[g], disc_counts[g], sigma, frame, spokes, rings, False, pupil, none):
-            continue
-        land(parameters[g], pupil, sigma, frame, spots)
-        densities = np.empty((rings, spokes, 2))
-        if span > 0:
-            _cells(parameters[g], sigma, pupil, spots, span, densities)
-        else:
-            fill_densities(parameters[g], sigma, pupil, spots, densities)
-        # the model's irradiance is per pixel of the model: a finer picture keeps it
-        densities *= visible[g] * frame[4] * frame[4]
-        variance = parameters[g, SOFT] * frame[4] * frame[4]
-        shifts = np.empty((spokes, 4))
-        far = shifts_of(parameters[g], sigma, frame, pupil, shifts)
-        if not (variance > 0.0 or far > 0.0):
-            draw_mesh(spots, densities, span, False, True, 0, 0, width, height, plane)
-            continue
-        even = parameters[g, LATERAL + 2] == 0.0 and parameters[g, LATERAL + 3] == 0.0
-        if even and span > 0 and _least_radius(spots) > _WIDE * sqrt(variance + far * far):
-            # without folds, and wide: only the outline's step is steep enough to be seen spread
-            draw_mesh(spots, densities, span, False, False, 0, 0, width, height, plane)
-            _draw_soft_rim(spots, densities, variance, shifts, far, width, height, plane)
-            continue
-        # spread alone, and then laid over the others
-        left, top, w, h = _box(spots, reach_of(variance) + beyond(far), width, height)
-        if w == 0:
-            continue
-        own = np.zeros((h, w + 1))
-        draw_mesh(spots, densities, span, False, far == 0.0, left, top, w, h, own)
-        if far > 0.0:
-            draw_rims(spots, shifts, wavelengths_of(far), densities, left, top, w, h, own)
-        if variance > 0.0:
-            soften_mesh(own.reshape((h, w + 1, 1)), variance, spots, beyond(far), left, top)
-        for y in range(h):
-            for c in range(w):
-                plane[top + y, left + c] += own[y, c]
-
-
 @inner
 def _landed(parameters, disc_count, sigma, frame):
     """Return a fine mesh's pupil points and where they land, (rings + 1, spokes, 2) each; of a shut ghost none."""
@@ -445,7 +337,7 @@ def touched(parameters, disc_count, sigma, frame, width, height):
     if spots.shape[0] == 0:
         return 0, 0, 0, 0
     far = shifts_of(parameters, sigma, frame, pupil, np.empty((spots.shape[1], 4)))
-    return _box(spots, reach_of(parameters[SOFT] * frame[4] * frame[4]) + beyond(far), width, height)
+    return box_of(spots, reach_of(parameters[SOFT] * frame[4] * frame[4]) + beyond(far), width, height)
 
 
 @compiled
@@ -488,7 +380,7 @@ def parting_of(parameters, disc_count, sigma, frame):
     pupil, spots = _landed(parameters, disc_count, sigma, frame)
     if spots.shape[0] == 0:
         return 0.0
-    return shifts_of(parameters, sigma, frame, pupil, np.empty((spots.shape[1], 4))) / max(_least_radius(spots), 1e-9)
+    return shifts_of(parameters, sigma, frame, pupil, np.empty((spots.shape[1], 4))) / max(least_radius(spots), 1e-9)
 
 
 @inner
@@ -503,7 +395,7 @@ def _bounds(spots):
 
 
 @inner
-def _box(spots, reach, width, height):
+def box_of(spots, reach, width, height):
     """Return left, top, width and height of the pixels that a mesh touches when it is spread; width 0: none."""
     x0, y0, x1, y1 = _bounds(spots)
     if not (x1 > -reach and y1 > -reach and x0 < width + reach and y0 < height + reach):

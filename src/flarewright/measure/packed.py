@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernels.measure_mesh import draw_ghosts
+from ..kernels.measure_ghosts import draw_ghosts
 from ..model.ghost_model import AberrationGhost, BezierGhost, Curves, GhostModel
 from .curves import pose_at, posed
 from .numbers import NUMBERS, channel_numbers

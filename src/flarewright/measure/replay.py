@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ..errors import FlarewrightError
 from ..kernels.measure_bezier import BORDER, bezier_window, draw_bezier
 from ..kernels.measure_edges import sum_into
-from ..kernels.measure_mesh import draw_ghosts
+from ..kernels.measure_ghosts import draw_ghosts
 from ..model.ghost_model import AberrationGhost, BezierGhost, GhostModel
 from ..model.layer import Layer
 from ..render.compose import beauty
