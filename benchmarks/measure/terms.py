@@ -9,13 +9,14 @@ tightest), and the part of its light that reaches the sensor for the intensity. 
 iris, at four constellations and more: of one that rims cut to a rest, the numbers of the whole pupil are not told.
 
 How far from its rays each form of the map is that a ghost may have is told beside them: f and g polynomials of first or
-second order, alone or over 1 + b v + c w.
+second order, alone or over 1 + b v + c w; and by how much blue and red differ from green, by size (`measure.colours`).
 """
 
 from __future__ import annotations
 
 import argparse
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from benchmarks.measure.shoot import setup_of
@@ -39,6 +40,8 @@ _LEAST = 4
 # of the squares, what keeps numbers that the rays do not tell at 0
 _RIDGE = 1e-6
 _PERCENTILES = (50, 75, 90, 95)
+# of a ghost in a picture 720 pixels wide: colours are told by size
+_SIZES = (0.0, 6.0, 20.0, 60.0, 150.0, np.inf)
 # forms of the map: how many terms f and g have each, and which of u, v, w stand in what they are divided by
 _FORMS = {
     "first order": (4, ()), "second order": (10, ()), "first order over v, w": (4, (2, 3)),
@@ -80,15 +83,15 @@ class _Seen:
     light: Floats
 
 
-def whole_ghosts(setup: Setup) -> dict[str, _Rays]:
-    """Trace the rays of a lens' whole ghosts."""
+def whole_ghosts(setup: Setup, colour: float = 0.5) -> dict[str, _Rays]:
+    """Trace the rays of a lens' whole ghosts, from 0 for the shortest wavelength to 1 for the longest."""
     seen: dict[str, list[_Seen]] = {}
     largest, per_mm = max(setup.angles_deg), setup.size_px[0] / setup.sensor_width_mm
     for pose in poses(setup)[_EVERY // 3 :: _EVERY]:
         settled = settle(project_of(setup, pose, "passes"))
         shot = make_shots(settled, make_opening(settled, None))[0]
         for path in ghost_paths(settled.lens):
-            rays = rays_of(shot, path, _RAYS)
+            rays = rays_of(shot, path, _RAYS, colour)
             if rays is not None and rays.passes.any():
                 open_ = rays.passes
                 seen.setdefault(path.name, []).append(
@@ -169,6 +172,16 @@ def spread(numbers: Floats, width: int) -> dict[str, Floats]:
     return told
 
 
+def differences(setup: Setup) -> Floats:
+    """Return green's size and by how much f and g of blue and red differ from green's, pixels, shape (N, 21)."""
+    blue, green, red = ({name: terms_of(rays) for name, rays in whole_ghosts(setup, at).items()} for at in (0, 0.5, 1))
+    told = [
+        np.concatenate([green[name][10:11], other[name][:20] - green[name][:20]])
+        for other in (blue, red) for name in sorted(green.keys() & other.keys())
+    ]  # fmt: skip
+    return np.abs(np.array(told).reshape(-1, 21))
+
+
 def main() -> None:
     """Print the percentiles of each number over the paths of all lenses."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.measure.terms", description=__doc__)
@@ -187,6 +200,17 @@ def main() -> None:
         told |= {f"  by {TERMS[k]}": np.abs([each[n] for each in divides]) for n, k in enumerate(below)}
         for row, values in told.items():
             print(f"{row:32}", "  ".join(f"{value:7.3f}" for value in np.percentile(values, _PERCENTILES)))
+
+    apart = np.concatenate([differences(setup) for setup in setups])
+    # as many pixels as in a picture 720 wide
+    apart *= 720.0 / setups[0].size_px[0]
+    for least, most in pairwise(_SIZES):
+        some = apart[(apart[:, 0] >= least) & (apart[:, 0] < most)]
+        if len(some):
+            print(f"colours of {len(some)} ghosts of {least:g} to {most:g} px")
+        for k in range(20 if len(some) else 0):
+            name = f"  {'fg'[k // 10]} {TERMS[k % 10]}, px"
+            print(f"{name:24}", "  ".join(f"{value:7.3f}" for value in np.percentile(some[:, 1 + k], _PERCENTILES)))
 
 
 if __name__ == "__main__":

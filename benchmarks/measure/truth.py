@@ -142,8 +142,11 @@ class PathRays:
     weight: Floats
 
 
-def rays_of(shot: Shot, path: LightPath, count: tuple[int, int]) -> PathRays | None:
-    """Trace rays on a grid, row by row along the light's plane; None where too few reach the sensor to tell a form."""
+def rays_of(shot: Shot, path: LightPath, count: tuple[int, int], colour: float = 0.5) -> PathRays | None:
+    """Trace rays on a grid, row by row along the light's plane; None where too few reach the sensor to tell a form.
+
+    `colour` is from 0 for the shortest wavelength to 1 for the longest.
+    """
     tilt, radius = shot.incidence.tilt, shot.opening.radius
     region = find_region(shot.packed, path, tilt, radius, shot.view_radius)
     if region is None:
@@ -151,7 +154,8 @@ def rays_of(shot: Shot, path: LightPath, count: tuple[int, int]) -> PathRays | N
     x0, x1, y0, y1 = region.box
     across, along = np.linspace(x0, x1, count[0]), np.linspace(y0, y1, count[1])
     px, py = (each.ravel() for each in np.meshgrid(across, along))
-    rays = trace_points(shot.packed, len(shot.packed.wavelengths_nm) // 2, path, tilt, np.stack([px, py], axis=1))
+    wavelength = round(colour * (len(shot.packed.wavelengths_nm) - 1))
+    rays = trace_points(shot.packed, wavelength, path, tilt, np.stack([px, py], axis=1))
     stops = rays[:, STOP_X:].reshape(len(rays), -1, 2)
     at_stop = np.hypot(stops[..., 0], stops[..., 1]).max(axis=1)
     passes = (rays[:, ALIVE] > 0.5) & (rays[:, REL] <= 1.0) & (at_stop <= radius)

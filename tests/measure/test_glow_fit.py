@@ -38,7 +38,8 @@ def test_halo_is_what_stays_and_ghosts_are_not_in_it():
     found = fit_halo(some, [view.pixels for view in some])
     radius = np.array([12.0, 25.0, 60.0, 110.0])
     expected, got = (halo_radiance(each, radius, 0.0 * radius) for each in (HALO, found))
-    assert np.abs(got / expected - 1.0).max() < 0.15
+    # the darkest places of a ring are no darker than its own fall from border to border makes them
+    assert np.abs(got / expected - 1.0).max() < 0.06
 
 
 def test_ghosts_that_go_along_with_the_light_are_in_neither_halo_nor_star():
@@ -91,8 +92,10 @@ def test_halo_and_star_are_as_far_off_as_they_say():
     assert len(halo.uncertainty) == len(halo.radiance)
     # the last one stands for all beyond
     assert np.quantile(off(halo, HALO, slice(0, -1)), 0.9) < 3.0
-    # and they are no excuse: a seventh of the light at most, where it is even all around
-    assert (np.array(halo.uncertainty) < 0.15 * np.array(halo.radiance))[:-1].all()
+    # and they are no excuse: some hundredths of the light, where it is even all around
+    part = np.array(halo.uncertainty) / np.array(halo.radiance)
+    assert part[:-1].max() < 0.25
+    assert np.median(part) < 0.03
     some = shown(star=True)
     star = fit_star(register(some, [view.pixels for view in some], 0.5))
     assert len(star.uncertainty) == len(star.radiance)

@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from benchmarks.measure.shoot import setup_of
-from benchmarks.measure.terms import TERMS, mapped_by, terms_of, whole_ghosts
+from benchmarks.measure.terms import TERMS, differences, mapped_by, terms_of, whole_ghosts
 
+from flarewright.measure.colours import ties
 from flarewright.measure.fit import priors
 from flarewright.measure.numbers import NUMBERS
 from flarewright.measure.shape import Shape
@@ -42,6 +43,22 @@ def test_aberrations_of_first_order_are_not_expected_to_be_much_larger_than_they
     # f's u, g's u and v, brightness' u and v: what nine in ten do not exceed is not far below
     for k in (1, 11, 12, 21, 22):
         assert np.quantile(traced[:, k], 0.98) > 0.2, k
+
+
+def test_colours_differ_by_what_ties_let_them():
+    """Of blue and red against green: place, size and what changes with the field, within what a fit takes for usual."""
+    apart = differences(setup_of("flektogon-35", WIDTH, 100, 5.6).steady)
+    assert len(apart) > 60
+    over = []
+    for size, *numbers in apart:
+        shape = Shape(np.zeros(NUMBERS))
+        shape.numbers[10] = size
+        over.append(np.array(numbers) * np.sqrt(ties(shape, np.arange(20), WIDTH, 0)))
+    over = np.array(over)
+    for k in (0, 3, 10, 13):
+        # neither tight against most nor so loose that it tells nothing
+        assert np.quantile(over[:, k], 0.6) < 1.5, k
+        assert np.quantile(over[:, k], 0.95) > 0.3, k
 
 
 def test_what_place_and_size_are_divided_by_follows_ghosts_that_terms_do_not(ghosts):

@@ -79,8 +79,8 @@ def read_lens(path: str | Path) -> LensReading | RawLens | RawSequence:
         return read_lens_toml(path)
     if suffix == ".json":
         raise LensError(
-            f"{path} is JSON, which no lens is read from: a measured flare has no prescription, but can be rendered, "
-            "replayed, predicted from, and opened in the editor"
+            f"{path} is JSON, which no lens is read from: a measured flare has no prescription; flarewright render, "
+            "predict and edit take it, and so does render_measured in Python"
         )
     raise LensError(
         f"{path} is not of a kind that can be read: Flarewright reads .toml (its own), .lens and .zmx files"

@@ -15,7 +15,7 @@ from ..model.ghost_model import AberrationGhost, Channel, Curve, Curves, GhostMo
 from ..model.ghost_tracks import GhostTrack, Tracks
 from .curves import Pose
 from .fit import MODEL_ERROR, Fit, cost_of, refine
-from .found import CHANNELS, Found, alone, by_light, exchange, rest_of
+from .found import CHANNELS, Found, alone, by_light, exchange, leading, noise_of, rest_of
 from .normal import inverse
 from .numbers import NUMBERS, Floats, channel_numbers, channel_of
 from .orders import needed_numbers, parabola
@@ -122,10 +122,10 @@ def _fewer(
 ) -> list[Found]:
     """Drop numbers that do not help and fit the others, each ghost against all others, brightest first."""
     out = list(ghosts)
-    rest = [rest_of(out, views, m, pool) for m in range(CHANNELS)]
+    rest, noise = [rest_of(out, views, m, pool) for m in range(CHANNELS)], noise_of(views)
     for done, k in enumerate(by_light(out)):
         old = out[k]
-        new = _smaller(old, fitted_numbers(kept[k]), views, rest, pool)
+        new = _smaller(old, fitted_numbers(kept[k]), views, rest, noise, pool)
         for m in range(CHANNELS):
             exchange(old.shapes[m], new.shapes[m], old, views, rest[m], pool)
         out[k] = new
@@ -146,8 +146,9 @@ def fitted_numbers(ghost: AberrationGhost) -> Indices:
 
 
 def _smaller(
-    ghost: Found, free: Indices, views: Sequence[View], rest: Sequence[list[Pixels]], pool: ThreadPoolExecutor
-) -> Found:
+    ghost: Found, free: Indices, views: Sequence[View], rest: Sequence[list[Pixels]], noise: Floats,
+    pool: ThreadPoolExecutor,
+) -> Found:  # fmt: skip
     width = views[0].size_px[0]
     shown = [alone(ghost, m, views, rest[m], _VIEWS, pool) for m in range(CHANNELS)]
     patches = [patches_of(ghost.shapes[m], shown[m], m) for m in range(CHANNELS)]
@@ -157,19 +158,23 @@ def _smaller(
     fewer = needed_numbers(bowls, free)
     best: list[Fit | None] = [None, None, None]
     shapes = list(ghost.shapes)
-    for m in range(CHANNELS):
+    # the colour that tells most of it first: the others are like it
+    lead = leading(ghost, noise)
+    for m in sorted(range(CHANNELS), key=lambda m: m != lead):
+        like = None if m == lead else shapes[lead]
         before, level = (cost_of(ghost.shapes[m], patches[m], offset=offset) for offset in (True, False))
         for numbers in (fewer, free):
             start = ghost.shapes[m].numbers.copy()
             start[np.setdiff1d(free, numbers)] = 0.0
-            fit = refine(replace(ghost.shapes[m], numbers=start), patches[m], numbers, width=width, steps=10, pool=pool)
+            fewer_numbers = replace(ghost.shapes[m], numbers=start)
+            fit = refine(fewer_numbers, patches[m], numbers, width=width, steps=10, like=like, pool=pool)
             # the parabola may have been too far off: then all numbers stay
             even = cost_of(fit.shape, patches[m], offset=False) <= (1.0 + _UNEVEN) * level
             if even and cost_of(fit.shape, patches[m]) <= before + _WORSE * before + 2.0 * numbers.size:
                 break
         if not even:
             # of a ghost that fills every picture only an even background tells how bright it is
-            fit = refine(ghost.shapes[m], patches[m], free, width=width, steps=10, offset=False, pool=pool)
+            fit = refine(ghost.shapes[m], patches[m], free, width=width, steps=10, offset=False, like=like, pool=pool)
         best[m], shapes[m] = fit, fit.shape
     return replace(ghost, shapes=(shapes[0], shapes[1], shapes[2]), fits=(best[0], best[1], best[2]))
 

@@ -12,6 +12,7 @@ from ..kernels.measure_changes import draw_with_changes
 from ..kernels.measure_edges import sum_along_rows
 from ..kernels.measure_mesh import window_of
 from ..kernels.measure_pupil import BELOW, FIRST_DISC, FIRST_G, FIRST_I, LATERAL, SOFT
+from .colours import Expectation, expectation, nothing
 from .marquardt import NEAR, descend
 from .normal import inverse
 from .numbers import NUMBERS, Floats
@@ -173,6 +174,7 @@ def refine(
     tails: bool = True,
     alike: bool = True,
     damping: float = NEAR,
+    like: Shape | None = None,
     pool: ThreadPoolExecutor | None = None,
 ) -> Fit:
     """Fit one ghost's numbers to patches by Levenberg-Marquardt.
@@ -198,6 +200,8 @@ def refine(
         Neighbours miss the model alike, see `witness`. False while most ghosts are unknown: the misfit is theirs then.
     damping : float
         See `marquardt.descend`.
+    like : Shape, optional
+        The same ghost in a colour that tells more of it; see `colours.ties`.
     pool : executor, optional
         Runs the patches; sums are taken in their order.
 
@@ -210,7 +214,7 @@ def refine(
     See `marquardt`; the Jacobian is the drawn picture's own derivative.
     """
     alike = alike and error > 0.0
-    search = _Search(laid_out(patches), free, width, offset, error, tails, alike, pool)
+    search = _Search(laid_out(patches), free, width, offset, error, tails, alike, pool, like)
     last, matrix = search.descend(shape, steps, damping)
     covariance = inverse(search.slopes(last)[0] if matrix is None else matrix)
     cost, count = last.missed.cost, last.missed.count
@@ -237,10 +241,10 @@ def improve(
 
 @dataclass(frozen=True)
 class _State:
-    """Where a search stands: the prior is that of the state from which the last step was taken."""
+    """Where a search stands: what is expected is that of the state from which the last step was taken."""
 
     shape: Shape
-    prior: Floats
+    expected: Expectation
     cost: float
     missed: Missed
 
@@ -257,39 +261,41 @@ class _Search:
     tails: bool
     alike: bool
     pool: ThreadPoolExecutor | None
+    like: Shape | None = None
 
     def descend(self, shape: Shape, steps: int, damping: float = NEAR) -> tuple[_State, Floats | None]:
         """Go down step by step; return the last state, and its normal matrix when it is known."""
         return descend(
             self.look(shape), steps, slopes=self.slopes, anew=self.anew,
-            moved=lambda at, step: self.look(stepped(at.shape, self.free, step), at.prior),
+            moved=lambda at, step: self.look(stepped(at.shape, self.free, step), at.expected),
             # a search needs no more than its model is worth; a measurement ends where noise hides every step
             enough=1e-4 if self.error > 0.0 else 1e-7, damping=damping,
         )  # fmt: skip
 
-    def look(self, shape: Shape, prior: Floats | None = None) -> _State:
+    def look(self, shape: Shape, expected: Expectation | None = None) -> _State:
         """Return the state of a shape."""
         miss = missed(shape, self.patches, offset=self.offset, error=self.error, tails=self.tails, pool=self.pool)
-        return self.weighed(shape, np.zeros(self.free.size) if prior is None else prior, miss)
+        return self.weighed(shape, nothing(self.free.size) if expected is None else expected, miss)
 
     def anew(self, at: _State) -> _State:
-        """Return a state with the prior that its shape and its misfit ask for."""
-        prior = priors(at.shape, self.free, self.width)
+        """Return a state with what its shape and its misfit let expect."""
+        prior, doubt = priors(at.shape, self.free, self.width), 1.0
         if self.alike:
             # where a rim may lie nobody knows beforehand
             known = (self.free < FIRST_DISC) | (self.free >= SOFT)
-            prior[known] *= witness(at.missed.cost, at.missed.count - self.free.size)
-        return self.weighed(at.shape, prior, at.missed)
+            doubt = witness(at.missed.cost, at.missed.count - self.free.size)
+            prior[known] *= doubt
+        return self.weighed(at.shape, expectation(prior, at.shape, self.free, self.width, doubt, self.like), at.missed)
 
-    def weighed(self, shape: Shape, prior: Floats, miss: Missed) -> _State:
-        """Return a state with a prior."""
-        return _State(shape, prior, miss.cost + float(prior @ shape.numbers[self.free] ** 2), miss)
+    def weighed(self, shape: Shape, expected: Expectation, miss: Missed) -> _State:
+        """Return a state with what is expected."""
+        return _State(shape, expected, miss.cost + expected.squares(shape.numbers[self.free]), miss)
 
     def slopes(self, at: _State) -> tuple[Floats, Floats]:
         """Return normal matrix and right side."""
         matrices, sides = equations(at.shape, self.free, self.patches, at.missed, offset=self.offset, pool=self.pool)
-        prior = at.prior * at.shape.numbers[self.free]
-        return matrices.sum(axis=0) + np.diag(at.prior), sides.sum(axis=0) - prior
+        off = at.shape.numbers[self.free] - at.expected.toward
+        return matrices.sum(axis=0) + np.diag(at.expected.weights), sides.sum(axis=0) - at.expected.weights * off
 
 
 def cost_of(

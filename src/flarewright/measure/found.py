@@ -11,6 +11,7 @@ import numpy as np
 from ..kernels.measure_pupil import FIRST_DISC, FIRST_I
 from .evenly import evenly
 from .fit import Fit, light_of
+from .numbers import Floats
 from .shape import Shape
 from .shared_out import shared_out
 from .views import Pixels, View
@@ -44,6 +45,20 @@ class Found:
 def by_light(ghosts: Sequence[Found]) -> list[int]:
     """Return the ghosts' places, the most light first."""
     return sorted(range(len(ghosts)), key=lambda k: -float(ghosts[k].shapes[1].numbers[FIRST_I]))
+
+
+def noise_of(views: Sequence[View]) -> Floats:
+    """Return the noise of red, green and blue where views are known, shape (3,)."""
+    known = [view.variance[np.isfinite(view.variance).all(axis=2)] for view in views]
+    medians = [np.median(each, axis=0) for each in known if each.size]
+    return np.sqrt(np.median(medians, axis=0)) if medians else np.ones(CHANNELS)
+
+
+def leading(ghost: Found, noise: Floats) -> int:
+    """Return the colour that tells most of a ghost: the one whose light stands out most of the noise."""
+    light = [max(float(shape.numbers[FIRST_I]), 0.0) for shape in ghost.shapes]
+    # green, where none does
+    return int(np.argmax(np.array(light) / noise)) if max(light) > 0.0 else 1
 
 
 def rest_of(

@@ -50,6 +50,8 @@ _MOST_BLADES = 20
 # how strong halo and star are is learned from about so many pixels of a view, in so many rounds; the part of them that
 # their laws may miss
 _SAMPLES, _ROUNDS, _GLOW_ERROR = 8000, 12, 0.1
+# the highest power of the distance by which a halo falls within a ring
+_STEEPEST = 4.0
 # quantile of the directions that is taken for light between spikes
 _GAPS = 0.1
 # part of the noise that halo or star must reach somewhere for their strength to be asked
@@ -156,18 +158,29 @@ def fit_halo(
     seen = shared_out(_around, views, pool=pool)
     sector = np.floor(_SECTORS * (np.arctan2(up, right) / (2.0 * np.pi) + 0.5)).astype(np.int64) % _SECTORS
     far, side = float(radius.max()), known.side
-    middles, levels, errors = [], [], []
+    rings, medians, spreads = [], [], []
     for inner, outer in pairwise(np.geomspace(side, far + side, _RINGS + 1)):
         here = (radius >= inner) & (radius < outer) & all_known(known.picture)
         ring = known.picture[here]
         if len(ring) >= 4:
-            middle = np.median(ring, axis=0)
-            level = np.minimum(middle, _darkest(seen, inner, outer))
-            middles.append(float(np.sqrt(inner * outer)))
-            levels.append(level)
-            # where darker places tell, what lies beside them does not
-            errors.append(np.hypot(_differ(ring, sector[here]), middle - level))
-    if len(middles) < 3 or not max(level.max() for level in levels) > 0.0:
+            rings.append((float(inner), float(outer)))
+            medians.append(np.median(ring, axis=0))
+            spreads.append(_differ(ring, sector[here]))
+    if len(rings) < 3:
+        return None
+    middles = [float(np.sqrt(inner * outer)) for inner, outer in rings]
+    falls = _falls(np.array(middles), np.array(medians))
+    levels = [
+        np.minimum(median, _darkest(seen, ring, fall)) for median, ring, fall in zip(medians, rings, falls, strict=True)
+    ]
+    # where darker places tell, what lies beside them does not; noise draws a low quantile down; and near the light
+    # a ring is as narrow as the pixels that it is made of
+    noise = -NormalDist().inv_cdf(low) * _noise(seen)
+    errors = [
+        np.sqrt(spread**2 + (median - level) ** 2 + noise**2 + (0.5 * (side / middle) ** 2 * level) ** 2)
+        for spread, median, level, middle in zip(spreads, medians, levels, middles, strict=True)
+    ]
+    if not max(level.max() for level in levels) > 0.0:
         return None
     # the outermost ring's level holds to the corners
     middles.append(2.0 * far)
@@ -211,17 +224,34 @@ def _around(view: View) -> _Around:
     return _Around(radius[known], light[known], variance[known])
 
 
-def _darkest(seen: Sequence[_Around], inner: float, outer: float) -> Floats:
-    """Return the light of the darkest places so far from the light, of most views, shape (3,); noise is made good."""
+def _noise(seen: Sequence[_Around]) -> Floats:
+    """Return the noise of a place, shape (3,)."""
+    medians = [np.median(one.variance, axis=0) for one in seen if len(one.variance)]
+    return np.asarray(np.sqrt(np.median(np.array(medians), axis=0))) if medians else np.zeros(3)
+
+
+def _falls(middles: Floats, medians: Floats) -> Floats:
+    """Return by which power of the distance light falls at each ring, shape (R, 3): never towards the light."""
+    falls = -np.gradient(np.log(np.maximum(medians, 1e-30)), np.log(middles), axis=0)
+    # what is dark tells no law
+    return np.asarray(np.clip(np.where(medians > 0.0, falls, 0.0), 0.0, _STEEPEST))
+
+
+def _darkest(seen: Sequence[_Around], ring: tuple[float, float], fall: Floats) -> Floats:
+    """Return the light of the darkest places of a ring, of most views, shape (3,); noise is made good.
+
+    Every place is asked what it would be in the ring's middle: else those at its outer border would be the darkest.
+    """
     found = []
     for one in seen:
-        here = (one.radius >= inner) & (one.radius < outer)
+        here = (one.radius >= ring[0]) & (one.radius < ring[1])
         if np.count_nonzero(here) >= _LEAST_PLACES:
-            noise = np.sqrt(np.median(one.variance[here], axis=0))
-            found.append(np.quantile(one.light[here], _DARKER, axis=0) + _DARKER_NOISE * noise)
+            brighter = (one.radius[here, None] / np.sqrt(ring[0] * ring[1])) ** fall
+            noise = np.sqrt(np.median(one.variance[here] * brighter**2, axis=0))
+            found.append(np.quantile(one.light[here] * brighter, _DARKER, axis=0) + _DARKER_NOISE * noise)
     if len(found) < 3:
         return np.full(3, np.inf)
-    return np.maximum(np.quantile(np.array(found), _DARKER_VIEWS, axis=0), 0.0)
+    return np.asarray(np.maximum(np.quantile(np.array(found), _DARKER_VIEWS, axis=0), 0.0))
 
 
 def _rgb(level: NDArray[np.floating]) -> Rgb3:

@@ -17,6 +17,7 @@ from ..kernels.measure_joint import add_jointly
 from ..kernels.measure_mesh import window_of
 from ..kernels.measure_misfit import weigh_misfit
 from ..kernels.measure_pupil import FIRST_DISC, FIRST_G, FIRST_I, SOFT
+from .colours import Expectation, expectation, nothing
 from .evenly import evenly
 from .fit import MODEL_ERROR, priors, witness
 from .found import Found
@@ -47,6 +48,7 @@ def fitted_jointly(
     steps: int,
     error: float = MODEL_ERROR,
     tails: bool = True,
+    likes: Sequence[Shape | None] = (),
     pool: ThreadPoolExecutor | None = None,
 ) -> list[Shape]:
     """Fit one colour of all ghosts at once.
@@ -65,6 +67,8 @@ def fitted_jointly(
         Part of the light that the model may miss.
     tails : bool
         Pixels that are missed by much count less: there may be ghosts that are not known yet.
+    likes : sequence of Shape or None
+        Each ghost in the colour that tells most of it; empty: of none that is known.
     pool : executor, optional
         Runs the views; sums are taken in their order.
 
@@ -76,7 +80,7 @@ def fitted_jointly(
         return []
     sheets = [_sheet(ghosts, views[k], pixels[k], channel, k) for k in evenly(range(len(views)), _VIEWS)]
     frees = [_free(ghost, channel) for ghost in ghosts]
-    search = _Search(sheets, frees, views[0].size_px[0], error, tails, pool)
+    search = _Search(sheets, frees, views[0].size_px[0], error, tails, pool, likes or [None] * len(ghosts))
     return search.descend([ghost.shapes[channel] for ghost in ghosts], steps)
 
 
@@ -150,7 +154,7 @@ class _State:
     """Where the search stands; see `fit`."""
 
     shapes: list[Shape]
-    prior: Floats
+    expected: Expectation
     cost: float
     missed: list[_Missed]
 
@@ -165,6 +169,7 @@ class _Search:
     error: float
     tails: bool
     pool: ThreadPoolExecutor | None
+    likes: Sequence[Shape | None]
 
     def descend(self, shapes: list[Shape], steps: int) -> list[Shape]:
         """Go down step by step; return the last shapes."""
@@ -179,25 +184,28 @@ class _Search:
         )
         return last.shapes
 
-    def look(self, shapes: list[Shape], prior: Floats | None) -> _State:
+    def look(self, shapes: list[Shape], expected: Expectation | None) -> _State:
         """Return the state of some shapes."""
         missed = shared_out(lambda sheet: self.missed(shapes, sheet), self.sheets, pool=self.pool)
-        return self.weighed(shapes, np.zeros(self.ends[-1]) if prior is None else prior, missed)
+        return self.weighed(shapes, nothing(int(self.ends[-1])) if expected is None else expected, missed)
 
-    def weighed(self, shapes: list[Shape], prior: Floats, missed: list[_Missed]) -> _State:
-        """Return a state with a prior."""
-        return _State(shapes, prior, sum(one.cost for one in missed) + float(prior @ self.numbers(shapes) ** 2), missed)
+    def weighed(self, shapes: list[Shape], expected: Expectation, missed: list[_Missed]) -> _State:
+        """Return a state with what is expected."""
+        cost = sum(one.cost for one in missed) + expected.squares(self.numbers(shapes))
+        return _State(shapes, expected, cost, missed)
 
     def anew(self, at: _State) -> _State:
-        """Return a state with the prior that its shapes and their misfit ask for."""
-        prior = np.concatenate([
-            priors(shape, free, self.width) for shape, free in zip(at.shapes, self.frees, strict=True)
-        ])  # fmt: skip
-        free = np.concatenate(self.frees)
-        # where a rim may lie nobody knows beforehand
-        known = (free < FIRST_DISC) | (free >= SOFT)
-        prior[known] *= witness(sum(one.cost for one in at.missed), sum(one.count for one in at.missed) - free.size)
-        return self.weighed(at.shapes, prior, at.missed)
+        """Return a state with what its shapes and their misfit let expect."""
+        count = int(self.ends[-1])
+        doubt = witness(sum(one.cost for one in at.missed), sum(one.count for one in at.missed) - count)
+        parts = []
+        for shape, free, like in zip(at.shapes, self.frees, self.likes, strict=True):
+            prior = priors(shape, free, self.width)
+            # where a rim may lie nobody knows beforehand
+            prior[(free < FIRST_DISC) | (free >= SOFT)] *= doubt
+            parts.append(expectation(prior, shape, free, self.width, doubt, like))
+        weights, toward = (np.concatenate([getattr(each, name) for each in parts]) for name in ("weights", "toward"))
+        return self.weighed(at.shapes, Expectation(weights, toward), at.missed)
 
     def moved(self, at: _State, step: Floats) -> _State:
         """Return the state a step away."""
@@ -206,12 +214,12 @@ class _Search:
             stepped(shape, free, _cautious(shape, free, part) * part)
             for shape, free, part in zip(at.shapes, self.frees, parts, strict=True)
         ]
-        return self.look(shapes, at.prior)
+        return self.look(shapes, at.expected)
 
     def slopes(self, at: _State) -> tuple[Floats, Floats]:
         """Return normal matrix and right side."""
-        side = -at.prior * self.numbers(at.shapes)
-        matrix = np.diag(at.prior)
+        side = -at.expected.weights * (self.numbers(at.shapes) - at.expected.toward)
+        matrix = np.diag(at.expected.weights)
         # one at a time, for a matrix is large: they are added as they come
         work = (map if self.pool is None else self.pool.map)(
             lambda sheet, missed: self.equations(at.shapes, sheet, missed), self.sheets, at.missed

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
@@ -13,12 +14,12 @@ from ..kernels.measure_pupil import DISC_NUMBERS, FIRST_DISC, FIRST_I
 from ..model.ghost_model import AberrationGhost, Blades
 from .find import rims_of
 from .fit import Fit, cost_of, improve, refine
-from .found import CHANNELS, Found, alone, by_light, exchange, rest_of
+from .found import CHANNELS, Found, alone, by_light, exchange, leading, noise_of, rest_of
 from .grow import RIM_PAYS, Growth, grow
 from .joint import lit
 from .jointly import fitted_jointly
 from .journal import Journal
-from .numbers import blades_of, channel_of, with_blades
+from .numbers import Floats, blades_of, channel_of, with_blades
 from .patches import patches_of
 from .presence import presences
 from .shape import Shape, free_numbers
@@ -85,17 +86,17 @@ def settle(
     list of Found
         Those that are needed, brightest first.
     """
-    ghosts = list(found)
+    ghosts, noise = list(found), noise_of(views)
     steps = journal or Journal()
     for turn in range(how.rounds):
         ghosts = lit(ghosts, views, pool=pool)
         # in small pictures, and every ghost in its own after that: what is told of its errors is of these
-        ghosts = _jointly(ghosts, views, pool, steps)
+        ghosts = _jointly(ghosts, views, noise, pool, steps)
         ghosts, green = respanned(ghosts, views, rest_of(ghosts, views, 1, pool), pool)
         rest = [green if m == 1 else rest_of(ghosts, views, m, pool) for m in range(CHANNELS)]
         for done, k in enumerate(by_light(ghosts)):
             old = ghosts[k]
-            ghosts[k] = steps.step(partial(_again, old, views, rest, how, iris, pool))
+            ghosts[k] = steps.step(partial(_again, old, views, rest, leading(old, noise), how, iris, pool))
             for m in range(CHANNELS):
                 exchange(old.shapes[m], ghosts[k].shapes[m], old, views, rest[m], pool)
             progress((turn + (done + 1) / len(ghosts)) / how.rounds, f"ghost {done + 1} of {len(ghosts)}")
@@ -106,58 +107,66 @@ def settle(
 
 
 def _jointly(
-    ghosts: Sequence[Found], views: Sequence[View], pool: ThreadPoolExecutor | None, steps: Journal
+    ghosts: Sequence[Found], views: Sequence[View], noise: Floats, pool: ThreadPoolExecutor | None, steps: Journal
 ) -> list[Found]:
-    """Fit all ghosts at once; before any of them was fitted green speaks for the form of all colours."""
+    """Fit all ghosts at once; before any was fitted the colour that tells most of most speaks for the form of all."""
     out = list(ghosts)
     first = all(ghost.fits[1] is None for ghost in ghosts)
-    for m in (1,) if first else (1, 0, 2):
+    most = Counter(leading(ghost, noise) for ghost in ghosts).most_common(1)
+    for m in [at for at, _ in most] if first else (1, 0, 2):
         pixels = [view.pixels[..., m] for view in views]
-        for k, shape in enumerate(steps.step(partial(fitted_jointly, out, views, pixels, m, steps=_STEPS, pool=pool))):
-            shapes = [_like_green(shape, old) if first else old for old in out[k].shapes]
+        leads = [leading(ghost, noise) for ghost in out]
+        likes = [None if lead == m else ghost.shapes[lead] for ghost, lead in zip(out, leads, strict=True)]
+        fitted = partial(
+            fitted_jointly, out, views, pixels, m, steps=_STEPS, likes=[] if first else likes, pool=pool
+        )  # fmt: skip
+        for k, shape in enumerate(steps.step(fitted)):
+            shapes = [_formed(shape, old) if first else old for old in out[k].shapes]
             shapes[m] = shape
             out[k] = replace(out[k], shapes=(shapes[0], shapes[1], shapes[2]))
     return out
 
 
-def _like_green(green: Shape, own: Shape) -> Shape:
-    """Return green's form with the light of another colour."""
-    numbers = green.numbers.copy()
+def _formed(other: Shape, own: Shape) -> Shape:
+    """Return another colour's form with a colour's own light."""
+    numbers = other.numbers.copy()
     numbers[FIRST_I:FIRST_DISC] = own.numbers[FIRST_I:FIRST_DISC]
-    return replace(green, numbers=numbers)
+    return replace(other, numbers=numbers)
 
 
 def _again(
     ghost: Found,
     views: Sequence[View],
     rest: list[list[Pixels]],
+    lead: int,
     how: Settling,
     iris: Blades | None,
     pool: ThreadPoolExecutor | None,
 ) -> Found:
-    """Fit one ghost anew in all colours."""
+    """Fit one ghost anew: first in the colour that tells most of it, then in the others, which are like that one."""
     fits: list[Fit | None] = list(ghost.fits)
     shapes = list(ghost.shapes)
 
-    def green() -> Fit | None:
-        shown = alone(ghost, 1, views, rest[1], how.views, pool)
-        if ghost.fits[1] is None:
-            return _grown(_rimmed(shapes[1], shown, 1, iris, pool), shown, 1, how.most, pool)
-        return _refined(shapes[1], shown, 1, ghost.fits[1], pool)
+    def leader() -> Fit | None:
+        shown = alone(ghost, lead, views, rest[lead], how.views, pool)
+        if ghost.fits[lead] is None:
+            return _grown(_rimmed(shapes[lead], shown, lead, iris, pool), shown, lead, how.most, pool)
+        return _refined(shapes[lead], shown, lead, ghost.fits[lead], pool)
 
-    def like_green(m: int) -> Fit | None:
+    def like_leader(m: int) -> Fit | None:
         shown = alone(ghost, m, views, rest[m], how.views, pool)
-        start = shapes[m] if ghost.fits[m] is not None else _like(shapes[1], shapes[m], shown, m)
-        return _refined(start, shown, m, fits[1], pool)
+        start = shapes[m] if ghost.fits[m] is not None else _like(shapes[lead], shapes[m], shown, m)
+        return _refined(start, shown, m, fits[lead], pool, shapes[lead])
 
     def keep(m: int, fit: Fit | None) -> None:
         if fit is not None:
             fits[m], shapes[m] = fit, fit.shape
 
-    keep(1, green())
-    red, blue = side_by_side(partial(like_green, 0), partial(like_green, 2), pool=pool)
-    keep(0, red)
-    keep(2, blue)
+    keep(lead, leader())
+    one, other = (m for m in range(CHANNELS) if m != lead)
+    for m, fit in zip((one, other), side_by_side(partial(like_leader, one), partial(like_leader, other), pool=pool),
+                      strict=True):  # fmt: skip
+        keep(m, fit)
     return replace(ghost, shapes=(shapes[0], shapes[1], shapes[2]), fits=(fits[0], fits[1], fits[2]))
 
 
@@ -228,24 +237,31 @@ def without_discs(shape: Shape) -> Shape:
     return replace(shape, numbers=numbers, discs=0)
 
 
-def _like(green: Shape, own: Shape, alone: Sequence[View], channel: int) -> Shape:
-    """Return green's shape as bright as another colour is."""
-    sure = [each.amplitude for each in presences(green, alone, channel) if np.isfinite(each.error)]
+def _like(lead: Shape, own: Shape, alone: Sequence[View], channel: int) -> Shape:
+    """Return the shape of the colour that leads as bright as another colour is."""
+    sure = [each.amplitude for each in presences(lead, alone, channel) if np.isfinite(each.error)]
     if not sure:
         return own
-    numbers = green.numbers.copy()
+    numbers = lead.numbers.copy()
     numbers[FIRST_I:FIRST_DISC] *= max(float(np.median(sure)), 0.0)
-    return replace(green, numbers=numbers)
+    return replace(lead, numbers=numbers)
 
 
 def _refined(
-    start: Shape, alone: Sequence[View], channel: int, like: Fit | None, pool: ThreadPoolExecutor | None
+    start: Shape,
+    alone: Sequence[View],
+    channel: int,
+    known: Fit | None,
+    pool: ThreadPoolExecutor | None,
+    like: Shape | None = None,
 ) -> Fit | None:
+    """Fit the numbers that were free in another fit; `like` is the ghost in a colour that tells more of it."""
     patches = patches_of(start, alone, channel)
     if not patches:
         return None
-    free = like.free if like is not None and like.shape.discs == start.discs else free_numbers(1, start.discs, 1, True)
-    return refine(start, patches, free, width=alone[0].size_px[0], steps=8, pool=pool)
+    same = known is not None and known.shape.discs == start.discs
+    free = known.free if known is not None and same else free_numbers(1, start.discs, 1, True)
+    return refine(start, patches, free, width=alone[0].size_px[0], steps=8, like=like, pool=pool)
 
 
 def to_model(ghosts: Sequence[Found], views: Sequence[View]) -> tuple[AberrationGhost, ...]:
