@@ -18,6 +18,7 @@ from ..kernels.measure_ghosts import draw_ghosts
 from ..model.ghost_model import AberrationGhost, BezierGhost, GhostModel
 from ..model.layer import Layer
 from ..render.compose import beauty
+from .found import CHANNELS
 from .glow import halo_at, offsets, star_at
 from .held import held
 from .numbers import bezier_numbers, field, fit_in, frame_in, visible
@@ -220,9 +221,14 @@ def _there(model: GhostModel, ghosts: Sequence[AberrationGhost | BezierGhost], c
 
 
 def draw_packed(
-    packed: Packed, model: GhostModel, constellation_deg: float, roll_deg: float, size_px: tuple[int, int]
+    packed: Packed,
+    model: GhostModel,
+    constellation_deg: float,
+    roll_deg: float,
+    size_px: tuple[int, int],
+    threads: int = CHANNELS,
 ) -> Floats:
-    """Draw all ghosts of a packed model together; see `draw`."""
+    """Draw all ghosts of a packed model together, as many colours at a time as there are threads; see `draw`."""
     meshes, numbers, counts, curves = packed
     width, height = size_px
     pixels = np.zeros((height, width, 3))
@@ -233,7 +239,7 @@ def draw_packed(
         numbers = posed_numbers(meshes, numbers, constellation_deg, sigma)
         planes = np.zeros((3, height, width + 1))
         # colours know nothing of each other, and neither kernel nor interpreter holds one up for another
-        with ThreadPoolExecutor(3) as pool:
+        with ThreadPoolExecutor(threads) as pool:
             for drawn in [
                 pool.submit(draw_ghosts, numbers[m], counts[m], there, sigma, placed, planes[m]) for m in range(3)
             ]:
