@@ -24,6 +24,7 @@ from .held import held
 from .numbers import bezier_numbers, field, fit_in, frame_in, visible
 from .packed import Packed, pack, posed_numbers
 from .rest_drawn import draw_rest
+from .shared_out import shared_out
 from .sprites import interval
 
 Floats = NDArray[np.float64]
@@ -33,6 +34,8 @@ BEYOND_DEG = 1.0
 # of all of a ghost's light, in one pixel: less is none
 _ROUNDING = 1e-12
 _NOTHING = np.empty((0, 0, 3, 19))
+# it is kept: what a thread has had of memory it need not ask for again
+_POOL = ThreadPoolExecutor(CHANNELS)
 
 
 def light_px(model: GhostModel, constellation_deg: float, roll_deg: float = 0.0) -> tuple[float, float]:
@@ -228,7 +231,7 @@ def draw_packed(
     size_px: tuple[int, int],
     threads: int = CHANNELS,
 ) -> Floats:
-    """Draw all ghosts of a packed model together, as many colours at a time as there are threads; see `draw`."""
+    """Draw all ghosts of a packed model together, beside each other but for one thread; see `draw`."""
     meshes, numbers, counts, curves = packed
     width, height = size_px
     pixels = np.zeros((height, width, 3))
@@ -239,11 +242,10 @@ def draw_packed(
         numbers = posed_numbers(meshes, numbers, constellation_deg, sigma)
         planes = np.zeros((3, height, width + 1))
         # colours know nothing of each other, and neither kernel nor interpreter holds one up for another
-        with ThreadPoolExecutor(threads) as pool:
-            for drawn in [
-                pool.submit(draw_ghosts, numbers[m], counts[m], there, sigma, placed, planes[m]) for m in range(3)
-            ]:
-                drawn.result()
+        shared_out(
+            lambda m: draw_ghosts(numbers[m], counts[m], there, sigma, placed, planes[m]), range(CHANNELS),
+            pool=_POOL if threads > 1 else None,
+        )  # fmt: skip
         sum_into(planes, pixels)
     for ghost, part in zip(curves, _there(model, curves, constellation_deg), strict=True):
         if part > 0.0:
