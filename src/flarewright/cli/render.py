@@ -11,6 +11,8 @@ from ..errors import ProjectError
 from .common import check_place, print_json, tell
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from ..model import Layer, Project
     from ..model.reference_state import ReferenceState
     from ..render.ledger import Ledger
@@ -481,32 +483,37 @@ def _render(project: Project, threads: int | None, run: ReferenceRun | None, led
     """Render with a progress bar where someone looks at it."""
     import sys
 
-    from ..io.ghost_model_file import names_ghost_model
-    from ..render.first_run import compile_for_render
-    from ..render.render import render as render_project
-
-    if names_ghost_model(project.lens):
-        from ..measure.rendering import render_measured
-
-        if ledger:
-            raise ProjectError(f"{project.lens} is a measured flare, whose light no ledger follows; leave --ledger out")
-        return render_measured(project)
-    compile_for_render(project, threads)
+    draw = _renderer(project, threads, run, ledger)
     if not sys.stderr.isatty():
-        return render_project(project, threads=threads, run=run, ledger=ledger)
+        return draw(progress=None)
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
     columns = (TextColumn("{task.description}", markup=False), BarColumn(), TimeRemainingColumn())
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("rendering", total=1.0)
-        return render_project(
-            project,
-            threads=threads,
-            progress=lambda done, what: bar.update(task, completed=done, description=what),
-            run=run,
-            ledger=ledger,
-        )
+        return draw(progress=lambda done, what: bar.update(task, completed=done, description=what))
+
+
+def _renderer(
+    project: Project, threads: int | None, run: ReferenceRun | None, ledger: bool
+) -> Callable[..., Rendering]:  # fmt: skip
+    """Return what draws a project, be it of a lens or of a measured flare, once it is told its progress."""
+    from functools import partial
+
+    from ..io.ghost_model_file import names_ghost_model
+
+    if names_ghost_model(project.lens):
+        from ..measure.rendering import render_measured
+
+        if ledger:
+            raise ProjectError(f"{project.lens} is a measured flare, whose light no ledger follows; leave --ledger out")
+        return partial(render_measured, project)
+    from ..render.first_run import compile_for_render
+    from ..render.render import render as render_project
+
+    compile_for_render(project, threads)
+    return partial(render_project, project, threads=threads, run=run, ledger=ledger)
 
 
 def _write(
