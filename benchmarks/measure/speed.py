@@ -48,11 +48,11 @@ def replay_speed(repeat: int = 5) -> dict[str, Any]:
         packed = pack(model)
         rates = []
         for angle in _ANGLES:
-            draw_packed(packed, model, angle, 10.0, SIZE, threads=1)
+            draw_packed(packed, model, angle, 10.0, SIZE, pool=None)
             best = float("inf")
             for _ in range(repeat):
                 start = time.process_time()
-                draw_packed(packed, model, angle, 10.0, SIZE, threads=1)
+                draw_packed(packed, model, angle, 10.0, SIZE, pool=None)
                 best = min(best, time.process_time() - start)
             rates.append(len(model.ghosts) / best)
         name = f"softness {soft_px:g} px" if soft_px else "replay, ghosts a second and core"

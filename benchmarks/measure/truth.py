@@ -154,7 +154,7 @@ def rays_of(shot: Shot, path: LightPath, count: tuple[int, int], colour: float =
     x0, x1, y0, y1 = region.box
     across, along = np.linspace(x0, x1, count[0]), np.linspace(y0, y1, count[1])
     px, py = (each.ravel() for each in np.meshgrid(across, along))
-    wavelength = round(colour * (len(shot.packed.wavelengths_nm) - 1))
+    wavelength = int(colour * (len(shot.packed.wavelengths_nm) - 1) + 0.5)
     rays = trace_points(shot.packed, wavelength, path, tilt, np.stack([px, py], axis=1))
     stops = rays[:, STOP_X:].reshape(len(rays), -1, 2)
     at_stop = np.hypot(stops[..., 0], stops[..., 1]).max(axis=1)

@@ -42,13 +42,12 @@ def check(
 
 def _measured(project: Project) -> dict[str, Any]:
     """Check a project of a measured flare; tell of it what is told of one with a lens."""
-    from ..measure.rendering import check_measured, efl_mm, flare_of
+    from ..measure.rendering import check_measured, efl_mm, flare_of, opening_of
 
     check_measured(project)
     flare = flare_of(project)
-    f_number = flare.model.reference.f_number if project.f_number is None else project.f_number
     return {
-        "lens": flare.name, "efl_mm": efl_mm(project, flare.model), "f_number": f_number,
+        "lens": flare.name, "efl_mm": efl_mm(project, flare.model), "f_number": opening_of(project, flare.model),
         "remarks": list(flare.model.remarks),
     }  # fmt: skip
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from math import atan, degrees, isfinite, radians, tan
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from ..errors import FlarewrightError, GlassError, LensError
@@ -22,6 +23,8 @@ from ..optics.paraxial import FirstOrder
 from ..optics.shape import sag
 from ..render.prepare import as_lens, first_order
 from .words import sentence, spoken
+
+Floats = NDArray[np.float64]
 
 COLUMNS = ("radius", "thickness", "glass", "n_d", "v_d", "semi_diameter", "coating")
 MOST_ROWS = 200
@@ -345,9 +348,7 @@ def choose_lens(project: Project, lens: str | Lens) -> Project:
     known = as_lens(lens)
     efl = first_order(known).efl
     try:
-        old = (
-            efl_mm(project, flare_of(project).model) if is_measured(project) else first_order(as_lens(project.lens)).efl
-        )
+        old = _efl(project)
     except FlarewrightError:
         old = efl
     lights = tuple(
@@ -367,6 +368,7 @@ def choose_lens(project: Project, lens: str | Lens) -> Project:
 
 
 def _efl(project: Project) -> float:
+    """Return the focal length of what stands in the lens' place, mm."""
     return efl_mm(project, flare_of(project).model) if is_measured(project) else first_order(as_lens(project.lens)).efl
 
 
@@ -454,10 +456,29 @@ def prescription(project: Project) -> Prescription:
 
 @lru_cache(maxsize=8)
 def _distortion(lens: Lens, order: FirstOrder) -> tuple[float, ...]:
-    angles = np.arange(DISTORTION_STEP_DEG, DISTORTION_TO_DEG + 0.5, DISTORTION_STEP_DEG)
-    heights = image_heights(lens, order, angles)
+    angles = distortion_angles()
+    return distortion_of(image_heights(lens, order, angles), order.efl * np.tan(np.radians(angles)))
+
+
+def distortion_angles() -> Floats:
+    """Return the field angles at which the page is told a distortion, degrees."""
+    return np.arange(DISTORTION_STEP_DEG, DISTORTION_TO_DEG + 0.5, DISTORTION_STEP_DEG)
+
+
+def distortion_of(heights: Sequence[float] | Floats, ideals: Floats) -> tuple[float, ...]:
+    """Return image heights over what they would be without distortion, as far as a hand can go.
+
+    Parameters
+    ----------
+    heights, ideals : array_like, shape (N,)
+        At rising field angles; fewer heights where there is no image any more.
+
+    Returns
+    -------
+    tuple of float
+    """
     out: list[float] = []
-    for height, nearer, ideal in zip(heights, (0.0, *heights), order.efl * np.tan(np.radians(angles)), strict=False):
+    for height, nearer, ideal in zip(heights, (0.0, *heights), ideals, strict=False):
         # farther out must be farther out, or a hand could not find the way back
         if not height > nearer:
             break

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from math import radians, tan
 from pathlib import Path
 from typing import Any
 
-from ..measure.rendering import MeasuredFlare, check_measured, efl_mm, flare_of, is_measured
+import numpy as np
+
+from ..measure.rendering import check_measured, efl_mm, flare_of, is_measured, opening_of
 from ..model import Camera, Light, Project
 from ..optics.constellation import field_angles
 from ..render.prepare import settle
-from .edit_lens import DISTORTION_STEP_DEG, DISTORTION_TO_DEG, Prescription
+from .edit_lens import Prescription, distortion_angles, distortion_of
 
 # of a new project: how far out in what was photographed its light stands, and in which direction
 PART, ROLL_DEG = 0.45, 28.0
@@ -53,26 +54,13 @@ def check_any(project: Project) -> None:
 
 def measured_facts(project: Project) -> Prescription:
     """Return what stands in the place of a measured flare's prescription: no rows, but where its light is imaged."""
-    flare = flare_of(project)
-    facts = {"efl": efl_mm(project, flare.model)}
-    reference = flare.model.reference
-    if reference.f_number is not None:
-        facts["f_number"] = project.f_number or reference.f_number
-    return Prescription((), facts, "", _distortion(flare))
-
-
-def _distortion(flare: MeasuredFlare) -> tuple[float, ...]:
-    out: list[float] = []
-    nearer, step = 0.0, 1
-    while step * DISTORTION_STEP_DEG <= DISTORTION_TO_DEG:
-        slope = tan(radians(step * DISTORTION_STEP_DEG))
-        part = 1.0 + flare.model.distortion * slope * slope
-        # farther out must be farther out, or a hand could not find the way back
-        if not slope * part > nearer:
-            break
-        out.append(round(part, 5))
-        nearer, step = slope * part, step + 1
-    return tuple(out)
+    model = flare_of(project).model
+    facts = {"efl": efl_mm(project, model)}
+    f_number = opening_of(project, model)
+    if f_number is not None:
+        facts["f_number"] = f_number
+    slopes = np.tan(np.radians(distortion_angles()))
+    return Prescription((), facts, "", distortion_of(slopes * (1.0 + model.distortion * slopes**2), slopes))
 
 
 def measured_lens(project: Project) -> dict[str, Any]:

@@ -162,6 +162,26 @@ def witness(cost: float, count: int, alike: float = ALIKE) -> float:
     return 1.0 + alike * max(cost / max(count, 1) - 1.0, 0.0)
 
 
+def expected(shape: Shape, free: Indices, width: int, doubt: float, like: Shape | None) -> Expectation:
+    """Return what a ghost's numbers are expected to be, by what ghosts are like and by its other colours.
+
+    Parameters
+    ----------
+    shape : Shape
+    free : ndarray of int, shape (Q,)
+    width : int
+        Of the whole picture, pixels.
+    doubt : float
+        From `witness`.
+    like : Shape or None
+        See `colours.expectation`.
+    """
+    prior = priors(shape, free, width)
+    # where a rim may lie nobody knows beforehand
+    prior[(free < FIRST_DISC) | (free >= SOFT)] *= doubt
+    return expectation(prior, shape, free, width, doubt, like)
+
+
 def refine(
     shape: Shape,
     patches: Sequence[Patch],
@@ -279,13 +299,8 @@ class _Search:
 
     def anew(self, at: _State) -> _State:
         """Return a state with what its shape and its misfit let expect."""
-        prior, doubt = priors(at.shape, self.free, self.width), 1.0
-        if self.alike:
-            # where a rim may lie nobody knows beforehand
-            known = (self.free < FIRST_DISC) | (self.free >= SOFT)
-            doubt = witness(at.missed.cost, at.missed.count - self.free.size)
-            prior[known] *= doubt
-        return self.weighed(at.shape, expectation(prior, at.shape, self.free, self.width, doubt, self.like), at.missed)
+        doubt = witness(at.missed.cost, at.missed.count - self.free.size) if self.alike else 1.0
+        return self.weighed(at.shape, expected(at.shape, self.free, self.width, doubt, self.like), at.missed)
 
     def weighed(self, shape: Shape, expected: Expectation, miss: Missed) -> _State:
         """Return a state with what is expected."""

@@ -16,10 +16,10 @@ from ..kernels.measure_changes import draw_with_changes
 from ..kernels.measure_joint import add_jointly
 from ..kernels.measure_mesh import window_of
 from ..kernels.measure_misfit import weigh_misfit
-from ..kernels.measure_pupil import FIRST_DISC, FIRST_G, FIRST_I, SOFT
-from .colours import Expectation, expectation, nothing
+from ..kernels.measure_pupil import FIRST_DISC, FIRST_G, FIRST_I
+from .colours import Expectation, nothing
 from .evenly import evenly
-from .fit import MODEL_ERROR, priors, witness
+from .fit import MODEL_ERROR, expected, witness
 from .found import Found
 from .marquardt import FAR, descend
 from .numbers import Floats
@@ -198,12 +198,10 @@ class _Search:
         """Return a state with what its shapes and their misfit let expect."""
         count = int(self.ends[-1])
         doubt = witness(sum(one.cost for one in at.missed), sum(one.count for one in at.missed) - count)
-        parts = []
-        for shape, free, like in zip(at.shapes, self.frees, self.likes, strict=True):
-            prior = priors(shape, free, self.width)
-            # where a rim may lie nobody knows beforehand
-            prior[(free < FIRST_DISC) | (free >= SOFT)] *= doubt
-            parts.append(expectation(prior, shape, free, self.width, doubt, like))
+        parts = [
+            expected(shape, free, self.width, doubt, like)
+            for shape, free, like in zip(at.shapes, self.frees, self.likes, strict=True)
+        ]
         weights, toward = (np.concatenate([getattr(each, name) for each in parts]) for name in ("weights", "toward"))
         return self.weighed(at.shapes, Expectation(weights, toward), at.missed)
 

@@ -43,6 +43,8 @@ _OF_CAMERAS = (
     "sensor_distance", "focus_distance", "cover_glass", "sensor_reflectance", "sensor_grating", "squeeze", "desqueeze",
 )  # fmt: skip
 _OF_LIGHTS = ("distance", "diameter_deg", "shape")
+# how the layer of one ghost begins
+_SINGLE = "ghost."
 # a pass of art direction, and the layers it stands for: what is left of ghosts goes with them
 _PASSES = {"ghosts": "ghosts", "residual": "ghosts", "starburst": "starburst", "halo": "scatter"}
 # pixels that are wider than high by more than this are no square ones
@@ -181,13 +183,13 @@ def render_measured(project: Project, *, progress: Progress | None = None) -> Re
     for k, one in enumerate(seen):
         if progress is not None:
             progress(k / len(seen), one.light.name)
-        drawn = replay(flare.model if whole else flare.bare, one.constellation_deg, roll_deg=one.roll_deg, size_px=size)
+        drawn = replay(
+            flare.model if whole else flare.bare, one.constellation_deg, roll_deg=one.roll_deg, size_px=size,
+            single=project.output.layers == "ghosts",
+        )  # fmt: skip
         # but for the beauty
         for layer in drawn[1:]:
-            _add(parts, _coloured(layer, one.colours))
-        if project.output.layers == "ghosts":
-            for layer in _singles(flare, one, size):
-                _add(singles, _coloured(layer, one.colours))
+            _add(singles if layer.name.startswith(_SINGLE) else parts, _coloured(layer, one.colours))
     if gains:
         # what grows beyond all numbers is refused below
         with np.errstate(over="ignore", invalid="ignore"):
@@ -327,7 +329,7 @@ def _keep_above_0(parts: dict[str, Layer]) -> None:
 
 def _singles(flare: MeasuredFlare, one: _Seen, size: tuple[int, int]) -> list[Layer]:
     drawn = replay(flare.bare, one.constellation_deg, roll_deg=one.roll_deg, size_px=size, single=True)
-    return [layer for layer in drawn if layer.name.startswith("ghost.")]
+    return [layer for layer in drawn if layer.name.startswith(_SINGLE)]
 
 
 def _ranked(flare: MeasuredFlare, seen: Sequence[_Seen], size: tuple[int, int], kind: str) -> list[str]:
@@ -336,7 +338,7 @@ def _ranked(flare: MeasuredFlare, seen: Sequence[_Seen], size: tuple[int, int], 
     for one in seen:
         for layer in _singles(flare, one, size):
             light = np.maximum(_coloured(layer, one.colours).pixels @ _LUMINANCE, 0.0)
-            name, total = layer.name.removeprefix("ghost."), float(light.sum())
+            name, total = layer.name.removeprefix(_SINGLE), float(light.sum())
             if total <= 0.0:
                 continue
             if kind == "brightest":
@@ -361,7 +363,7 @@ def _brightest(project: Project, singles: dict[str, Layer], gains: dict[str, Rgb
     area = across * down / (width * height)
     kept = []
     for name, layer in singles.items():
-        gain = gains.get(name.removeprefix("ghost."), (1.0, 1.0, 1.0))
+        gain = gains.get(name.removeprefix(_SINGLE), (1.0, 1.0, 1.0))
         if gain is not None:
             pixels = np.asarray(layer.pixels * np.array(gain, dtype=np.float32))
             flux = float((pixels.astype(np.float64) @ _LUMINANCE).sum()) * area
@@ -380,7 +382,7 @@ def _summary(
         "lens": flare.name,
         "measured": True,
         "efl_mm": efl_mm(project, model),
-        "f_number": model.reference.f_number if project.f_number is None else project.f_number,
+        "f_number": opening_of(project, model),
         "size_px": [width, height],
         "sensor_mm": [across, down],
         "quality": "measured",
@@ -402,6 +404,11 @@ def _summary(
     }  # fmt: skip
 
 
+def opening_of(project: Project, model: GhostModel) -> float | None:
+    """Return the f-number that a measured flare is drawn for: the project's, else that of its captures, if told."""
+    return model.reference.f_number if project.f_number is None else project.f_number
+
+
 def efl_mm(project: Project, model: GhostModel) -> float:
     """Return the focal length of a measured flare, mm, for a sensor of the project's width."""
     return model.focal_px * project.camera.sensor[0] / model.size_px[0]
@@ -421,5 +428,6 @@ def _remarks(project: Project, flare: MeasuredFlare, seen: Sequence[_Seen], tota
 
 
 __all__ = [
-    "MeasuredFlare", "check_measured", "efl_mm", "flare_of", "is_measured", "render_any", "render_measured",
+    "MeasuredFlare", "check_measured", "efl_mm", "flare_of", "is_measured", "opening_of", "render_any",
+    "render_measured",
 ]  # fmt: skip

@@ -229,9 +229,9 @@ def draw_packed(
     constellation_deg: float,
     roll_deg: float,
     size_px: tuple[int, int],
-    threads: int = CHANNELS,
+    pool: ThreadPoolExecutor | None = _POOL,
 ) -> Floats:
-    """Draw all ghosts of a packed model together, beside each other but for one thread; see `draw`."""
+    """Draw all ghosts of a packed model together, colours in a pool's threads or one after the other; see `draw`."""
     meshes, numbers, counts, curves = packed
     width, height = size_px
     pixels = np.zeros((height, width, 3))
@@ -244,7 +244,7 @@ def draw_packed(
         # colours know nothing of each other, and neither kernel nor interpreter holds one up for another
         shared_out(
             lambda m: draw_ghosts(numbers[m], counts[m], there, sigma, placed, planes[m]), range(CHANNELS),
-            pool=_POOL if threads > 1 else None,
+            pool=pool,
         )  # fmt: skip
         sum_into(planes, pixels)
     for ghost, part in zip(curves, _there(model, curves, constellation_deg), strict=True):

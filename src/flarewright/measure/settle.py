@@ -112,14 +112,13 @@ def _jointly(
     """Fit all ghosts at once; before any was fitted the colour that tells most of most speaks for the form of all."""
     out = list(ghosts)
     first = all(ghost.fits[1] is None for ghost in ghosts)
-    most = Counter(leading(ghost, noise) for ghost in ghosts).most_common(1)
-    for m in [at for at, _ in most] if first else (1, 0, 2):
+    if not out:
+        return out
+    spokesman = Counter(leading(ghost, noise) for ghost in out).most_common(1)[0][0]
+    for m in (spokesman,) if first else (1, 0, 2):
         pixels = [view.pixels[..., m] for view in views]
-        leads = [leading(ghost, noise) for ghost in out]
-        likes = [None if lead == m else ghost.shapes[lead] for ghost, lead in zip(out, leads, strict=True)]
-        fitted = partial(
-            fitted_jointly, out, views, pixels, m, steps=_STEPS, likes=[] if first else likes, pool=pool
-        )  # fmt: skip
+        likes = [None if (lead := leading(ghost, noise)) == m else ghost.shapes[lead] for ghost in out]
+        fitted = partial(fitted_jointly, out, views, pixels, m, steps=_STEPS, likes=[] if first else likes, pool=pool)
         for k, shape in enumerate(steps.step(fitted)):
             shapes = [_formed(shape, old) if first else old for old in out[k].shapes]
             shapes[m] = shape
@@ -163,9 +162,8 @@ def _again(
             fits[m], shapes[m] = fit, fit.shape
 
     keep(lead, leader())
-    one, other = (m for m in range(CHANNELS) if m != lead)
-    for m, fit in zip((one, other), side_by_side(partial(like_leader, one), partial(like_leader, other), pool=pool),
-                      strict=True):  # fmt: skip
+    others = [m for m in range(CHANNELS) if m != lead]
+    for m, fit in zip(others, side_by_side(*(partial(like_leader, m) for m in others), pool=pool), strict=True):
         keep(m, fit)
     return replace(ghost, shapes=(shapes[0], shapes[1], shapes[2]), fits=(fits[0], fits[1], fits[2]))
 
