@@ -46,7 +46,8 @@ def shoot(setup: Setup, folder: Path) -> None:
     for pose in poses(setup):
         truth = truth_of(setup, pose, scale)
         frame = ideal_frame(setup, truth, pose)
-        rows.append({**asdict(pose), "light_px": truth.light_px, "roll_deg": frame.info.roll_deg})
+        places = {"light_px": truth.light_px, "image_px": truth.image_px}
+        rows.append({**asdict(pose), **places, "roll_deg": frame.info.roll_deg})
         if pose.number % 2:
             sigma = np.sqrt(frame.variance[..., 1]).astype(np.float32)
             np.savez(folder / f"truth-{pose.number:03d}.npz", total=truth.total, sigma=sigma)

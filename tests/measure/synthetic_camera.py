@@ -117,11 +117,16 @@ class Pose:
 
 @dataclass(frozen=True)
 class Truth:
-    """What a perfect camera would measure: linear, unit as in `MergedFrame` (1 fills the sensor in a second)."""
+    """What a perfect camera would measure: linear, unit as in `MergedFrame` (1 fills the sensor in a second).
+
+    The light's own image is at `image_px`: where rims let only its last rays pass these may land far from `light_px`,
+    where the lens' law has it.
+    """
 
     total: Pixels
     ghosts: Pixels
     light_px: tuple[float, float]
+    image_px: tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -204,19 +209,26 @@ def truth_of(setup: Setup, pose: Pose, scale: float) -> Truth:
     layers = {layer.name: layer for layer in rendering.layers}
     ghosts = _seen(setup, layers["ghosts"]) * scale
     star = _blurred(_seen(setup, layers["starburst"]) * scale)
-    light = _light_px(setup, pose, rendering)
+    light, image = light_places(setup, pose, rendering)
     total = ghosts + star + _haze(setup, light)
-    return Truth(total.astype(np.float32), ghosts.astype(np.float32), light)
+    return Truth(total.astype(np.float32), ghosts.astype(np.float32), light, image)
 
 
-def _light_px(setup: Setup, pose: Pose, rendering: fw.Rendering) -> tuple[float, float]:
+def light_places(setup: Setup, pose: Pose, rendering: fw.Rendering) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Return where the light is, and where its image is, if it has any."""
     told = rendering.summary["lights"][0]
     _, _, most = _law(replace(setup.steady, roll_deg=0.0))
+    passed = max(told["direct_throughput_mm2"])
+    image = _on_picture(setup, told["direct_position_mm"])
     # the last rays that rims let pass land anywhere
-    shown = max(told["direct_throughput_mm2"]) > _SHOWN * most
-    x, y = told["direct_position_mm"] if shown else dark_mm(setup, pose)
+    light = image if passed > _SHOWN * most else _on_picture(setup, dark_mm(setup, pose))
+    return light, image if passed > 0.0 else light
+
+
+def _on_picture(setup: Setup, place_mm: tuple[float, float]) -> tuple[float, float]:
+    """Return where a place on the sensor is in the picture, pixels."""
     per_mm = setup.size_px[0] / setup.sensor_width_mm
-    return setup.axis_px[0] + x * per_mm, setup.axis_px[1] - y * per_mm
+    return setup.axis_px[0] + place_mm[0] * per_mm, setup.axis_px[1] - place_mm[1] * per_mm
 
 
 def dark_mm(setup: Setup, pose: Pose) -> tuple[float, float]:

@@ -68,6 +68,21 @@ def test_a_ghost_is_judged_by_the_light_that_its_rims_let_through():
     assert misfit(kept, shown) < 1.2
 
 
+@pytest.mark.parametrize("colour", [0, 1, 2])
+def test_a_ghost_that_one_colour_alone_shows_is_needed(colour):
+    body, within = shape(-40.0, 34.0, 0.5), shape(-46.0, 20.0, 0.4)
+    shown = []
+    for view in views((body,), angles=FEW):
+        light = view.pixels.copy()
+        light[..., colour] += render(within, view).astype(np.float32)
+        shown.append(view.showing(light))
+    kept = lit([found(body), found(within)], shown)
+    assert [ghost.shapes[1].numbers[0] for ghost in kept] == [body.numbers[0], within.numbers[0]]
+    told = [one.numbers[20] / within.numbers[20] for one in kept[1].shapes]
+    assert told == pytest.approx([float(m == colour) for m in range(3)], abs=0.05)
+    assert len(lit([found(body), found(within)], views((body,), angles=FEW))) == 1
+
+
 @pytest.mark.parametrize(("part", "told"), [(0.015, 1), (0.06, 2)])
 def test_what_a_model_may_miss_of_a_ghost_is_no_other_ghost(part, told):
     # no noise to speak of: whatever is drawn explains its own light well

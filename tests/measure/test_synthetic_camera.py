@@ -1,6 +1,7 @@
 """The synthetic camera, which judges everything else in this folder, photographs what it says it does."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from synthetic_camera import (
     expose,
     ghosts_of,
     ideal_frame,
+    light_places,
     make,
     poses,
     project_of,
@@ -111,3 +113,20 @@ def test_a_light_that_the_rims_hide_goes_on_where_the_lens_would_image_it():
     assert (np.diff(table[:, 2]) > 0.0).all()
     # what is dark lies at the ideal place in a rendering, never in the middle
     assert (table[:, 0] > 0.0).all()
+
+
+def test_the_last_rays_of_a_light_are_its_image_and_tell_no_place(scene):
+    pose, _, _ = scene
+
+    def places(passed):
+        told = {"direct_throughput_mm2": [passed, 0.5 * passed], "direct_position_mm": (-9.0, 4.0)}
+        return light_places(SMALL, pose, SimpleNamespace(summary={"lights": [told]}))
+
+    image = (0.5 * 90 + 1 - 9.0 * 2.5, 0.5 * 60 - 1 - 4.0 * 2.5)
+    most = truth_of(SMALL, pose, 1.0).light_px
+    assert places(1e4) == (image, image)
+    light, there = places(1e-3)
+    assert there == image
+    # where the lens' law has it, as it was while it shone
+    assert light == pytest.approx(most, abs=0.2)
+    assert places(0.0) == (light, light)

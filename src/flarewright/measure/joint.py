@@ -58,6 +58,15 @@ class _Picture:
         return _columns(self.ghosts)
 
 
+@dataclass(frozen=True)
+class _Told:
+    """What one colour tells of all ghosts' light: the equations `matrix` x = `side` of their numbers, shape (4 G,)."""
+
+    pictures: Sequence[_Picture]
+    matrix: Floats
+    side: Floats
+
+
 def lit(
     ghosts: Sequence[Found], views: Sequence[View], *, needed: float = NEEDED, pool: ThreadPoolExecutor | None = None
 ) -> list[Found]:
@@ -69,7 +78,7 @@ def lit(
     views : sequence of View
         Glow taken off; what shall not count has infinite variance.
     needed : float
-        Part of the squares that a ghost must explain alone, judged by green.
+        Part of the squares that a ghost must explain alone, all colours together.
     pool : executor, optional
 
     Returns
@@ -78,29 +87,33 @@ def lit(
     """
     if not ghosts:
         return []
-    kept = np.arange(len(ghosts))
-    values: dict[int, Floats] = {}
-    for m in (1, 0, 2):
-        pictures = _pictures(ghosts, views, m, pool)
-        prior = np.concatenate([priors(ghost.shapes[m], _TERMS, views[0].size_px[0]) for ghost in ghosts])
-        matrix: Floats = np.zeros((prior.size, prior.size))
-        side: Floats = np.zeros(prior.size)
-        for one in pictures:
-            # a matrix times itself: half of the work, and symmetric to the last bit
-            root = np.sqrt(one.weight)
-            scaled = one.basis * root[:, None]
-            matrix[np.ix_(one.columns, one.columns)] += scaled.T @ scaled
-            side[one.columns] += scaled.T @ (root * one.pixels)
-        # a picture of fewer pixels has fewer that miss the model alike
-        alike = max(ALIKE * (_WIDTH / views[0].size_px[0]) ** 2, 1.0)
-        first: Floats = np.asarray(np.linalg.solve(matrix + np.diag(prior), side))
-        matrix += np.diag(prior * witness(*_missed(pictures, first), alike))
-        if m == 1:
-            kept = _needed(matrix, side, pictures, needed)
-        at = _columns(kept)
-        solved = np.linalg.solve(matrix[np.ix_(at, at)], side[at])
-        values[m] = np.asarray(solved, dtype=np.float64).reshape(-1, _TERMS.size)
+    told = [_told(ghosts, views, m, pool) for m in range(CHANNELS)]
+    kept = _needed(told, needed)
+    at = _columns(kept)
+    values = [
+        np.asarray(np.linalg.solve(one.matrix[np.ix_(at, at)], one.side[at])).reshape(-1, _TERMS.size) for one in told
+    ]
     return [_with_light(ghosts[int(k)], [values[m][n] for m in range(CHANNELS)]) for n, k in enumerate(kept)]
+
+
+def _told(ghosts: Sequence[Found], views: Sequence[View], channel: int, pool: ThreadPoolExecutor | None) -> _Told:
+    """Return what views tell of all ghosts' light in one colour."""
+    pictures = _pictures(ghosts, views, channel, pool)
+    width = views[0].size_px[0]
+    prior = np.concatenate([priors(ghost.shapes[channel], _TERMS, width) for ghost in ghosts])
+    matrix: Floats = np.zeros((prior.size, prior.size))
+    side: Floats = np.zeros(prior.size)
+    for one in pictures:
+        # a matrix times itself: half of the work, and symmetric to the last bit
+        root = np.sqrt(one.weight)
+        scaled = one.basis * root[:, None]
+        matrix[np.ix_(one.columns, one.columns)] += scaled.T @ scaled
+        side[one.columns] += scaled.T @ (root * one.pixels)
+    # a picture of fewer pixels has fewer that miss the model alike
+    alike = max(ALIKE * (_WIDTH / width) ** 2, 1.0)
+    first: Floats = np.asarray(np.linalg.solve(matrix + np.diag(prior), side))
+    matrix += np.diag(prior * witness(*_missed(pictures, first), alike))
+    return _Told(pictures, matrix, side)
 
 
 def _missed(pictures: Sequence[_Picture], values: Floats) -> tuple[float, int]:
@@ -114,43 +127,65 @@ def _columns(kept: Indices) -> Indices:
     return np.asarray((_TERMS.size * kept[:, None] + np.arange(_TERMS.size)).ravel())
 
 
-def _needed(matrix: Floats, side: Floats, pictures: Sequence[_Picture], least: float) -> Indices:
+def _needed(told: Sequence[_Told], least: float) -> Indices:
     """Return the ghosts that stay when the least needed one is left out, again and again.
 
     What the squares grow by without some of the numbers, all others solved anew, is x' (C)^-1 x with x their values
-    and C their part of the inverse matrix.
+    and C their part of the inverse matrix. The squares of all colours count together: coatings leave many a ghost
+    purple, which green hardly shows.
     """
-    kept = np.arange(side.size // _TERMS.size)
-    adds, allowed = np.zeros(side.size), np.zeros(kept.size)
-    for one in pictures:
-        adds[one.columns] += one.light
-        allowed[one.ghosts] += one.allowed
+    kept = np.arange(told[0].side.size // _TERMS.size)
+    adds = [_adds(one) for one in told]
+    allowed = np.sum([_allowed(one, kept.size) for one in told], axis=0)
     while kept.size:
         at = _columns(kept)
-        inverse = np.linalg.inv(matrix[np.ix_(at, at)])
-        values = inverse @ side[at]
-        everything = np.zeros(side.size)
-        everything[at] = values
-        rests = np.zeros(side.size // _TERMS.size)
-        for one in pictures:
-            missed = one.pixels - one.basis @ everything[one.columns]
-            rests[one.ghosts] += (one.weight * missed**2) @ one.there
-        gains = np.empty(kept.size)
-        for n, k in enumerate(kept):
-            own, part = _columns(kept[n : n + 1]), slice(_TERMS.size * n, _TERMS.size * (n + 1))
-            light = everything[own]
-            grown = float(light @ np.linalg.solve(inverse[part, part], light))
-            seen = float(light @ matrix[np.ix_(own, own)] @ light)
-            # one that is fainter than what the model may miss of the others there is what it misses of them
-            gains[n] = min(grown / max(grown + rests[k], 1e-300), seen / max(allowed[k], 1e-300) - 1.0)
-            # a ghost that darkens is none: what its rims let through counts, not what its law says of the whole pupil
-            if adds[own] @ light <= 0.0:
-                gains[n] = -1.0
+        grown, seen, lit_up, rests = (np.zeros(kept.size) for _ in range(4))
+        for colour, adding in zip(told, adds, strict=True):
+            inverse = np.linalg.inv(colour.matrix[np.ix_(at, at)])
+            values = inverse @ colour.side[at]
+            rests += _rests(colour, at, values)[kept]
+            for n in range(kept.size):
+                own, part = at[_columns(np.array([n]))], slice(_TERMS.size * n, _TERMS.size * (n + 1))
+                light = values[part]
+                grown[n] += float(light @ np.linalg.solve(inverse[part, part], light))
+                seen[n] += float(light @ colour.matrix[np.ix_(own, own)] @ light)
+                lit_up[n] += adding[own] @ light
+        # one that is fainter than what the model may miss of the others there is what it misses of them
+        gains = np.minimum(grown / np.maximum(grown + rests, 1e-300), seen / np.maximum(allowed[kept], 1e-300) - 1.0)
+        # a ghost that darkens is none: what its rims let through counts, not what its law says of the whole pupil
+        gains[lit_up <= 0.0] = -1.0
         worst = int(np.argmin(gains))
         if gains[worst] >= least:
             break
         kept = np.delete(kept, worst)
     return kept
+
+
+def _adds(colour: _Told) -> Floats:
+    """Return how much light each number of each ghost adds in all, shape (4 G,)."""
+    adds = np.zeros(colour.side.size)
+    for one in colour.pictures:
+        adds[one.columns] += one.light
+    return adds
+
+
+def _allowed(colour: _Told, count: int) -> Floats:
+    """Return what a model may miss where each of all ghosts is, in weighted squares."""
+    allowed = np.zeros(count)
+    for one in colour.pictures:
+        allowed[one.ghosts] += one.allowed
+    return allowed
+
+
+def _rests(colour: _Told, at: Indices, values: Floats) -> Floats:
+    """Return the weighted squares that are left where each of all ghosts is, with these numbers of light."""
+    everything = np.zeros(colour.side.size)
+    everything[at] = values
+    rests = np.zeros(colour.side.size // _TERMS.size)
+    for one in colour.pictures:
+        missed = one.pixels - one.basis @ everything[one.columns]
+        rests[one.ghosts] += (one.weight * missed**2) @ one.there
+    return rests
 
 
 def _pictures(

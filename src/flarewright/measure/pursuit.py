@@ -16,7 +16,7 @@ from ..model.ghost_model import Blades
 from .evenly import evenly
 from .find import Candidate, candidates, slopes_of
 from .fit import brightens, cost_of, render
-from .found import Found, darkened, left_beside, rest_of
+from .found import Found, darkened, left_beside
 from .grow import Growth, grow
 from .jointly import fitted_jointly
 from .journal import Journal
@@ -79,7 +79,7 @@ def pursue(
     *,
     most: int = 60,
     first: Sequence[Candidate] = (),
-    known: Sequence[Found] = (),
+    rest: Sequence[Pixels] | None = None,
     iris: Blades | None = None,
     pool: ThreadPoolExecutor | None = None,
     tell: Callable[[str], None] = lambda _: None,
@@ -91,14 +91,14 @@ def pursue(
     Parameters
     ----------
     views : sequence of View
-        Glow taken off.
+        Glow taken off, all colours as one (`mixed`).
     masks : sequence of ndarray of bool, shape (H, W)
         Where to look.
     most : int
     first : sequence of Candidate
         Tried before all others.
-    known : sequence of Found
-        Ghosts that are taken off first and stay as they are.
+    rest : sequence of ndarray, shape (H, W), optional
+        What views show beside ghosts that are known already and stay as they are; None: none is.
     iris : Blades, optional
         Rims that ghosts may have, beside round ones.
     pool : executor, optional
@@ -112,15 +112,15 @@ def pursue(
     Returns
     -------
     list of Found
-        The new ones.
+        The new ones, all colours alike.
     """
     # masked pixels weigh nothing, in all fits
     shown = [
         replace(view, variance=np.where(mask[..., None], view.variance, np.inf).astype(np.float32))
         for view, mask in zip(views, masks, strict=True)
     ]
-    wanted = rest_of(known, shown, 1, pool)
-    rest = list(wanted)
+    wanted = [view.pixels[..., 1] for view in shown] if rest is None else list(rest)
+    left = list(wanted)
     found: list[Found] = []
     refused: list[_Refused] = []
     waiting = list(first)
@@ -133,7 +133,7 @@ def pursue(
         asked = _TRIALS + len(refused)
         if asked > known_to:
             known_to = asked + _SPARE
-            rims, small = steps.step(partial(_candidates, shown, rest, masks, known_to, iris, pool))
+            rims, small = steps.step(partial(_candidates, shown, left, masks, known_to, iris, pool))
         votes = sorted([*rims[:asked], *small[:asked]], key=lambda each: -each.score)
         trials = _open([each for each in votes if each.score > SCORE], refused, len(found))
         fallen(trials[0].score if trials else SCORE, len(found))
@@ -144,13 +144,13 @@ def pursue(
                 break
             if any(_stale(trial, other) for other in taken):
                 continue
-            ghost = steps.step(partial(_try, trial, shown, rest, pool))
+            ghost = steps.step(partial(_try, trial, shown, left, pool))
             if ghost is None:
                 refused = _with_refused(refused, trial, len(found))
                 continue
             taken.append(trial)
             found.append(ghost)
-            rest = left_beside(rest, [ghost], shown, 1, pool)
+            left = left_beside(left, [ghost], shown, 1, pool)
             numbers = ghost.shapes[1].numbers
             rim = "round" if trial.blades is None else f"{trial.blades.count} blades"
             tell(
@@ -162,13 +162,13 @@ def pursue(
         if taken:
             shapes = steps.step(partial(fitted_jointly, found, shown, wanted, 1, steps=_TOUCHES, pool=pool))
             found = [replace(ghost, shapes=(one, one, one)) for ghost, one in zip(found, shapes, strict=True)]
-            rest = left_beside(wanted, found, shown, 1, pool)
+            left = left_beside(wanted, found, shown, 1, pool)
             if len(found) >= _MANY_MORE * asked_at:
-                found, rest = respanned(found, shown, rest, pool)
+                found, (left,) = respanned(found, shown, [left], [0] * len(found), pool)
                 asked_at = len(found)
             # who voted for what was there before has to look again
             known_to = 0
-    return respanned(found, shown, rest, pool)[0] if len(found) > asked_at else found
+    return respanned(found, shown, [left], [0] * len(found), pool)[0] if len(found) > asked_at else found
 
 
 @dataclass(frozen=True)

@@ -92,8 +92,8 @@ def settle(
         ghosts = lit(ghosts, views, pool=pool)
         # in small pictures, and every ghost in its own after that: what is told of its errors is of these
         ghosts = _jointly(ghosts, views, noise, pool, steps)
-        ghosts, green = respanned(ghosts, views, rest_of(ghosts, views, 1, pool), pool)
-        rest = [green if m == 1 else rest_of(ghosts, views, m, pool) for m in range(CHANNELS)]
+        rest = [rest_of(ghosts, views, m, pool) for m in range(CHANNELS)]
+        ghosts, rest = respanned(ghosts, views, rest, [leading(ghost, noise) for ghost in ghosts], pool)
         for done, k in enumerate(by_light(ghosts)):
             old = ghosts[k]
             ghosts[k] = steps.step(partial(_again, old, views, rest, leading(old, noise), how, iris, pool))

@@ -40,12 +40,16 @@ def span_of(
     -----
     A view that does not reach it, or cannot tell, is no reason for a death, and neither is a single one without it.
     """
-    return _around([each is not False for each in _shown(shape, views, own, pool)], middle)
+    return _around([each is not False for each in _shown(shape, views, own, 1, pool)], middle)
 
 
 def respanned(
-    ghosts: Sequence[Found], views: Sequence[View], rest: Sequence[Pixels], pool: ThreadPoolExecutor | None = None
-) -> tuple[list[Found], list[Pixels]]:
+    ghosts: Sequence[Found],
+    views: Sequence[View],
+    rests: Sequence[Sequence[Pixels]],
+    leads: Sequence[int],
+    pool: ThreadPoolExecutor | None = None,
+) -> tuple[list[Found], list[list[Pixels]]]:
     """Ask all views anew in which of them each ghost is there, the brightest first.
 
     When a ghost was found others were not known: light of theirs hid where it goes on, or passed for its own.
@@ -54,38 +58,44 @@ def respanned(
     ----------
     ghosts : sequence of Found
     views : sequence of View
-    rest : sequence of ndarray, shape (H, W)
-        What each shows of green beside all ghosts.
+    rests : sequence of sequences of ndarray, shape (H, W)
+        What each view shows beside all ghosts, colour by colour, or of the first colours.
+    leads : sequence of int
+        The colour that each ghost is looked for in.
     pool : executor, optional
 
     Returns
     -------
     ghosts : list of Found
-    rest : list of ndarray, shape (H, W)
+    rests : list of lists of ndarray, shape (H, W)
         Beside these.
     """
-    out, left = list(ghosts), [picture.copy() for picture in rest]
+    out, left = list(ghosts), [[picture.copy() for picture in rest] for rest in rests]
     for k in by_light(ghosts):
-        ghost, shape = out[k], out[k].shapes[1]
-        lay_over(shape, ghost, views, left, 1.0, pool)
-        seen = _shown(shape, views, left, pool)
+        ghost, lead = out[k], leads[k]
+        lay_over(ghost.shapes[lead], ghost, views, left[lead], 1.0, pool)
+        seen = _shown(ghost.shapes[lead], views, left[lead], lead, pool)
         # the longest life of which views are certain
         lives = {_around([each is not False for each in seen], at) for at, each in enumerate(seen) if each}
         first, last = max(lives, key=lambda life: (seen[life[0] : life[1] + 1].count(True), -life[0]), default=(0, 0))
         if last - first + 1 >= LEAST_VIEWS:
             out[k] = replace(ghost, first=first, last=last)
-        lay_over(shape, out[k], views, left, -1.0, pool)
+        lay_over(ghost.shapes[lead], out[k], views, left[lead], -1.0, pool)
+        if (out[k].first, out[k].last) != (ghost.first, ghost.last):
+            for m in set(range(len(left))) - {lead}:
+                lay_over(ghost.shapes[m], ghost, views, left[m], 1.0, pool)
+                lay_over(ghost.shapes[m], out[k], views, left[m], -1.0, pool)
     return out, left
 
 
 def _shown(
-    shape: Shape, views: Sequence[View], own: Sequence[Pixels], pool: ThreadPoolExecutor | None
+    shape: Shape, views: Sequence[View], own: Sequence[Pixels], channel: int, pool: ThreadPoolExecutor | None
 ) -> list[bool | None]:
     """Tell which views show a shape; None of those that cannot tell."""
     alone = [view.showing_one(each) for view, each in zip(views, own, strict=True)]
     return [
         bool(seen.amplitude > THERE) if np.isfinite(seen.error) and seen.error <= _UNSURE else None
-        for seen in presences(shape, alone, 1, pool=pool)
+        for seen in presences(shape, alone, channel, pool=pool)
     ]
 
 

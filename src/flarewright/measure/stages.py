@@ -20,12 +20,13 @@ from ..model.corrections import Corrections
 from ..model.ghost_model import AberrationGhost, Blades, GhostModel, Halo, Reference, Star
 from .detail_fit import with_detail
 from .fit import light_of
-from .found import Found
+from .found import CHANNELS, Found, rest_of
 from .fragments import joined
 from .glow import halo_at, offsets, star_at
 from .glow_fit import fit_halo, fit_star, followed, iris_of, register
 from .joint import lit
 from .journal import Journal
+from .mixed import mixed, mixture, shares
 from .moves_fit import with_moves
 from .numbers import channel_numbers
 from .packed import pack
@@ -184,7 +185,7 @@ def find_ghosts(
     Returns
     -------
     GhostModel
-        Rough: all colours of a ghost have green's shape.
+        Rough: all colours of a ghost have one shape.
 
     Raises
     ------
@@ -195,15 +196,17 @@ def find_ghosts(
     with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
         views = read_views(folder, run, every, pool)
         dim = _dimmed_beside([], views, _star_of(views, pool), pool)
+        share = shares(dim.views)
         times, small = _for_search(dim.views)
+        _, seen = _for_search(mixed(views, dim.views, share, LEFT_BEHIND, pool))
         iris = iris_of(dim.star)
         pointed = [candidate(each, small, 2.0**times, run) for each in known.add]
         measured = [all_known(view.variance) for view in small]
         found = pursue(
-            small, measured, most=most, first=pointed, iris=iris, pool=pool, tell=tell, progress=progress,
+            seen, measured, most=most, first=pointed, iris=iris, pool=pool, tell=tell, progress=progress,
             journal=journal,
         )  # fmt: skip
-        found = lit(joined(lit(found, small, pool=pool), small, pool=pool, tell=tell), small, pool=pool)
+        found = lit(joined(lit(found, seen, pool=pool), seen, pool=pool, tell=tell), small, pool=pool)
     tell_pointed(known, pointed, found, tell)
     ghosts = to_model([_sized(ghost, 2.0**times) for ghost in found], views)
     wanted = kept(known, ghosts, tell)
@@ -279,7 +282,7 @@ def fit_ghosts(
         for _ in range(again):
             # with more ghosts known, the glow is better known and leaves more to be found
             dim = _dimmed_beside(settled, views, dim.star, pool)
-            settled += _more(settled, dim.views, most - len(settled), iris, pool, tell, next(parts), journal)
+            settled += _more(settled, views, dim.views, most - len(settled), iris, pool, tell, next(parts), journal)
             settled = _whole(settled, dim.views, pool, tell)
             settled = settle(
                 settled, dim.views, how=settling, iris=iris, pool=pool, tell=tell, progress=next(parts),
@@ -416,6 +419,7 @@ def _light(halo: Halo | None, star: Star | None, view: View) -> Pixels:
 def _more(
     known: Sequence[Found],
     views: Sequence[View],
+    dimmed: Sequence[View],
     most: int,
     iris: Blades | None,
     pool: ThreadPoolExecutor,
@@ -424,10 +428,14 @@ def _more(
     journal: Journal | None,
 ) -> list[Found]:
     """Look for more ghosts beside the known ones, at the search's resolution."""
-    times, small = _for_search(views)
+    share = shares(dimmed)
+    times, small = _for_search(dimmed)
+    _, seen = _for_search(mixed(views, dimmed, share, LEFT_BEHIND, pool))
     measured = [all_known(view.variance) for view in small]
+    ghosts = [_sized(ghost, 0.5**times) for ghost in known]
+    left = np.stack([rest_of(ghosts, small, m, pool) for m in range(CHANNELS)], axis=-1)
     found = pursue(
-        small, measured, most=max(most, 0), known=[_sized(ghost, 0.5**times) for ghost in known], iris=iris, pool=pool,
+        seen, measured, most=max(most, 0), rest=[mixture(each, share) for each in left], iris=iris, pool=pool,
         tell=tell, progress=progress, journal=journal,
     )  # fmt: skip
     return [_sized(ghost, 2.0**times) for ghost in found]
