@@ -149,3 +149,16 @@ def test_ghosts_that_have_shrunk_to_nothing_take_no_other_with_them():
             assert np.isfinite(render(vanished[-1], view)).all()
     kept = lit([*map(found, vanished[:5]), *map(found, GHOSTS[:2])], shown)
     assert [ghost.shapes[1].numbers[0] for ghost in kept] == [ghost.numbers[0] for ghost in GHOSTS[:2]]
+
+
+def test_a_speck_stays_a_ghost_of_its_own(monkeypatch):
+    """A caustic core of a pixel: drawn as a part of its ghost it is soft, and nothing finer than a pixel is learned."""
+    whole = shape(-50.0, 12.0, 0.4)
+    whole.numbers[10], whole.numbers[11] = 1.0, 11.0
+    shown = views((whole,), angles=FEW)
+    pieces = lit([found(shape(-50.0, 12.0, 0.4)), found(shape(-50.0, 1.1, 4.0))], shown, needed=0.0)
+    assert len(pieces) == 2
+    assert len(joined(pieces, shown)) == 2
+    # it is one ghost, and a larger one would be taken for that
+    monkeypatch.setattr("flarewright.measure.fragments._SPECK", 0.0)
+    assert len(joined(pieces, shown)) == 1

@@ -23,6 +23,8 @@ _LOST = 0.08
 _APART, _SHARED = 0.4, 0.5
 # how wide the pupil's middle is drawn where fits of one ghost begin: 1 is even, little is a bright core
 _CORES = (1.0, 0.4, -0.2)
+# a ghost no larger than this part of the picture's width is a speck
+_SPECK = 0.005
 # views that a trial looks at, and pixels of a window there
 _FEW, _AREA = 10, 2500
 # part of the light that a trial's model may miss beyond what its views say: nothing, but a search as rough as others
@@ -56,10 +58,14 @@ def joined(
     -----
     A lens of revolution maps the pupil by g(u), u the square of the distance from its middle (`measure_pupil`): a core
     is where g is little in the middle of the pupil, and no fit that began with an even disc gets there by itself.
+    Specks stay: a caustic of a pixel or two that outshines its ghost many times is not drawn by a larger one, and is
+    learned in pictures finer than a pixel where a ghost of its own goes with it (`speck_sprites`).
     """
     out = list(ghosts)
     rest = rest_of(out, views, 1, pool)
     for ghost in [out[k] for k in reversed(by_light(out))]:
+        if _is_speck(ghost, views):
+            continue
         for other in _hosts(ghost, out):
             one = _as_one(other, ghost, views, rest, pool)
             if one is None:
@@ -70,6 +76,15 @@ def joined(
             tell(f"a ghost at speed {ghost.shapes[1].numbers[0]:.0f} px is a part of one of size {size:.0f} px")
             break
     return out
+
+
+def _is_speck(ghost: Found, views: Sequence[View]) -> bool:
+    """Tell whether a ghost is never larger than a speck."""
+    numbers = ghost.shapes[1].numbers
+    sizes = [
+        abs(numbers[FIRST_G] + numbers[FIRST_G + 3] * view.sigma**2) for view in views[ghost.first : ghost.last + 1]
+    ]
+    return bool(max(sizes, default=0.0) <= _SPECK * views[0].size_px[0])
 
 
 def _hosts(ghost: Found, ghosts: Sequence[Found]) -> list[Found]:
