@@ -33,6 +33,10 @@ def test_colours_count_by_how_certain_they_are():
         assert ((share + step) ** 2) @ seen[0].variance[0, 0] > (share**2) @ seen[0].variance[0, 0]
 
 
+def test_pictures_without_noise_count_alike():
+    assert shares([noisier(view, (0.0, 0.0, 0.0)) for view in views(())[:3]]) == pytest.approx(np.full(3, 1.0 / 3.0))
+
+
 def test_what_was_not_measured_stays_unknown_and_the_noise_is_what_is_told():
     seen = views(())[:3]
     seen[0].variance[:4, :, 0] = np.inf

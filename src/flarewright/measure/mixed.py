@@ -13,6 +13,8 @@ from .numbers import Floats
 from .shared_out import shared_out
 from .views import Pixels, View
 
+_LEAST_NOISE = 1e-30
+
 
 def shares(views: Sequence[View]) -> Floats:
     """Return how much red, green and blue count when they are mixed, shape (3,), summing to 1.
@@ -20,7 +22,8 @@ def shares(views: Sequence[View]) -> Floats:
     The less noise a colour has the more it counts, by its variance: of light that stands out alike in all of them such
     a mixture shows most.
     """
-    counts = 1.0 / noise_of(views) ** 2
+    # pictures that are told to be without noise count alike
+    counts = np.maximum(noise_of(views).astype(np.float64), _LEAST_NOISE) ** -2.0
     return np.asarray(counts / counts.sum(), dtype=np.float64)
 
 
