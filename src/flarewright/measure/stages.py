@@ -28,7 +28,7 @@ from .joint import lit
 from .journal import Journal
 from .mixed import mixed, mixture, shares
 from .moves_fit import with_moves
-from .numbers import channel_numbers
+from .numbers import Floats, channel_numbers
 from .packed import pack
 from .pointing import candidate, kept, tell_pointed
 from .pursuit import pursue
@@ -196,9 +196,8 @@ def find_ghosts(
     with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
         views = read_views(folder, run, every, pool)
         dim = _dimmed_beside([], views, _star_of(views, pool), pool)
-        share = shares(dim.views)
         times, small = _for_search(dim.views)
-        _, seen = _for_search(mixed(views, dim.views, share, LEFT_BEHIND, pool))
+        seen = _mixed_for_search(views, dim.views, shares(dim.views), pool)
         iris = iris_of(dim.star)
         pointed = [candidate(each, small, 2.0**times, run) for each in known.add]
         measured = [all_known(view.variance) for view in small]
@@ -430,7 +429,7 @@ def _more(
     """Look for more ghosts beside the known ones, at the search's resolution."""
     share = shares(dimmed)
     times, small = _for_search(dimmed)
-    _, seen = _for_search(mixed(views, dimmed, share, LEFT_BEHIND, pool))
+    seen = _mixed_for_search(views, dimmed, share, pool)
     measured = [all_known(view.variance) for view in small]
     ghosts = [_sized(ghost, 0.5**times) for ghost in known]
     left = np.stack([rest_of(ghosts, small, m, pool) for m in range(CHANNELS)], axis=-1)
@@ -452,6 +451,14 @@ def _for_search(views: Sequence[View]) -> tuple[int, list[View]]:
     """Return how often pictures are halved in which ghosts are looked for, and these."""
     times = max(0, int(np.ceil(np.log2(views[0].size_px[0] / SEARCH_WIDTH))))
     return times, [coarse(view, times) for view in views]
+
+
+def _mixed_for_search(
+    views: Sequence[View], dimmed: Sequence[View], share: Floats, pool: ThreadPoolExecutor
+) -> list[View]:
+    """Return the pictures in which ghosts are looked for, all colours as one."""
+    _, seen = _for_search(mixed(views, dimmed, share, LEFT_BEHIND, pool))
+    return seen
 
 
 def _sized(ghost: Found, factor: float) -> Found:
