@@ -105,7 +105,7 @@ def judge(model: GhostModel, folder: Path, run_folder: Path, run: MergedRun) -> 
         around = [info for info in infos if abs(info.nominal_deg - pose["nominal_deg"]) < 0.31 * 3]
         below = [info for info in around if info.nominal_deg < pose["nominal_deg"]]
         above = [info for info in around if info.nominal_deg > pose["nominal_deg"]]
-        far = _far_from(pose["light_px"], run.size_px) & _far_from(pose["image_px"], run.size_px)
+        far = far_from(pose["light_px"], run.size_px) & far_from(pose["image_px"], run.size_px)
         picture = replay(model, pose["constellation_deg"], roll_deg=pose["roll_deg"])[0].pixels
         if below and above:
             pair = [frames.setdefault(info.file, read_frame(run_folder, info)) for info in (below[-1], above[0])]
@@ -117,7 +117,7 @@ def judge(model: GhostModel, folder: Path, run_folder: Path, run: MergedRun) -> 
     return summary(tally)
 
 
-def _far_from(place_px: tuple[float, float], size_px: tuple[int, int]) -> Mask:
+def far_from(place_px: tuple[float, float], size_px: tuple[int, int]) -> Mask:
     """Return which pixels are far enough from a place to be judged."""
     return np.asarray(np.hypot(*offsets(tuple(place_px), size_px, 1.0)) > AROUND_LIGHT * size_px[0])
 

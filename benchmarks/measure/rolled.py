@@ -12,12 +12,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from benchmarks.measure.judge import AROUND_LIGHT
+from benchmarks.measure.judge import far_from
 from numpy.typing import NDArray
 from synthetic_camera import Setup, poses, scale_of, truth_of
 
 from flarewright.io.merged import read_frame
-from flarewright.measure.glow import offsets
 from flarewright.measure.replay import replay
 from flarewright.measure.sprites import samples
 from flarewright.model.capture import MergedFrame, MergedRun
@@ -62,7 +61,7 @@ def judge_rolled(model: GhostModel, folder: Path, run_folder: Path, run: MergedR
         frame = read_frame(run_folder, min(run.frames, key=lambda info: abs(info.constellation_deg - constellation)))
         turned, shown = _turned(frame, float(roll))
         mine = replay(model, float(constellation), roll_deg=float(roll))[0].pixels
-        far = np.hypot(*offsets((light[0], light[1]), run.size_px, 1.0)) > AROUND_LIGHT * run.size_px[0]
+        far = far_from((light[0], light[1]), run.size_px)
         floor = float(np.sqrt(np.median(frame.variance[np.isfinite(frame.variance)])))
         logs = [np.log(np.maximum(each, 0.0) + floor) for each in (mine, turned, true)]
         row: dict[str, Any] = {"constellation": float(constellation), "roll": float(roll)}

@@ -14,7 +14,7 @@ from .fit import MODEL_ERROR, brightens, cost_of, improve, render
 from .found import Found, by_light, rest_of
 from .numbers import Floats
 from .patches import Patch, patches_of
-from .shape import Shape, free_numbers
+from .shape import Shape, free_numbers, largest_size
 from .views import Pixels, View
 
 # part of the squares explained by the smaller of two ghosts that one ghost may lose
@@ -80,11 +80,8 @@ def joined(
 
 def _is_speck(ghost: Found, views: Sequence[View]) -> bool:
     """Tell whether a ghost is never larger than a speck."""
-    numbers = ghost.shapes[1].numbers
-    sizes = [
-        abs(numbers[FIRST_G] + numbers[FIRST_G + 3] * view.sigma**2) for view in views[ghost.first : ghost.last + 1]
-    ]
-    return bool(max(sizes, default=0.0) <= _SPECK * views[0].size_px[0])
+    there = views[ghost.first : ghost.last + 1]
+    return largest_size(ghost.shapes[1], [view.sigma for view in there]) <= _SPECK * views[0].size_px[0]
 
 
 def _hosts(ghost: Found, ghosts: Sequence[Found]) -> list[Found]:

@@ -145,8 +145,8 @@ def _needed(told: Sequence[_Told], least: float) -> Indices:
             values = inverse @ colour.side[at]
             rests += _rests(colour, at, values)[kept]
             for n in range(kept.size):
-                own, part = at[_columns(np.array([n]))], slice(_TERMS.size * n, _TERMS.size * (n + 1))
-                light = values[part]
+                part = slice(_TERMS.size * n, _TERMS.size * (n + 1))
+                own, light = at[part], values[part]
                 grown[n] += float(light @ np.linalg.solve(inverse[part, part], light))
                 seen[n] += float(light @ colour.matrix[np.ix_(own, own)] @ light)
                 lit_up[n] += adding[own] @ light

@@ -23,7 +23,7 @@ from .journal import Journal
 from .numbers import NUMBERS, with_blades
 from .patches import patches_of
 from .presence import presences
-from .shape import Shape
+from .shape import Shape, largest_size
 from .shared_out import shared_out
 from .spans import LEAST_VIEWS, respanned, span_of
 from .specks import RADII, highest_near, specks
@@ -305,8 +305,7 @@ def _stays(trial: Candidate, shape: Shape, views: Sequence[View]) -> bool:
     """Tell whether a fit is about where its candidate was seen, and as large: elsewhere nobody voted for it."""
     if trial.radius <= SPECK:
         # a speck is no larger than what was looked at
-        sizes = [abs(shape.numbers[FIRST_G] + shape.numbers[FIRST_G + 3] * view.sigma**2) for view in views]
-        return bool(max(sizes) <= trial.radius + BESIDE_SPECK)
+        return largest_size(shape, [view.sigma for view in views]) <= trial.radius + BESIDE_SPECK
     shared = covered = 0
     for view in views[:: max(1, len(views) // _LOOKED)]:
         disc = distances(view, trial.place(view.sigma)) <= trial.radius

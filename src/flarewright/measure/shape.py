@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -68,6 +69,12 @@ def free_numbers(
     picked += range(LATERAL, BELOW) if lateral else []
     picked += range(BELOW, BELOW + BELOW_NUMBERS) if below else []
     return np.array(picked, dtype=np.int64)
+
+
+def largest_size(shape: Shape, sigmas: Iterable[float]) -> float:
+    """Return how large a shape is at the field, of those given, at which it is largest: its first order, pixels."""
+    size, growth = shape.numbers[FIRST_G], shape.numbers[FIRST_G + 3]
+    return float(max(abs(size + growth * sigma**2) for sigma in sigmas))
 
 
 def stepped(shape: Shape, free: Indices, step: Floats) -> Shape:
