@@ -9,24 +9,26 @@ from planted_run import GHOSTS, LARGEST, SIZE, shape, views
 from flarewright.cli.app import run as command
 from flarewright.io.ghost_model_file import read_ghost_model
 from flarewright.io.merged import read_run, write_frame, write_run
+from flarewright.measure import stages
 from flarewright.measure.fit import render
 from flarewright.measure.found import Found
 from flarewright.measure.replay import draw, replay
 from flarewright.measure.settle import to_model
 from flarewright.measure.stages import find_ghosts, fit_ghosts, read_views
 from flarewright.model.capture import FrameInfo, MergedFrame, MergedRun
-from flarewright.model.corrections import Corrections
+from flarewright.model.corrections import Corrections, Pointed
 from flarewright.model.ghost_model import GhostModel
 
 ANGLES = np.linspace(2.0, LARGEST, 12)
 FOCAL = 900.0
 
 
-def write(folder, ghosts, focal=FOCAL) -> None:
-    """Write a merged run of planted ghosts."""
+def write(folder, ghosts, focal=FOCAL, last_from=0) -> None:
+    """Write a merged run of planted ghosts, the last of which is born at one of the constellations."""
     infos = []
     (folder / "frames").mkdir()
-    for k, view in enumerate(views(ghosts, angles=ANGLES)):
+    before, after = views(ghosts[:-1], angles=ANGLES), views(ghosts, angles=ANGLES)
+    for k, view in enumerate([*before[:last_from], *after[last_from:]]):
         x, y = float(view.frame[0]), float(view.frame[1])
         info = FrameInfo(
             file=f"frames/{k:03d}.exr", constellation_deg=float(ANGLES[k]), nominal_deg=float(ANGLES[k]),
@@ -110,6 +112,25 @@ def test_a_fit_does_not_find_again_what_a_person_took_away(tmp_path):
     shown = replay(model, angle)[0].pixels[..., 1] - render(GHOSTS[0], views((), angles=[angle])[0])
     truth = render(GHOSTS[1], views((), angles=[angle])[0])
     assert shown.sum() == pytest.approx(truth.sum(), rel=0.2)
+
+
+def test_of_many_constellations_some_are_searched_and_all_fitted(tmp_path, monkeypatch):
+    born, searched = 5, [0, 2, 4, 7, 9, 11]
+    monkeypatch.setattr(stages, "SEARCHED", len(searched))
+    write(tmp_path, GHOSTS[:2], last_from=born)
+    run = read_run(tmp_path)
+    # pointed at where no constellation is searched
+    x = run.axis_px[0] + 55.0 * np.tan(np.radians(ANGLES[5])) / np.tan(np.radians(LARGEST))
+    pointed = Pointed(constellation_deg=float(ANGLES[5]), centre_px=(x, run.axis_px[1]), radius_px=14.0)
+    rough = find_ghosts(tmp_path, run, most=1, corrections=Corrections(add=(pointed,)))
+    assert [ghost.green.f[0] for ghost in rough.ghosts] == pytest.approx([55.0], abs=1.0)
+    # it begins between the last one searched that does not show it and the first that does
+    assert ANGLES[4] < rough.ghosts[0].visible_deg[0] < ANGLES[7]
+    model = fit_ghosts(tmp_path, run, rough)
+    late, other = sorted(model.ghosts, key=lambda ghost: -ghost.green.f[0])
+    assert ANGLES[born - 1] < late.visible_deg[0] < ANGLES[born]
+    assert other.green.f[0] == pytest.approx(-110.0, abs=1.0)
+    assert other.visible_deg == (ANGLES[0], ANGLES[-1])
 
 
 @pytest.mark.parametrize(("every", "kept"), [(1, 8), (2, 4), (3, 4)])

@@ -18,16 +18,19 @@ from .views import View
 _FIRST = 1e9
 
 
-def candidate(pointed: Pointed, views: Sequence[View], factor: float, run: MergedRun) -> Candidate:
+def candidate(pointed: Pointed, views: Sequence[View], run: MergedRun, *, looked: int, factor: float) -> Candidate:
     """Turn a ghost that a person pointed at, in one frame, into a candidate.
 
     Parameters
     ----------
     pointed : Pointed
     views : sequence of View
-        By rising constellation, smaller than the frames by `factor`.
-    factor : float
+        By rising constellation, as large as the frames.
     run : MergedRun
+    looked : int
+        Views in which candidates are looked for.
+    factor : float
+        By which the pixels of these are larger.
 
     Returns
     -------
@@ -60,8 +63,8 @@ def candidate(pointed: Pointed, views: Sequence[View], factor: float, run: Merge
             f"corrections: {_place(pointed)} is not in the picture of {run.size_px[0]} x {run.size_px[1]} pixels"
         )
     x, y, cosine, sine, _ = views[at].frame
-    along = (pointed.centre_px[0] / factor - x) * cosine - (pointed.centre_px[1] / factor - y) * sine
-    return Candidate(float(along / views[at].sigma), pointed.radius_px / factor, 0, len(views) - 1, _FIRST)
+    along = (pointed.centre_px[0] - x) * cosine - (pointed.centre_px[1] - y) * sine
+    return Candidate(float(along / views[at].sigma) / factor, pointed.radius_px / factor, 0, looked - 1, _FIRST)
 
 
 def tell_pointed(

@@ -24,7 +24,7 @@ from .numbers import NUMBERS, with_blades
 from .patches import patches_of
 from .presence import presences
 from .shape import Shape, largest_size
-from .shared_out import shared_out
+from .shared_out import shared_out, side_by_side
 from .spans import LEAST_VIEWS, respanned, span_of
 from .specks import RADII, highest_near, specks
 from .views import Pixels, View, distances
@@ -52,8 +52,10 @@ _TOUCHES = 6
 _MANY_MORE = 1.1
 # candidates that are looked for beside those that were refused, and more, so that not every refusal is a new search
 _TRIALS, _SPARE = 12, 20
-# views that vote, and that a first fit looks at
-VOTERS = 50
+# candidates that are tried before votes are cast again, and the part of the best one's votes that they must have when
+# any was taken; so many are tried at a time after one was refused, for then the next mostly is as well
+_ROUND, _NEARLY, _BESIDE_REFUSED = 4, 0.6, 2
+# views that a first fit looks at
 _FEW = 16
 # how far a candidate grows: most of what lies beside it is not known yet, so its misfit tells nothing of it, and
 # fine pictures no more than coarse ones
@@ -91,7 +93,7 @@ def pursue(
     Parameters
     ----------
     views : sequence of View
-        Glow taken off, all colours as one (`mixed`).
+        Glow taken off, all colours as one (`mixed`); with many more than `stages.SEARCHED` chance reaches more votes.
     masks : sequence of ndarray of bool, shape (H, W)
         Where to look.
     most : int
@@ -129,6 +131,7 @@ def pursue(
     rims: list[Candidate] = []
     small: list[Candidate] = []
     known_to = asked_at = 0
+    beside = 1
     while len(found) < most:
         asked = _TRIALS + len(refused)
         if asked > known_to:
@@ -138,25 +141,28 @@ def pursue(
         trials = _open([each for each in votes if each.score > SCORE], refused, len(found))
         fallen(trials[0].score if trials else SCORE, len(found))
         taken: list[Candidate] = []
-        trials, waiting = [*waiting[:4], *trials], waiting[4:]
-        for trial in trials[:4]:
-            if taken and trial.score < 0.6 * trials[0].score:
+        trials, waiting = [*waiting[:_ROUND], *trials], waiting[_ROUND:]
+        queue = trials[:_ROUND]
+        while queue:
+            ghosts = steps.step(partial(_tried, queue[:beside], shown, left, pool))
+            for trial, ghost in zip(queue[:beside], ghosts, strict=True):
+                queue = queue[1:]
+                if ghost is None:
+                    refused, beside = _with_refused(refused, trial, len(found)), _BESIDE_REFUSED
+                    continue
+                taken.append(trial)
+                found.append(ghost)
+                left = left_beside(left, [ghost], shown, 1, pool)
+                numbers = ghost.shapes[1].numbers
+                rim = "round" if trial.blades is None else f"{trial.blades.count} blades"
+                tell(
+                    f"ghost {len(found)}: speed {numbers[0]:.0f} px, size {abs(numbers[FIRST_G]):.1f} px, {rim}, votes "
+                    f"{trial.score:.1f}, views {ghost.first}-{ghost.last}"
+                )
+                # those tried beside it did not know of it
+                queue = [one for one in queue if one.score >= _NEARLY * trials[0].score and not _stale(one, trial)]
+                beside = 1
                 break
-            if any(_stale(trial, other) for other in taken):
-                continue
-            ghost = steps.step(partial(_try, trial, shown, left, pool))
-            if ghost is None:
-                refused = _with_refused(refused, trial, len(found))
-                continue
-            taken.append(trial)
-            found.append(ghost)
-            left = left_beside(left, [ghost], shown, 1, pool)
-            numbers = ghost.shapes[1].numbers
-            rim = "round" if trial.blades is None else f"{trial.blades.count} blades"
-            tell(
-                f"ghost {len(found)}: speed {numbers[0]:.0f} px, size {abs(numbers[FIRST_G]):.1f} px, {rim}, votes "
-                f"{trial.score:.1f}, views {ghost.first}-{ghost.last}"
-            )
         if not trials:
             break
         if taken:
@@ -223,17 +229,10 @@ def _candidates(
     pool: ThreadPoolExecutor | None,
 ) -> tuple[list[Candidate], list[Candidate]]:
     """Return the best rims and the best specks, best first."""
-    # with more of them a vote costs more and tells no more: `SCORE` is what chance reaches with so many
-    voters = evenly(range(len(views)), VOTERS)
-    seen, left, where = evenly(views, VOTERS), evenly(rest, VOTERS), evenly(masks, VOTERS)
-    slopes = slopes_of(_doubted(seen, left, pool=pool), left, where, pool=pool)
+    slopes = slopes_of(_doubted(views, rest, pool=pool), rest, masks, pool=pool)
     rims = candidates(slopes, views[0].size_px[0], most=most, iris=iris, pool=pool)
-    small = specks(_doubted(seen, left, beside=True, pool=pool), left, where, most=most, pool=pool)
-
-    def numbered(some: Sequence[Candidate]) -> list[Candidate]:
-        return [replace(each, first=voters[each.first], last=voters[each.last]) for each in some]
-
-    return numbered(rims), numbered(small)
+    small = specks(_doubted(views, rest, beside=True, pool=pool), rest, masks, most=most, pool=pool)
+    return rims, small
 
 
 def _doubted(
@@ -270,6 +269,13 @@ def _stale(trial: Candidate, taken: Candidate) -> bool:
 def _alone(views: Sequence[View], rest: Sequence[Pixels], keep: Sequence[int]) -> list[View]:
     """Return some views with one channel's rest as their green."""
     return [views[k].showing_one(rest[k]) for k in keep]
+
+
+def _tried(
+    trials: Sequence[Candidate], views: Sequence[View], rest: Sequence[Pixels], pool: ThreadPoolExecutor | None
+) -> list[Found | None]:
+    """Fit some candidates, each as if it were the only one, and judge them."""
+    return side_by_side(*(partial(_try, trial, views, rest, pool) for trial in trials), pool=pool)
 
 
 def _try(

@@ -19,6 +19,7 @@ from ..model.capture import FrameInfo, MergedRun
 from ..model.corrections import Corrections
 from ..model.ghost_model import AberrationGhost, Blades, GhostModel, Halo, Reference, Star
 from .detail_fit import with_detail
+from .evenly import evenly
 from .fit import light_of
 from .found import CHANNELS, Found, rest_of
 from .fragments import joined
@@ -58,8 +59,9 @@ _OFF_AXIS = 0.02
 _LAW_ROUNDS, _LIGHT_PX = 20, 0.05
 # part of the width by which a light's place may differ from the law of all places
 _NEAR_LAW = 0.01
-# ghosts are looked for in pictures halved until they are no wider
-SEARCH_WIDTH = 400
+# ghosts are looked for in pictures halved until they are no wider, of no more constellations than this: with more of
+# them a vote costs more and tells no more, and `pursuit.SCORE` is what chance reaches with so many
+SEARCH_WIDTH, SEARCHED = 400, 50
 
 
 def read_views(
@@ -196,10 +198,11 @@ def find_ghosts(
     with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
         views = read_views(folder, run, every, pool)
         dim = _dimmed_beside([], views, _star_of(views, pool), pool)
-        times, small = _for_search(dim.views)
-        seen = _mixed_for_search(views, dim.views, shares(dim.views), pool)
+        searched, dimmed = evenly(views, SEARCHED), evenly(dim.views, SEARCHED)
+        times, small = _for_search(dimmed)
+        seen = _mixed_for_search(searched, dimmed, shares(dimmed), pool)
         iris = iris_of(dim.star)
-        pointed = [candidate(each, small, 2.0**times, run) for each in known.add]
+        pointed = [candidate(each, views, run, looked=len(seen), factor=2.0**times) for each in known.add]
         measured = [all_known(view.variance) for view in small]
         found = pursue(
             seen, measured, most=most, first=pointed, iris=iris, pool=pool, tell=tell, progress=progress,
@@ -207,7 +210,7 @@ def find_ghosts(
         )  # fmt: skip
         found = lit(joined(lit(found, seen, pool=pool), seen, pool=pool, tell=tell), small, pool=pool)
     tell_pointed(known, pointed, found, tell)
-    ghosts = to_model([_sized(ghost, 2.0**times) for ghost in found], views)
+    ghosts = to_model([_sized(ghost, 2.0**times) for ghost in found], searched)
     wanted = kept(known, ghosts, tell)
     rough: GhostModel = _model(run, wanted, dim, views).replace(
         removed=tuple(ghost for ghost in ghosts if ghost not in wanted)
@@ -427,17 +430,25 @@ def _more(
     journal: Journal | None,
 ) -> list[Found]:
     """Look for more ghosts beside the known ones, at the search's resolution."""
-    share = shares(dimmed)
-    times, small = _for_search(dimmed)
-    seen = _mixed_for_search(views, dimmed, share, pool)
+    numbers = evenly(range(len(views)), SEARCHED)
+    searched = [dimmed[k] for k in numbers]
+    share = shares(searched)
+    times, small = _for_search(searched)
+    seen = _mixed_for_search([views[k] for k in numbers], searched, share, pool)
     measured = [all_known(view.variance) for view in small]
-    ghosts = [_sized(ghost, 0.5**times) for ghost in known]
+    ghosts = [_among(_sized(ghost, 0.5**times), numbers) for ghost in known]
     left = np.stack([rest_of(ghosts, small, m, pool) for m in range(CHANNELS)], axis=-1)
     found = pursue(
         seen, measured, most=max(most, 0), rest=[mixture(each, share) for each in left], iris=iris, pool=pool,
         tell=tell, progress=progress, journal=journal,
     )  # fmt: skip
-    return [_sized(ghost, 2.0**times) for ghost in found]
+    return [replace(_sized(ghost, 2.0**times), first=numbers[ghost.first], last=numbers[ghost.last]) for ghost in found]
+
+
+def _among(ghost: Found, numbers: Sequence[int]) -> Found:
+    """Return a ghost with its life counted among some of the views; it may fall between two of them."""
+    first, beyond = np.searchsorted(numbers, (ghost.first, ghost.last + 1))
+    return replace(ghost, first=int(first), last=int(beyond) - 1)
 
 
 def _whole(ghosts: Sequence[Found], views: Sequence[View], pool: ThreadPoolExecutor, tell: Tell) -> list[Found]:
