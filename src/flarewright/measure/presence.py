@@ -63,3 +63,15 @@ def presences(
     for patch, (amplitude, deviation) in zip(patches, told, strict=True):
         seen[patch.view] = Presence(float(amplitude), float(deviation))
     return seen
+
+
+def usual_amplitude(shape: Shape, views: Sequence[View], channel: int, error: float = MODEL_ERROR) -> float | None:
+    """Return the median of how much of a shape views show, 0 or more; None when none of them reaches it.
+
+    Parameters
+    ----------
+    shape, views, channel, error
+        As for `presences`.
+    """
+    sure = [each.amplitude for each in presences(shape, views, channel, error) if np.isfinite(each.error)]
+    return max(float(np.median(sure)), 0.0) if sure else None

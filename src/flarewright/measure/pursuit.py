@@ -22,7 +22,7 @@ from .jointly import fitted_jointly
 from .journal import Journal
 from .numbers import NUMBERS, with_blades
 from .patches import patches_of
-from .presence import presences
+from .presence import usual_amplitude
 from .shape import Shape, largest_size
 from .shared_out import shared_out, side_by_side
 from .spans import LEAST_VIEWS, respanned, span_of
@@ -57,6 +57,8 @@ _TRIALS, _SPARE = 12, 20
 _ROUND, _NEARLY, _BESIDE_REFUSED = 4, 0.6, 2
 # views that a first fit looks at
 _FEW = 16
+# by which a candidate that views show no light of begins
+_LEAST_LIGHT = 1e-12
 # how far a candidate grows: most of what lies beside it is not known yet, so its misfit tells nothing of it, and
 # fine pictures no more than coarse ones
 _FIRST = Growth(order=1, discs=1, error=0.05, soft=False, below=False, alike=False, area=2500)
@@ -70,8 +72,7 @@ def beginning(candidate: Candidate, views: Sequence[View], pixels: Sequence[Pixe
     numbers = with_blades(numbers, candidate.blades)
     shape = Shape(numbers)
     alone = [view.showing_one(picture) for view, picture in zip(views, pixels, strict=True)]
-    seen = [each.amplitude for each in presences(shape, alone, 1, 0.0) if np.isfinite(each.error)]
-    numbers[FIRST_I] *= max(float(np.median(seen)) if seen else 0.0, 1e-12)
+    numbers[FIRST_I] *= max(usual_amplitude(shape, alone, 1, 0.0) or 0.0, _LEAST_LIGHT)
     return Shape(numbers)
 
 
@@ -140,9 +141,8 @@ def pursue(
         votes = sorted([*rims[:asked], *small[:asked]], key=lambda each: -each.score)
         trials = _open([each for each in votes if each.score > SCORE], refused, len(found))
         fallen(trials[0].score if trials else SCORE, len(found))
-        taken: list[Candidate] = []
         trials, waiting = [*waiting[:_ROUND], *trials], waiting[_ROUND:]
-        queue = trials[:_ROUND]
+        queue, before = trials[:_ROUND], len(found)
         while queue:
             ghosts = steps.step(partial(_tried, queue[:beside], shown, left, pool))
             for trial, ghost in zip(queue[:beside], ghosts, strict=True):
@@ -150,22 +150,16 @@ def pursue(
                 if ghost is None:
                     refused, beside = _with_refused(refused, trial, len(found)), _BESIDE_REFUSED
                     continue
-                taken.append(trial)
                 found.append(ghost)
+                tell(f"ghost {len(found)}: {_described(ghost, trial)}")
                 left = left_beside(left, [ghost], shown, 1, pool)
-                numbers = ghost.shapes[1].numbers
-                rim = "round" if trial.blades is None else f"{trial.blades.count} blades"
-                tell(
-                    f"ghost {len(found)}: speed {numbers[0]:.0f} px, size {abs(numbers[FIRST_G]):.1f} px, {rim}, votes "
-                    f"{trial.score:.1f}, views {ghost.first}-{ghost.last}"
-                )
-                # those tried beside it did not know of it
+                # those tried beside it did not know of it: they are tried again
                 queue = [one for one in queue if one.score >= _NEARLY * trials[0].score and not _stale(one, trial)]
                 beside = 1
                 break
         if not trials:
             break
-        if taken:
+        if len(found) > before:
             shapes = steps.step(partial(fitted_jointly, found, shown, wanted, 1, steps=_TOUCHES, pool=pool))
             found = [replace(ghost, shapes=(one, one, one)) for ghost, one in zip(found, shapes, strict=True)]
             left = left_beside(wanted, found, shown, 1, pool)
@@ -175,6 +169,15 @@ def pursue(
             # who voted for what was there before has to look again
             known_to = 0
     return respanned(found, shown, [left], [0] * len(found), pool)[0] if len(found) > asked_at else found
+
+
+def _described(ghost: Found, trial: Candidate) -> str:
+    numbers = ghost.shapes[1].numbers
+    rim = "round" if trial.blades is None else f"{trial.blades.count} blades"
+    return (
+        f"speed {numbers[0]:.0f} px, size {abs(numbers[FIRST_G]):.1f} px, {rim}, votes {trial.score:.1f}, views "
+        f"{ghost.first}-{ghost.last}"
+    )
 
 
 @dataclass(frozen=True)
@@ -266,11 +269,6 @@ def _stale(trial: Candidate, taken: Candidate) -> bool:
     return abs(trial.speed - taken.speed) < 0.5 * larger and abs(trial.radius - taken.radius) < 0.5 * larger
 
 
-def _alone(views: Sequence[View], rest: Sequence[Pixels], keep: Sequence[int]) -> list[View]:
-    """Return some views with one channel's rest as their green."""
-    return [views[k].showing_one(rest[k]) for k in keep]
-
-
 def _tried(
     trials: Sequence[Candidate], views: Sequence[View], rest: Sequence[Pixels], pool: ThreadPoolExecutor | None
 ) -> list[Found | None]:
@@ -283,7 +281,7 @@ def _try(
 ) -> Found | None:
     """Fit a candidate and judge it."""
     few = evenly(range(trial.first, trial.last + 1), _FEW)
-    shown = _alone(views, rest, few)
+    shown = [views[k].showing_one(rest[k]) for k in few]
     starts = [trial]
     if trial.radius <= SPECK:
         shown = [_near(trial, view) for view in shown]

@@ -21,7 +21,7 @@ from .jointly import fitted_jointly
 from .journal import Journal
 from .numbers import Floats, blades_of, channel_of, with_blades
 from .patches import patches_of
-from .presence import presences
+from .presence import usual_amplitude
 from .shape import Shape, free_numbers
 from .shared_out import side_by_side
 from .spans import respanned
@@ -237,11 +237,11 @@ def without_discs(shape: Shape) -> Shape:
 
 def _like(lead: Shape, own: Shape, alone: Sequence[View], channel: int) -> Shape:
     """Return the shape of the colour that leads as bright as another colour is."""
-    sure = [each.amplitude for each in presences(lead, alone, channel) if np.isfinite(each.error)]
-    if not sure:
+    amplitude = usual_amplitude(lead, alone, channel)
+    if amplitude is None:
         return own
     numbers = lead.numbers.copy()
-    numbers[FIRST_I:FIRST_DISC] *= max(float(np.median(sure)), 0.0)
+    numbers[FIRST_I:FIRST_DISC] *= amplitude
     return replace(lead, numbers=numbers)
 
 
