@@ -28,9 +28,8 @@ from flarewright.measure.numbers import NUMBERS, channel_of
 from flarewright.measure.orders import needed_numbers, parabola
 from flarewright.measure.patches import patches_of
 from flarewright.measure.replay import replay
-from flarewright.measure.shape import Shape, free_numbers
+from flarewright.measure.shape import Shape, enlarged, free_numbers
 from flarewright.measure.smooth import smooth_curve
-from flarewright.measure.stages import enlarged
 from flarewright.measure.together import halvings, measure_together
 from flarewright.measure.track import follow
 from flarewright.model.ghost_model import AberrationGhost, Curves, GhostModel

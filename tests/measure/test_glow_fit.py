@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from planted_run import GHOSTS, SIZE, views
 
+from flarewright.measure.dimmed import beside, masks_of
 from flarewright.measure.fit import render
 from flarewright.measure.glow import halo_at, halo_radiance, offsets, star_at, star_radiance
 from flarewright.measure.glow_fit import Registered, fit_halo, fit_star, followed, iris_of, register
-from flarewright.measure.stages import beside, masks_of
 from flarewright.model.ghost_model import Blades, Halo, Star
 
 HALO = Halo(

@@ -9,8 +9,8 @@ from flarewright.kernels.measure_pupil import FIRST_G, FIRST_I
 from flarewright.measure.beyond import gone_on, shown
 from flarewright.measure.numbers import NUMBERS, channel_of, frame
 from flarewright.measure.replay import light_px, replay
+from flarewright.measure.rest_fit import with_rest
 from flarewright.measure.sprite_fit import light_sprites
-from flarewright.measure.stages import with_rest
 from flarewright.measure.views import View
 from flarewright.model.ghost_model import AberrationGhost, GhostModel
 from flarewright.model.sprite import Sprite, packed

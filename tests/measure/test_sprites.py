@@ -12,12 +12,14 @@ from test_replay import planted
 
 from flarewright.errors import FlarewrightError
 from flarewright.io.ghost_model_file import read_ghost_model, write_ghost_model
+from flarewright.measure.dimmed import AROUND_LIGHT
 from flarewright.measure.glow import offsets
+from flarewright.measure.light_law import light_law
 from flarewright.measure.numbers import frame
 from flarewright.measure.replay import light_px, replay
+from flarewright.measure.rest_fit import around_light, with_rest
 from flarewright.measure.sprite_fit import axis_sprite, drawn, light_sprites, seen_near
 from flarewright.measure.sprites import draw_sprites, sprite_at
-from flarewright.measure.stages import AROUND_LIGHT, around_light, light_law, with_rest
 from flarewright.measure.views import View
 from flarewright.model.ghost_model import GhostModel
 from flarewright.model.sprite import Sprite, packed

@@ -12,9 +12,10 @@ from flarewright.io.merged import read_run, write_frame, write_run
 from flarewright.measure import stages
 from flarewright.measure.fit import render
 from flarewright.measure.found import Found
+from flarewright.measure.reading import read_views
 from flarewright.measure.replay import draw, replay
 from flarewright.measure.settle import to_model
-from flarewright.measure.stages import find_ghosts, fit_ghosts, read_views
+from flarewright.measure.stages import find_ghosts, fit_ghosts
 from flarewright.model.capture import FrameInfo, MergedFrame, MergedRun
 from flarewright.model.corrections import Corrections, Pointed
 from flarewright.model.ghost_model import GhostModel

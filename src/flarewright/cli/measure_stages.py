@@ -254,7 +254,8 @@ def _fit(job: _Job, made: Path, steps: Journal) -> None:
 def _complete(job: _Job, made: Path) -> None:
     """Learn what is left beside a model's ghosts when that was left to the small model."""
     from ..io.ghost_model_file import write_ghost_model
-    from ..measure.stages import read_views, with_rest
+    from ..measure.reading import read_views
+    from ..measure.rest_fit import with_rest
 
     model = _model(made)
     if not model.sprites:

@@ -20,11 +20,10 @@ from .normal import inverse
 from .numbers import NUMBERS, Floats, channel_numbers, channel_of
 from .orders import needed_numbers, parabola
 from .patches import patches_of
-from .shape import Indices, Shape, free_numbers
+from .shape import Indices, Shape, enlarged, free_numbers
 from .smooth import smooth_curve
-from .stages import coarse, enlarged
 from .together import Measured, Shapes, halvings, measure_together
-from .views import Pixels, View
+from .views import Pixels, View, coarse
 
 Tell = Callable[[float, str], None]
 

@@ -16,9 +16,9 @@ from ..model.ghost_model import GhostModel
 from ..model.layer import Layer
 from ..render.figure import Figure, Mark, Picture, Text
 from ..render.page import figures, image, paragraph, section
+from .dimmed import AROUND_LIGHT
 from .overview import frame_of
 from .replay import replay
-from .stages import AROUND_LIGHT
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]

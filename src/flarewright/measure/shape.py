@@ -102,3 +102,13 @@ def parted(shape: Shape) -> Shape:
         numbers[SOFT] *= 0.5
         numbers[LATERAL : LATERAL + 2] = np.sqrt(numbers[SOFT])
     return replace(shape, numbers=numbers)
+
+
+def enlarged(shape: Shape, factor: float) -> Shape:
+    """Return a shape in pixels that are smaller by a factor."""
+    numbers = shape.numbers.copy()
+    numbers[:FIRST_I] *= factor
+    numbers[FIRST_I:FIRST_DISC] *= factor**2
+    numbers[SOFT] *= factor**2
+    numbers[LATERAL:BELOW] *= factor
+    return replace(shape, numbers=numbers)

@@ -5,151 +5,39 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
-from functools import partial
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import FlarewrightError
-from ..io.merged import read_frame
-from ..kernels.measure_pupil import BELOW, FIRST_DISC, FIRST_I, LATERAL, SOFT
-from ..model.capture import FrameInfo, MergedRun
+from ..model.capture import MergedRun
 from ..model.corrections import Corrections
-from ..model.ghost_model import AberrationGhost, Blades, GhostModel, Halo, Reference, Star
-from .detail_fit import with_detail
+from ..model.ghost_model import AberrationGhost, Blades, GhostModel, Reference, Star
+from .dimmed import LEFT_BEHIND, Dimmed, dimmed_beside
 from .evenly import evenly
-from .fit import light_of
 from .found import CHANNELS, Found, rest_of
 from .fragments import joined
-from .glow import halo_at, offsets, star_at
-from .glow_fit import fit_halo, fit_star, followed, iris_of, register
+from .glow_fit import fit_star, iris_of, register
 from .joint import lit
 from .journal import Journal
+from .light_law import light_law
 from .mixed import mixed, mixture, shares
-from .moves_fit import with_moves
 from .numbers import Floats, channel_numbers
-from .packed import pack
 from .pointing import candidate, kept, tell_pointed
 from .pursuit import pursue
-from .reach import with_reaches
-from .replay import draw, light_px
+from .reading import read_views
+from .rest_fit import with_rest
 from .settle import Settling, settle, to_model
-from .shape import Shape
-from .shared_out import shared_out
-from .speck_sprites import all_hidden, covered, speck_sprites, specks_of
-from .specks_drawn import draw_specks
-from .spike_fit import spike_sprites
-from .sprite_fit import axis_sprite, beside_sprites, light_sprites
-from .views import Pixels, View, all_known, halved, views_of
+from .shape import Shape, enlarged
+from .views import Pixels, View, all_known, coarse
 
 Tell = Callable[[str], None]
 Progress = Callable[[float, str], None]
 
-# nothing is looked for nearer to the light than this, in pixels of a picture 720 wide
-AROUND_LIGHT = 40.0 / 720.0
-# and nothing but what goes with the light is learned nearer to it than this
-NEXT_TO_LIGHT = 24.0 / 720.0
-# part of the glow that may stay behind where it was taken off
-LEFT_BEHIND = 0.1
-# tangent of the constellation from which the light's distance from the axis tells the focal length
-_OFF_AXIS = 0.02
-# rounds in which stray places lose their weight, and how well a light's place is known at best
-_LAW_ROUNDS, _LIGHT_PX = 20, 0.05
-# part of the width by which a light's place may differ from the law of all places
-_NEAR_LAW = 0.01
 # ghosts are looked for in pictures halved until they are no wider, of no more constellations than this: with more of
 # them a vote costs more and tells no more, and `pursuit.SCORE` is what chance reaches with so many
 SEARCH_WIDTH, SEARCHED = 400, 50
-
-
-def read_views(
-    folder: Path, run: MergedRun, every: int = 1, pool: ThreadPoolExecutor | None = None
-) -> tuple[View, ...]:
-    """Read every n-th frame of each roll of a run, by rising constellation; the others are never opened.
-
-    Raises
-    ------
-    FlarewrightError
-        When frames cannot be read or are too few.
-    """
-    largest = max((abs(each.constellation_deg) for each in run.frames), default=0.0)
-    rolls: dict[float, list[FrameInfo]] = {}
-    for each in sorted(run.frames, key=lambda one: (one.nominal_deg, one.constellation_deg)):
-        rolls.setdefault(each.nominal_roll_deg, []).append(each)
-    frames = [each for turned in rolls.values() for each in turned[::every]]
-    if len(frames) < 3 <= len(run.frames):
-        raise FlarewrightError(
-            f"{folder}: --every {every} leaves {len(frames)} of {len(run.frames)} constellations, too few to follow a "
-            f"ghost; use at most --every {max(1, (len(run.frames) - 1) // 2)}"
-        )
-    frames.sort(key=lambda each: (each.constellation_deg, each.roll_deg))
-    return views_of(shared_out(partial(read_frame, folder), frames, pool=pool), largest)
-
-
-def masks_of(views: Sequence[View], pool: ThreadPoolExecutor | None = None) -> list[NDArray[np.bool_]]:
-    """Return where ghosts are looked for: where all colours were measured, away from the light."""
-
-    def one(view: View) -> NDArray[np.bool_]:
-        far = _off_light(view) > AROUND_LIGHT * view.size_px[0]
-        return np.asarray(far & all_known(view.variance))
-
-    return shared_out(one, views, pool=pool)
-
-
-def _off_light(view: View) -> NDArray[np.float64]:
-    """Return how far each pixel is from the light, pixels, shape (H, W)."""
-    x, y = offsets(view.light_px, view.size_px, 1.0)
-    return np.asarray(np.hypot(x, y))
-
-
-def coarse(view: View, times: int) -> View:
-    """Return a view at a lower resolution, with its own pixels as the unit."""
-    factor = 0.5**times
-    x, y, cosine, sine, _ = view.frame
-    return replace(
-        view, frame=np.array([x * factor, y * factor, cosine, sine, 1.0]),
-        light_px=(view.light_px[0] * factor, view.light_px[1] * factor), pixels=halved(view.pixels, times),
-        variance=halved(view.variance, times, variance=True),
-    )  # fmt: skip
-
-
-def enlarged(shape: Shape, factor: float) -> Shape:
-    """Return a shape in pixels that are smaller by a factor."""
-    numbers = shape.numbers.copy()
-    numbers[:FIRST_I] *= factor
-    numbers[FIRST_I:FIRST_DISC] *= factor**2
-    numbers[SOFT] *= factor**2
-    numbers[LATERAL:BELOW] *= factor
-    return replace(shape, numbers=numbers)
-
-
-@dataclass(frozen=True)
-class Dimmed:
-    """Views without the light around the light, and that light.
-
-    Attributes
-    ----------
-    views : list of View
-        What shall not count has infinite variance; where glow was taken off they are less certain.
-    halo : Halo or None
-    star : Star or None
-    """
-
-    views: list[View]
-    halo: Halo | None
-    star: Star | None
-
-
-def _star_of(views: Sequence[View], pool: ThreadPoolExecutor) -> Star | None:
-    """Find the star that stays beside the light at every constellation, if there is one."""
-    return fit_star(register(views, _measured(views), pool=pool))
-
-
-def _measured(views: Sequence[View]) -> list[Pixels]:
-    """Return what views show; not a number where nothing was measured."""
-    return [np.where(np.isfinite(view.variance), view.pixels, np.nan).astype(np.float32) for view in views]
 
 
 def find_ghosts(
@@ -197,7 +85,7 @@ def find_ghosts(
     known = corrections or Corrections()
     with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
         views = read_views(folder, run, every, pool)
-        dim = _dimmed_beside([], views, _star_of(views, pool), pool)
+        dim = dimmed_beside([], views, _star_of(views, pool), pool)
         searched, dimmed = evenly(views, SEARCHED), evenly(dim.views, SEARCHED)
         times, small = _for_search(dimmed)
         seen = _mixed_for_search(searched, dimmed, shares(dimmed), pool)
@@ -275,7 +163,7 @@ def fit_ghosts(
         found = [
             replace(_found(ghost, views), unwanted=k >= len(rough.ghosts)) for k, ghost in enumerate(ghosts)
         ]  # fmt: skip
-        dim = _dimmed_beside(found, views, _star_of(views, pool), pool)
+        dim = dimmed_beside(found, views, _star_of(views, pool), pool)
         iris = iris_of(dim.star)
         parts = iter(_parts(2 * again + 1, progress))
         settled = settle(
@@ -283,139 +171,32 @@ def fit_ghosts(
         )
         for _ in range(again):
             # with more ghosts known, the glow is better known and leaves more to be found
-            dim = _dimmed_beside(settled, views, dim.star, pool)
+            dim = dimmed_beside(settled, views, dim.star, pool)
             settled += _more(settled, views, dim.views, most - len(settled), iris, pool, tell, next(parts), journal)
             settled = _whole(settled, dim.views, pool, tell)
             settled = settle(
                 settled, dim.views, how=settling, iris=iris, pool=pool, tell=tell, progress=next(parts),
                 journal=journal,
             )  # fmt: skip
-        dim = _dimmed_beside(settled, views, dim.star, pool)
+        dim = dimmed_beside(settled, views, dim.star, pool)
     wanted = [ghost for ghost in settled if not ghost.unwanted]
     model = _model(run, to_model(wanted, views), dim, views)
     return with_rest(model, views, threads) if rest else model
 
 
-def with_rest(model: GhostModel, views: Sequence[View], threads: int | None = None) -> GhostModel:
-    """Return a model with what views show beside its ghosts, star and halo as sprites, in the place of old ones.
-
-    Parameters
-    ----------
-    model : GhostModel
-    views : sequence of View
-        As photographed.
-    threads : int, optional
-    """
-    with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
-        placed = [replace(view, light_px=_light_of(model, view, view.roll_deg)) for view in views]
-        left = shared_out(partial(_left_by, model), placed, pool=pool)
-        specks = specks_of(model, placed)
-        # a speck is so much brighter than what is around it that coarse cells would spread its errors over that
-        masks = covered(specks, placed, left)
-        spikes = spike_sprites(placed, all_hidden(left, masks, pool), model.star)
-        left = beside_sprites(left, spikes, placed, pool)
-        # coarse pictures overshoot beside the light's image, which finer ones only mend where something is known
-        around = shared_out(around_light, placed, all_hidden(left, masks, pool), pool=pool)
-        going = light_sprites(placed, around, model.star is not None, pool)
-        left = beside_sprites(left, going, placed, pool)
-        # next to the light a pixel's error is brighter than all that turns about the axis
-        next_to_light = [_off_light(view) < NEXT_TO_LIGHT * view.size_px[0] for view in placed]
-        axis = axis_sprite(placed, all_hidden(all_hidden(left, masks, pool), next_to_light, pool), pool)
-        left = beside_sprites(left, (axis,), placed, pool)
-        small = speck_sprites(specks, placed, left, masks_of(placed))
-    moving = with_moves(model.replace(sprites=(*spikes, *going, axis, *small)), threads)
-    packed = pack(moving)
-    left = [
-        each - draw_specks(small, packed, moving, view.constellation_deg, view.frame, view.size_px)
-        for each, view in zip(left, placed, strict=True)
-    ]
-    return with_reaches(with_detail(moving, placed, all_hidden(left, next_to_light), threads), placed, threads)
+def _star_of(views: Sequence[View], pool: ThreadPoolExecutor) -> Star | None:
+    """Find the star that stays beside the light at every constellation, if there is one."""
+    return fit_star(register(views, _measured(views), pool=pool))
 
 
-def _left_by(model: GhostModel, view: View) -> Pixels:
-    """Return what a view shows beside a model's ghosts, halo and star; not a number where it was not measured."""
-    known = np.where(np.isfinite(view.variance), view.pixels, np.nan)
-    ghosts = draw(model, view.constellation_deg, view.roll_deg, view.size_px)
-    return np.asarray(known - ghosts - _light(model.halo, model.star, view), dtype=np.float32)
-
-
-def around_light(view: View, pixels: Pixels) -> Pixels:
-    """Fill what is not known near the light with the median of what is known as far from it.
-
-    Parameters
-    ----------
-    view : View
-    pixels : ndarray, shape (H, W, 3)
-        Not a number where nothing was measured.
-
-    Returns
-    -------
-    ndarray, shape (H, W, 3)
-        Farther off than where ghosts are looked for, and where nothing at a distance is known, as it was. So is what
-        the view itself does not show, its clipped middle above all.
-    """
-    rings = _off_light(view).astype(np.int64)
-    near = rings < AROUND_LIGHT * view.size_px[0]
-    ring, light = rings[near], pixels[near]
-    known = np.isfinite(light).all(axis=1)
-    gaps = np.isnan(light).any(axis=1) & np.isfinite(view.variance[near]).all(axis=1)
-    for far in np.unique(ring[gaps]):
-        told = light[known & (ring == far)]
-        if told.size:
-            light[gaps & (ring == far)] = np.median(told, axis=0)
-    out = pixels.copy()
-    out[near] = light
-    return out
-
-
-def _light_of(model: GhostModel, view: View, roll_deg: float) -> tuple[float, float]:
-    """Return where a view's light is: as seen, or where a replay puts it when that is far off or beyond the picture.
-
-    Next to the axis a camera that nods turns the light's direction about: there a roll does not tell the place.
-    """
-    told = light_px(model, view.constellation_deg, roll_deg)
-    off = np.hypot(*np.subtract(view.light_px, told))
-    inside = all(0.0 <= at <= side for at, side in zip(view.light_px, view.size_px, strict=True))
-    return view.light_px if inside and off < _NEAR_LAW * view.size_px[0] else told
-
-
-def _dimmed_beside(
-    ghosts: Sequence[Found], views: Sequence[View], star: Star | None, pool: ThreadPoolExecutor
-) -> Dimmed:
-    """Learn the halo, and how strong a star is, from what is left beside known ghosts, and take both off the views."""
-    left = shared_out(partial(without, ghosts), views, range(len(views)), pool=pool)
-    masks = masks_of(views, pool)
-    halo, star = followed(views, left, masks, fit_halo(views, left, pool=pool), star, pool)
-    return Dimmed(beside(views, halo, star, pool), halo, star)
+def _measured(views: Sequence[View]) -> list[Pixels]:
+    """Return what views show; not a number where nothing was measured."""
+    return [np.where(np.isfinite(view.variance), view.pixels, np.nan).astype(np.float32) for view in views]
 
 
 def _parts(count: int, progress: Progress) -> list[Progress]:
     """Divide progress evenly among parts of the work that follow each other."""
     return [lambda part, words, k=k: progress((k + part) / count, words) for k in range(count)]  # type: ignore[misc]
-
-
-def beside(
-    views: Sequence[View], halo: Halo | None, star: Star | None, pool: ThreadPoolExecutor | None = None
-) -> list[View]:
-    """Return what views show beside halo and star, less certain where those are bright; nothing around the light."""
-
-    def one(view: View, mask: NDArray[np.bool_]) -> View:
-        light = _light(halo, star, view)
-        variance = np.where(mask[..., None], view.variance + (LEFT_BEHIND * light) ** 2, np.inf).astype(np.float32)
-        return replace(view, pixels=view.pixels - light, variance=variance)
-
-    return shared_out(one, views, masks_of(views, pool), pool=pool)
-
-
-def _light(halo: Halo | None, star: Star | None, view: View) -> Pixels:
-    """Draw halo and star as a view shows them, shape (H, W, 3)."""
-    x, y = offsets(view.light_px, view.size_px, 1.0)
-    light = np.zeros(view.pixels.shape, np.float32)
-    if halo is not None:
-        light += halo_at(halo, view.constellation_deg, x, y).astype(np.float32)
-    if star is not None:
-        light += star_at(star, view.constellation_deg, x, y).astype(np.float32)
-    return light
 
 
 def _more(
@@ -478,17 +259,6 @@ def _sized(ghost: Found, factor: float) -> Found:
     return replace(ghost, shapes=(red, green, blue))
 
 
-def without(ghosts: Sequence[Found], view: View, number: int) -> Pixels:
-    """Return a view's pixels without the ghosts that it shows, shape (H, W, 3); not a number where not measured."""
-    left = np.where(np.isfinite(view.variance), view.pixels, np.nan).astype(np.float64)
-    for ghost in ghosts:
-        if ghost.first <= number <= ghost.last:
-            for m in range(3):
-                part, light = light_of(ghost.shapes[m], view)
-                left[part][..., m] -= light
-    return left.astype(np.float32)
-
-
 def _found(ghost: AberrationGhost, views: Sequence[View]) -> Found:
     """Return a model's ghost as the fitter takes it."""
     shapes = [
@@ -499,33 +269,6 @@ def _found(ghost: AberrationGhost, views: Sequence[View]) -> Found:
     ]
     first, last = (there[0], there[-1]) if there else (0, len(views) - 1)
     return Found((shapes[0], shapes[1], shapes[2]), first, last)
-
-
-def light_law(views: Sequence[View], px_per_rad: float) -> tuple[float, float]:
-    """Return focal length (pixels) and distortion that tell where the views' lights are; see `GhostModel`.
-
-    Parameters
-    ----------
-    views : sequence of View
-        Those whose light lies in the picture count: places beyond it are foretold, not seen.
-    px_per_rad : float
-        Taken where fewer than four of them have the light well off the axis.
-    """
-    t = np.array([np.tan(np.radians(abs(view.constellation_deg))) for view in views])
-    away = np.array([np.hypot(*np.subtract(view.light_px, view.frame[:2])) for view in views])
-    inside = [all(0.0 <= at <= side for at, side in zip(view.light_px, view.size_px, strict=True)) for view in views]
-    seen = np.array(inside) & (t > _OFF_AXIS)
-    if np.unique(np.round(t[seen], 4)).size < 4:
-        return px_per_rad, 0.0
-    basis, away = np.stack([t, t**3], axis=1)[seen], away[seen]
-    law = np.array([np.median(away / basis[:, 0]), 0.0])
-    for _ in range(_LAW_ROUNDS):
-        # a light that was taken for another counts less and less
-        off = np.abs(away - basis @ law)
-        root = 1.0 / np.hypot(1.0, off / (3.0 * max(1.4826 * float(np.median(off)), _LIGHT_PX)))
-        law = np.linalg.lstsq(basis * root[:, None], away * root, rcond=None)[0]
-    focal, bent = law
-    return float(focal), float(bent / focal)
 
 
 def _model(run: MergedRun, ghosts: tuple[AberrationGhost, ...], dim: Dimmed, views: Sequence[View]) -> GhostModel:

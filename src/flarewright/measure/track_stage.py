@@ -13,12 +13,15 @@ from ..model.capture import MergedRun
 from ..model.ghost_model import AberrationGhost, GhostModel
 from ..model.ghost_tracks import Tracks
 from .compact import compact
+from .dimmed import beside
 from .numbers import channel_numbers
-from .shape import Shape
+from .reading import read_views
+from .rest_fit import with_rest
+from .shape import Shape, enlarged
 from .shared_out import shared_out
-from .stages import beside, coarse, enlarged, read_views, with_rest
 from .together import Shapes, halvings
 from .track import follow
+from .views import coarse
 
 Tell = Callable[[float, str], None]
 

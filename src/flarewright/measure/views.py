@@ -154,3 +154,14 @@ def halved(pixels: Pixels, times: int, variance: bool = False) -> Pixels:
     rows = reduce(np.add, (cut[k::side] for k in range(side)))
     total = reduce(np.add, (rows[:, k::side] for k in range(side)))
     return np.asarray(total / side ** (4 if variance else 2), dtype=np.float32)
+
+
+def coarse(view: View, times: int) -> View:
+    """Return a view at a lower resolution, with its own pixels as the unit."""
+    factor = 0.5**times
+    x, y, cosine, sine, _ = view.frame
+    return replace(
+        view, frame=np.array([x * factor, y * factor, cosine, sine, 1.0]),
+        light_px=(view.light_px[0] * factor, view.light_px[1] * factor), pixels=halved(view.pixels, times),
+        variance=halved(view.variance, times, variance=True),
+    )  # fmt: skip

@@ -19,12 +19,14 @@ from ..kernels.measure_bezier import BORDER, INNER, NUMBERS
 from ..model.capture import MergedRun
 from ..model.ghost_model import BezierGhost, GhostModel
 from .compress import compress
+from .dimmed import beside
 from .journal import Journal
 from .numbers import Floats
+from .reading import read_views
 from .replay import draw
+from .rest_fit import with_rest
 from .single import Spot, spots_of_model
-from .stages import beside, coarse, read_views, with_rest
-from .views import View, all_known
+from .views import View, all_known, coarse
 from .walch import circle, descend, window_of
 from .walch import draw as drawn
 
