@@ -54,7 +54,7 @@ _MANY_MORE = 1.1
 _TRIALS, _SPARE = 12, 20
 # candidates that are tried before votes are cast again, and the part of the best one's votes that they must have when
 # any was taken; so many are tried at a time after one was refused, for then the next mostly is as well
-_ROUND, _NEARLY, _BESIDE_REFUSED = 4, 0.6, 2
+_ROUND, _NEARLY, _AT_ONCE = 4, 0.6, 2
 # views that a first fit looks at
 _FEW = 16
 # by which a candidate that views show no light of begins
@@ -132,7 +132,7 @@ def pursue(
     rims: list[Candidate] = []
     small: list[Candidate] = []
     known_to = asked_at = 0
-    beside = 1
+    at_once = 1
     while len(found) < most:
         asked = _TRIALS + len(refused)
         if asked > known_to:
@@ -144,18 +144,18 @@ def pursue(
         trials, waiting = [*waiting[:_ROUND], *trials], waiting[_ROUND:]
         queue, before = trials[:_ROUND], len(found)
         while queue:
-            ghosts = steps.step(partial(_tried, queue[:beside], shown, left, pool))
-            for trial, ghost in zip(queue[:beside], ghosts, strict=True):
+            ghosts = steps.step(partial(_tried, queue[:at_once], shown, left, pool))
+            for trial, ghost in zip(queue[:at_once], ghosts, strict=True):
                 queue = queue[1:]
                 if ghost is None:
-                    refused, beside = _with_refused(refused, trial, len(found)), _BESIDE_REFUSED
+                    refused, at_once = _with_refused(refused, trial, len(found)), _AT_ONCE
                     continue
                 found.append(ghost)
                 tell(f"ghost {len(found)}: {_described(ghost, trial)}")
                 left = left_beside(left, [ghost], shown, 1, pool)
                 # those tried beside it did not know of it: they are tried again
                 queue = [one for one in queue if one.score >= _NEARLY * trials[0].score and not _stale(one, trial)]
-                beside = 1
+                at_once = 1
                 break
         if not trials:
             break
