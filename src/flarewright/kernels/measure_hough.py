@@ -75,8 +75,19 @@ def _vote(slopes, sigma, frame, speeds, sizes, rims, reaches, floor_level, sign,
                     votes[s, r, b] = (sign * slope - floor_level) * part
 
 
+@inner
+def _place(rims, turning, frame, placed):
+    """Fill rims as a view has them: those that turn with the light's direction are turned to it."""
+    for b in range(rims.shape[0]):
+        c, s = (frame[2], frame[3]) if turning else (1.0, 0.0)
+        for k in range(rims.shape[1]):
+            for m in range(0, 4, 2):
+                along, down = rims[b, k, m], rims[b, k, m + 1]
+                placed[b, k, m], placed[b, k, m + 1] = c * along + s * down, c * down - s * along
+
+
 @compiled
-def search(slopes_x, slopes_y, sigmas, frames, speeds, sizes, rims, floor_level, sign, scores, runs):
+def search(slopes_x, slopes_y, sigmas, frames, speeds, sizes, rims, turning, floor_level, sign, scores, runs):
     """Score rims by how bright their border's inside is against its outside, over the best run of views.
 
     Parameters
@@ -85,13 +96,16 @@ def search(slopes_x, slopes_y, sigmas, frames, speeds, sizes, rims, floor_level,
         Gradient over noise, each at most 1 long; not a number where nothing was measured.
     sigmas : ndarray, shape (V,)
     frames : ndarray, shape (V, 5)
-        Axis x and y, cosine and sine of the light's direction, pixels per pixel of the model.
+        Axis x and y, cosine and sine of the light's direction, pixels per pixel of the model: places and sizes of a
+        view are scaled by these.
     speeds : ndarray, shape (S,)
         Place of the centre over the field, pixels of the model.
     sizes : ndarray, shape (R,)
         Radii, pixels of the model.
     rims : ndarray, shape (K, P, 4)
         Kinds of rims, each as `outline` fills it.
+    turning : bool
+        They are so where the light lies right of the axis, and turn with its direction.
     floor_level : float
         Mean slope below which a view counts against.
     sign : float
@@ -108,12 +122,14 @@ def search(slopes_x, slopes_y, sigmas, frames, speeds, sizes, rims, floor_level,
             reaches[b] = max(reaches[b], sqrt(rims[b, k, 0] ** 2 + rims[b, k, 1] ** 2))
     # view by view: one picture of slopes stays near the processor, all of them do not
     votes = np.empty((views, speeds.size, sizes.size, rims.shape[0]))
+    placed = np.empty(rims.shape)
     slopes = np.empty((slopes_x.shape[1], slopes_x.shape[2], 2), np.float32)
     for v in range(views):
         for y in range(slopes.shape[0]):
             for x in range(slopes.shape[1]):
                 slopes[y, x, 0], slopes[y, x, 1] = slopes_x[v, y, x], slopes_y[v, y, x]
-        _vote(slopes, sigmas[v], frames[v], speeds, sizes, rims, reaches, floor_level, sign, votes[v])
+        _place(rims, turning, frames[v], placed)
+        _vote(slopes, sigmas[v], frames[v], speeds, sizes, placed, reaches, floor_level, sign, votes[v])
     for s in range(speeds.size):
         for r in range(sizes.size):
             scores[s, r] = 0.0

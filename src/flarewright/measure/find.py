@@ -27,7 +27,9 @@ SALIENT = 4.0
 # a view whose border is not brighter inside by this much counts against a candidate
 LEVEL = 0.16
 # points of a rim that are asked
-_SPOTS = 40
+SPOTS = 40
+# the field by which ghosts are told apart whose place is no proportion of it
+USUAL = 0.6
 
 
 @dataclass(frozen=True)
@@ -46,6 +48,12 @@ class Candidate:
         Of its rim; None: a circle.
     bend : float
         Pixels: by how much the place at field 1 leaves proportion.
+    below : float
+        Place and size are divided by 1 + so much of the squared field.
+    flat : float
+        How long it is along the light's line, part of its height.
+    bent : float
+        By how much its ends lie nearer to the axis than its middle, part of half its height.
     """
 
     speed: float
@@ -55,10 +63,23 @@ class Candidate:
     score: float
     blades: Blades | None = None
     bend: float = 0.0
+    below: float = 0.0
+    flat: float = 1.0
+    bent: float = 0.0
 
     def place(self, sigma: float) -> float:
         """Return where its centre is at a field, from the axis towards the light, pixels."""
-        return sigma * (self.speed + self.bend * sigma**2)
+        return sigma * (self.speed + self.bend * sigma**2) / (1.0 + self.below * sigma**2)
+
+    def size(self, sigma: float) -> float:
+        """Return its radius, or half its height, at a field, pixels."""
+        return self.radius / (1.0 + self.below * sigma**2)
+
+    @property
+    def usual(self) -> tuple[float, float]:
+        """Place over field, and size, as at `USUAL` when both are divided."""
+        by = 1.0 + self.below * USUAL**2
+        return self.speed / by, self.radius / by
 
 
 @dataclass(frozen=True)
@@ -141,7 +162,7 @@ def candidates(
 
     def one(part: Floats) -> tuple[Floats, NDArray[np.int64]]:
         scores, runs = np.zeros((part.size, sizes.size)), np.zeros((part.size, sizes.size, 3), np.int64)
-        search(slopes.x, slopes.y, slopes.sigmas, slopes.frames, part, sizes, rims, LEVEL, sign, scores, runs)
+        search(slopes.x, slopes.y, slopes.sigmas, slopes.frames, part, sizes, rims, False, LEVEL, sign, scores, runs)
         return scores, runs
 
     found = [one(part) for part in parts] if pool is None else list(pool.map(one, parts))
@@ -174,6 +195,6 @@ def rims_of(iris: Blades | None) -> list[Blades | None]:
 
 def rim_outline(kind: Blades | None) -> Floats:
     """Return the border along which `kernels.measure_hough.search` votes, shape (P, 4): a circle or a polygon."""
-    spots = np.empty((_SPOTS, 4))
+    spots = np.empty((SPOTS, 4))
     outline(0 if kind is None else kind.count, 0.0 if kind is None else np.radians(kind.first_deg), spots)
     return spots

@@ -11,7 +11,7 @@ from math import log
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernels.measure_pupil import FIRST_G, FIRST_I
+from ..kernels.measure_pupil import BELOW, FIRST_G, FIRST_I
 from ..model.ghost_model import Blades
 from .evenly import evenly
 from .find import Candidate, candidates, slopes_of
@@ -20,6 +20,7 @@ from .found import Found, darkened, left_beside
 from .grow import Growth, grow
 from .jointly import fitted_jointly
 from .journal import Journal
+from .lunes import lunes
 from .numbers import NUMBERS, with_blades
 from .patches import patches_of
 from .presence import usual_amplitude
@@ -59,6 +60,10 @@ _ROUND, _NEARLY, _AT_ONCE = 4, 0.6, 2
 _FEW = 16
 # by which a candidate that views show no light of begins
 _LEAST_LIGHT = 1e-12
+# lunes are looked for once the best other candidate has fewer votes than this
+_LUNES_FROM = 6.0
+# a candidate's form is told at no smaller field
+_LEAST_SIGMA = 0.05
 # how far a candidate grows: most of what lies beside it is not known yet, so its misfit tells nothing of it, and
 # fine pictures no more than coarse ones
 _FIRST = Growth(order=1, discs=1, error=0.05, soft=False, below=False, alike=False, area=2500)
@@ -69,6 +74,13 @@ def beginning(candidate: Candidate, views: Sequence[View], pixels: Sequence[Pixe
     numbers = np.zeros(NUMBERS)
     numbers[0], numbers[3], numbers[FIRST_G] = candidate.speed, candidate.bend, candidate.radius
     numbers[FIRST_I] = candidate.radius**2
+    # low and bent as it is in the middle of its life: x = s (f + f' v) + p (g + g' v), v = p s
+    sigma = max(float(np.median([view.sigma for view in views])), _LEAST_SIGMA)
+    bent = np.copysign(candidate.bent * candidate.radius / sigma, candidate.speed)
+    numbers[0] -= bent
+    numbers[2] = (candidate.flat - 1.0) * candidate.radius / sigma**2
+    numbers[FIRST_G + 2] = bent
+    numbers[BELOW + 1] = candidate.below
     numbers = with_blades(numbers, candidate.blades)
     shape = Shape(numbers)
     alone = [view.showing_one(picture) for view, picture in zip(views, pixels, strict=True)]
@@ -133,13 +145,18 @@ def pursue(
     small: list[Candidate] = []
     known_to = asked_at = 0
     at_once = 1
+    low: list[Candidate] = []
+    low_at = -1
     while len(found) < most:
         asked = _TRIALS + len(refused)
         if asked > known_to:
             known_to = asked + _SPARE
             rims, small = steps.step(partial(_candidates, shown, left, masks, known_to, iris, pool))
-        votes = sorted([*rims[:asked], *small[:asked]], key=lambda each: -each.score)
-        trials = _open([each for each in votes if each.score > SCORE], refused, len(found))
+        trials = _open([*rims[:asked], *small[:asked], *low], refused, len(found))
+        enough = len(found) >= _MANY_MORE * low_at if trials else len(found) > low_at
+        if enough and (not trials or trials[0].score < _LUNES_FROM):
+            low, low_at = steps.step(partial(_lunes, shown, left, masks, pool)), len(found)
+            trials = _open([*rims[:asked], *small[:asked], *low], refused, len(found))
         fallen(trials[0].score if trials else SCORE, len(found))
         trials, waiting = [*waiting[:_ROUND], *trials], waiting[_ROUND:]
         queue, before = trials[:_ROUND], len(found)
@@ -151,6 +168,7 @@ def pursue(
                     refused, at_once = _with_refused(refused, trial, len(found)), _AT_ONCE
                     continue
                 found.append(ghost)
+                low = [one for one in low if one is not trial]
                 tell(f"ghost {len(found)}: {_described(ghost, trial)}")
                 left = left_beside(left, [ghost], shown, 1, pool)
                 # those tried beside it did not know of it: they are tried again
@@ -197,14 +215,15 @@ def _with_refused(refused: Sequence[_Refused], trial: Candidate, known: int) -> 
 
 
 def _open(votes: Sequence[Candidate], refused: Sequence[_Refused], known: int) -> list[Candidate]:
-    """Return the candidates to try while so many ghosts are known.
+    """Return the candidates to try while so many ghosts are known, the best first.
 
     Beside ghosts that are not known yet one explains little of what is in its windows, and runs off to their light. So
     one that was refused waits until many more are known; where nothing else is left, until any more are.
     """
+    likely = sorted([each for each in votes if each.score > SCORE], key=lambda each: -each.score)
     for latest in (known // 2 - _SOON, known - 1):
         barred = [one.candidate for one in refused if one.known > latest or one.times >= _TRIES]
-        trials = [each for each in votes if not any(_same(each, other) for other in barred)]
+        trials = [each for each in likely if not any(_same(each, other) for other in barred)]
         if trials:
             return trials
     return []
@@ -238,6 +257,16 @@ def _candidates(
     return rims, small
 
 
+def _lunes(
+    views: Sequence[View],
+    rest: Sequence[Pixels],
+    masks: Sequence[NDArray[np.bool_]],
+    pool: ThreadPoolExecutor | None,
+) -> list[Candidate]:
+    """Return the best lunes, best first."""
+    return lunes(slopes_of(_doubted(views, rest, pool=pool), rest, masks, pool=pool), views[0].size_px[0], pool=pool)
+
+
 def _doubted(
     views: Sequence[View], rest: Sequence[Pixels], *, beside: bool = False, pool: ThreadPoolExecutor | None
 ) -> list[View]:
@@ -258,15 +287,17 @@ def _doubted(
 
 
 def _same(a: Candidate, b: Candidate) -> bool:
-    near = 0.1 * (a.radius + b.radius) + 4.0
+    (speed, radius), (other_speed, other_radius) = a.usual, b.usual
+    near = 0.1 * (radius + other_radius) + 4.0
     overlap = min(a.last, b.last) - max(a.first, b.first)
-    return abs(a.speed - b.speed) < near and abs(a.radius - b.radius) < 0.6 * near and overlap >= 0
+    return abs(speed - other_speed) < near and abs(radius - other_radius) < 0.6 * near and overlap >= 0
 
 
 def _stale(trial: Candidate, taken: Candidate) -> bool:
     """Tell whether a candidate had its votes from the borders of one that was taken off since."""
-    larger = max(trial.radius, taken.radius)
-    return abs(trial.speed - taken.speed) < 0.5 * larger and abs(trial.radius - taken.radius) < 0.5 * larger
+    (speed, radius), (taken_speed, taken_radius) = trial.usual, taken.usual
+    larger = max(radius, taken_radius)
+    return abs(speed - taken_speed) < 0.5 * larger and abs(radius - taken_radius) < 0.5 * larger
 
 
 def _tried(
@@ -288,8 +319,13 @@ def _try(
         if trial.radius > RADII[0]:
             # a rim of a few pixels is seen too large
             starts.append(replace(trial, radius=RADII[0]))
-    fits = [grow(beginning(one, shown, [rest[k] for k in few]), shown, 1, most=_FIRST, pool=pool) for one in starts]
-    kept = [fit for fit in fits if fit is not None and brightens(fit.shape, shown) and _stays(trial, fit.shape, shown)]
+    most = replace(_FIRST, below=trial.below > 0.0)
+    kept = []
+    for one in starts:
+        start = beginning(one, shown, [rest[k] for k in few])
+        fit = grow(start, shown, 1, most=most, pool=pool)
+        if fit is not None and brightens(fit.shape, shown) and _stays(trial, start, fit.shape, shown):
+            kept.append(fit)
     if not kept:
         return None
     shape = min(kept, key=lambda fit: fit.cost).shape
@@ -305,18 +341,18 @@ def _try(
     return Found((shape, shape, shape), first, last)
 
 
-def _stays(trial: Candidate, shape: Shape, views: Sequence[View]) -> bool:
+def _stays(trial: Candidate, start: Shape, shape: Shape, views: Sequence[View]) -> bool:
     """Tell whether a fit is about where its candidate was seen, and as large: elsewhere nobody voted for it."""
     if trial.radius <= SPECK:
         # a speck is no larger than what was looked at
         return largest_size(shape, [view.sigma for view in views]) <= trial.radius + BESIDE_SPECK
     shared = covered = 0
     for view in views[:: max(1, len(views) // _LOOKED)]:
-        disc = distances(view, trial.place(view.sigma)) <= trial.radius
+        seen = render(start, view) > 0.0
         light = render(shape, view)
         lit = light > LIT * float(light.max(initial=0.0))
-        shared += int(np.count_nonzero(disc & lit))
-        covered += int(np.count_nonzero(disc | lit))
+        shared += int(np.count_nonzero(seen & lit))
+        covered += int(np.count_nonzero(seen | lit))
     return shared > COVERS * covered
 
 
