@@ -28,6 +28,8 @@ SALIENT = 4.0
 LEVEL = 0.16
 # points of a rim that are asked
 SPOTS = 40
+# pieces of a search, one at a time for each thread
+_PIECES = 16
 # the field by which ghosts are told apart whose place is no proportion of it
 USUAL = 0.6
 
@@ -158,15 +160,7 @@ def candidates(
     speeds = np.concatenate([np.arange(-2.6 * width, -1.0 * width, 2.0 * fine), np.arange(-width, width, fine),
                              np.arange(width, 2.6 * width, 2.0 * fine)])  # fmt: skip
     sizes = np.concatenate([np.arange(0.006, 0.06, 0.0028), np.geomspace(0.06, 0.45, 40)]) * width
-    parts = np.array_split(speeds, 16)
-
-    def one(part: Floats) -> tuple[Floats, NDArray[np.int64]]:
-        scores, runs = np.zeros((part.size, sizes.size)), np.zeros((part.size, sizes.size, 3), np.int64)
-        search(slopes.x, slopes.y, slopes.sigmas, slopes.frames, part, sizes, rims, False, LEVEL, sign, scores, runs)
-        return scores, runs
-
-    found = [one(part) for part in parts] if pool is None else list(pool.map(one, parts))
-    scores, runs = np.concatenate([each[0] for each in found]), np.concatenate([each[1] for each in found])
+    scores, runs = searched(slopes, speeds, sizes, rims, sign=sign, pool=pool)
     best: list[Candidate] = []
     for place in np.argsort(scores, axis=None)[::-1]:
         s, r = np.unravel_index(place, scores.shape)
@@ -183,6 +177,47 @@ def candidates(
             continue
         best.append(Candidate(speed, radius, first, last, float(scores[s, r]), kinds[int(runs[s, r, 2])]))
     return best
+
+
+def searched(
+    slopes: Slopes,
+    speeds: Floats,
+    sizes: Floats,
+    rims: Floats,
+    *,
+    turning: bool = False,
+    sign: float = 1.0,
+    pool: ThreadPoolExecutor | None = None,
+) -> tuple[Floats, NDArray[np.int64]]:
+    """Return what outlines of all speeds and sizes score over their best run of views, and these runs.
+
+    Parameters
+    ----------
+    slopes : Slopes
+    speeds : ndarray, shape (S,)
+    sizes : ndarray, shape (R,)
+    rims : ndarray, shape (K, P, 4)
+    turning : bool
+        Rims turn with the light's direction.
+    sign : float
+        -1 looks for dark ones.
+    pool : executor, optional
+
+    Returns
+    -------
+    scores : ndarray, shape (S, R)
+    runs : ndarray, shape (S, R, 3)
+        First and last view, and which rim.
+    """
+
+    def one(part: Floats) -> tuple[Floats, NDArray[np.int64]]:
+        scores, runs = np.zeros((part.size, sizes.size)), np.zeros((part.size, sizes.size, 3), np.int64)
+        search(slopes.x, slopes.y, slopes.sigmas, slopes.frames, part, sizes, rims, turning, LEVEL, sign, scores, runs)
+        return scores, runs
+
+    parts = np.array_split(speeds, _PIECES)
+    found = [one(part) for part in parts] if pool is None else list(pool.map(one, parts))
+    return np.concatenate([each[0] for each in found]), np.concatenate([each[1] for each in found])
 
 
 def rims_of(iris: Blades | None) -> list[Blades | None]:

@@ -9,12 +9,11 @@ ghost is found where one of them fits, and fitted in all constellations.
 from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..kernels.measure_hough import search
-from .find import LEVEL, SPOTS, USUAL, Candidate, Slopes
+from .find import SPOTS, USUAL, Candidate, Slopes, searched
 from .numbers import Floats
 
 # what place and size are divided by; how long along the light's line, part of the height, and how bent
@@ -22,8 +21,8 @@ _BELOW = (1.5, 4.0)
 _FORMS = ((1.0, 0.0), (0.5, 0.0), (0.3, 0.2), (0.2, 0.15))
 # part of the width: steps of the place over the field, its largest, and half heights, all at field `USUAL`
 _STEP, _FARTHEST, _LEAST, _LARGEST, _SIZES = 0.004, 1.3, 0.012, 0.45, 40
-# pieces of a search, one for a thread, and how many of its best are compared with each other
-_PIECES, _BEST = 8, 400
+# how many of a search's best are compared with each other
+_BEST = 400
 # two are one that are, in the middle of what both saw, nearer than this part of their sizes, and as large but for this
 _NEAR, _AS_LARGE = 0.3, 0.4
 
@@ -90,14 +89,7 @@ def _on_one_side(
     speeds = side * width * np.arange(_STEP, _FARTHEST, _STEP)
     sizes = width * np.geomspace(_LEAST, _LARGEST, _SIZES)
 
-    def one(part: Floats) -> tuple[Floats, NDArray[np.int64]]:
-        scores, runs = np.zeros((part.size, sizes.size)), np.zeros((part.size, sizes.size, 3), np.int64)
-        search(slopes.x, slopes.y, slopes.sigmas, frames, part, sizes, rims, True, LEVEL, 1.0, scores, runs)
-        return scores, runs
-
-    parts = np.array_split(speeds, _PIECES)
-    pieces = [one(part) for part in parts] if pool is None else list(pool.map(one, parts))
-    scores, runs = np.concatenate([each[0] for each in pieces]), np.concatenate([each[1] for each in pieces])
+    scores, runs = searched(replace(slopes, frames=frames), speeds, sizes, rims, turning=True, pool=pool)
     best = []
     for place in np.argsort(scores, axis=None)[::-1][:_BEST]:
         s, r = np.unravel_index(place, scores.shape)

@@ -42,7 +42,7 @@ LEFT_BEHIND = 0.08
 LEFT_AS_SPECKS, _BESIDE = 0.2, 3
 # a candidate no larger than this is looked at with what is this far around it, pixels
 SPECK, BESIDE_SPECK = 3.5, 3.0
-# part of what either covers that a fit shares with the circle it began at, where it is brighter than this part of its
+# part of what either covers that a fit shares with the outline it began at, where it is brighter than this part of its
 # brightest place; so many views tell
 COVERS, LIT, _LOOKED = 0.35, 0.1, 4
 # who was refused is tried again when twice as many ghosts are known, and so many more; but no more often than this
@@ -153,6 +153,7 @@ def pursue(
             known_to = asked + _SPARE
             rims, small = steps.step(partial(_candidates, shown, left, masks, known_to, iris, pool))
         trials = _open([*rims[:asked], *small[:asked], *low], refused, len(found))
+        # what is left of ghosts votes for lunes as well, so they are looked for late, and again when more is taken off
         enough = len(found) >= _MANY_MORE * low_at if trials else len(found) > low_at
         if enough and (not trials or trials[0].score < _LUNES_FROM):
             low, low_at = steps.step(partial(_lunes, shown, left, masks, pool)), len(found)
