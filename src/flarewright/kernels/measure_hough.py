@@ -78,8 +78,8 @@ def _vote(slopes, sigma, frame, speeds, sizes, rims, reaches, floor_level, sign,
 @inner
 def _place(rims, turning, frame, placed):
     """Fill rims as a view has them: those that turn with the light's direction are turned to it."""
+    c, s = (frame[2], frame[3]) if turning else (1.0, 0.0)
     for b in range(rims.shape[0]):
-        c, s = (frame[2], frame[3]) if turning else (1.0, 0.0)
         for k in range(rims.shape[1]):
             for m in range(0, 4, 2):
                 along, down = rims[b, k, m], rims[b, k, m + 1]

@@ -48,12 +48,12 @@ def dimmed_beside(
     left = shared_out(partial(without, ghosts), views, range(len(views)), pool=pool)
     masks = masks_of(views, pool)
     halo, star = followed(views, left, masks, fit_halo(views, left, pool=pool), star, pool)
-    return Dimmed(beside(views, halo, star, pool), halo, star)
+    return Dimmed(_taken_off(views, masks, halo, star, pool), halo, star)
 
 
 def without(ghosts: Sequence[Found], view: View, number: int) -> Pixels:
     """Return a view's pixels without the ghosts that it shows, shape (H, W, 3); not a number where not measured."""
-    left = np.where(np.isfinite(view.variance), view.pixels, np.nan).astype(np.float64)
+    left = view.measured.astype(np.float64)
     for ghost in ghosts:
         if ghost.first <= number <= ghost.last:
             for m in range(3):
@@ -66,13 +66,24 @@ def beside(
     views: Sequence[View], halo: Halo | None, star: Star | None, pool: ThreadPoolExecutor | None = None
 ) -> list[View]:
     """Return what views show beside halo and star, less certain where those are bright; nothing around the light."""
+    return _taken_off(views, masks_of(views, pool), halo, star, pool)
+
+
+def _taken_off(
+    views: Sequence[View],
+    masks: Sequence[NDArray[np.bool_]],
+    halo: Halo | None,
+    star: Star | None,
+    pool: ThreadPoolExecutor | None,
+) -> list[View]:
+    """Return views beside halo and star; what lies outside the masks does not count."""
 
     def one(view: View, mask: NDArray[np.bool_]) -> View:
         light = light_around(halo, star, view)
         variance = np.where(mask[..., None], view.variance + (LEFT_BEHIND * light) ** 2, np.inf).astype(np.float32)
         return replace(view, pixels=view.pixels - light, variance=variance)
 
-    return shared_out(one, views, masks_of(views, pool), pool=pool)
+    return shared_out(one, views, masks, pool=pool)
 
 
 def light_around(halo: Halo | None, star: Star | None, view: View) -> Pixels:

@@ -215,7 +215,7 @@ class _Around:
 
 def _around(view: View) -> _Around:
     """Return what was measured of a view, ghosts and all."""
-    light = halved(np.where(np.isfinite(view.variance), view.pixels, np.float32(np.nan)), _HALVINGS)
+    light = halved(view.measured, _HALVINGS)
     variance = halved(view.variance, _HALVINGS, variance=True)
     side = 2.0**-_HALVINGS
     at = view.light_px[0] * side, view.light_px[1] * side

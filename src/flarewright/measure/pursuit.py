@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ..kernels.measure_pupil import BELOW, FIRST_G, FIRST_I
 from ..model.ghost_model import Blades
 from .evenly import evenly
-from .find import Candidate, candidates, slopes_of
+from .find import Candidate, Slopes, candidates, slopes_of
 from .fit import brightens, cost_of, render
 from .found import Found, darkened, left_beside
 from .grow import Growth, grow
@@ -252,8 +252,7 @@ def _candidates(
     pool: ThreadPoolExecutor | None,
 ) -> tuple[list[Candidate], list[Candidate]]:
     """Return the best rims and the best specks, best first."""
-    slopes = slopes_of(_doubted(views, rest, pool=pool), rest, masks, pool=pool)
-    rims = candidates(slopes, views[0].size_px[0], most=most, iris=iris, pool=pool)
+    rims = candidates(_slopes(views, rest, masks, pool), views[0].size_px[0], most=most, iris=iris, pool=pool)
     small = specks(_doubted(views, rest, beside=True, pool=pool), rest, masks, most=most, pool=pool)
     return rims, small
 
@@ -265,7 +264,14 @@ def _lunes(
     pool: ThreadPoolExecutor | None,
 ) -> list[Candidate]:
     """Return the best lunes, best first."""
-    return lunes(slopes_of(_doubted(views, rest, pool=pool), rest, masks, pool=pool), views[0].size_px[0], pool=pool)
+    return lunes(_slopes(views, rest, masks, pool), views[0].size_px[0], pool=pool)
+
+
+def _slopes(
+    views: Sequence[View], rest: Sequence[Pixels], masks: Sequence[NDArray[np.bool_]], pool: ThreadPoolExecutor | None
+) -> Slopes:
+    """Return the borders of what is left."""
+    return slopes_of(_doubted(views, rest, pool=pool), rest, masks, pool=pool)
 
 
 def _doubted(

@@ -67,9 +67,8 @@ def with_rest(model: GhostModel, views: Sequence[View], threads: int | None = No
 
 def _left_by(model: GhostModel, view: View) -> Pixels:
     """Return what a view shows beside a model's ghosts, halo and star; not a number where it was not measured."""
-    known = np.where(np.isfinite(view.variance), view.pixels, np.nan)
     ghosts = draw(model, view.constellation_deg, view.roll_deg, view.size_px)
-    return np.asarray(known - ghosts - light_around(model.halo, model.star, view), dtype=np.float32)
+    return np.asarray(view.measured - ghosts - light_around(model.halo, model.star, view), dtype=np.float32)
 
 
 def around_light(view: View, pixels: Pixels) -> Pixels:

@@ -147,8 +147,7 @@ def told(sprite: Sprite, view: View) -> tuple[Floats, Floats]:
         Means, and their standard deviations; not a number where nothing was measured.
     """
     along, down = _middles(*sprite.corner_px, sprite.grain_px, sprite.rows, sprite.columns)
-    known = np.where(np.isfinite(view.variance), view.pixels, np.float32(np.nan))
-    mean, variance, weight = _cells(known, view, *_placed(view, along, down), sprite.grain_px)
+    mean, variance, weight = _cells(view.measured, view, *_placed(view, along, down), sprite.grain_px)
     seen = weight > 0.0
     return np.where(seen, mean, np.nan), np.where(seen, np.sqrt(variance), np.nan)
 

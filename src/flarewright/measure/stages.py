@@ -30,7 +30,7 @@ from .reading import read_views
 from .rest_fit import with_rest
 from .settle import Settling, settle, to_model
 from .shape import Shape, enlarged
-from .views import Pixels, View, all_known, coarse
+from .views import View, all_known, coarse
 
 Tell = Callable[[str], None]
 Progress = Callable[[float, str], None]
@@ -186,12 +186,7 @@ def fit_ghosts(
 
 def _star_of(views: Sequence[View], pool: ThreadPoolExecutor) -> Star | None:
     """Find the star that stays beside the light at every constellation, if there is one."""
-    return fit_star(register(views, _measured(views), pool=pool))
-
-
-def _measured(views: Sequence[View]) -> list[Pixels]:
-    """Return what views show; not a number where nothing was measured."""
-    return [np.where(np.isfinite(view.variance), view.pixels, np.nan).astype(np.float32) for view in views]
+    return fit_star(register(views, [view.measured for view in views], pool=pool))
 
 
 def _parts(count: int, progress: Progress) -> list[Progress]:

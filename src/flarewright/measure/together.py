@@ -161,7 +161,7 @@ def _spreads(shape: Shape, view: View) -> tuple[float, float, float]:
 
 def _evenness(view: View) -> Floats:
     """Return how bright an even background may be, by colour: about as bright as the darkest places."""
-    known = np.where(np.isfinite(view.variance), view.pixels, np.nan).reshape(-1, CHANNELS)
+    known = view.measured.reshape(-1, CHANNELS)
     shown = np.isfinite(known).any(axis=0)
     dark = np.where(shown, np.nanpercentile(np.where(shown, known, 0.0), _DARK, axis=0), 0.0)
     least = view.darkest_noise if np.isfinite(view.darkest_noise) else 0.0

@@ -63,6 +63,11 @@ class View:
         """Return the same view with other pixels."""
         return replace(self, pixels=pixels)
 
+    @property
+    def measured(self) -> Pixels:
+        """Its pixels; not a number where nothing was measured."""
+        return np.where(np.isfinite(self.variance), self.pixels, np.float32(np.nan))
+
     def showing_one(self, picture: Pixels) -> View:
         """Return the same view with one channel's picture, shape (H, W), as every channel."""
         return self.showing(np.broadcast_to(picture[..., None], self.pixels.shape))
