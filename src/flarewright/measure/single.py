@@ -143,7 +143,7 @@ def _sharper(steep: Slopes, place: float, radius: float, step: float) -> tuple[f
         moves = finer * step * np.arange(-4, 5)
         speeds, sizes = place + moves, np.maximum(radius + moves, 1.0)
         scores, runs = np.zeros((9, 9)), np.zeros((9, 9, 3), np.int64)
-        search(steep.x, steep.y, steep.sigmas, steep.frames, speeds, sizes, circle, 0.0, 1.0, scores, runs)
+        search(steep.x, steep.y, steep.sigmas, steep.frames, speeds, sizes, circle, False, 0.0, 1.0, scores, runs)
         s, r = np.unravel_index(int(np.argmax(scores)), scores.shape)
         if scores[s, r] > 0.0:
             place, radius = float(speeds[s]), float(sizes[r])
