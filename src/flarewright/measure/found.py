@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -141,6 +141,13 @@ def _add(shape: Shape, view: View, pixels: Pixels, sign: float) -> None:
     """Add a shape's light to a view's pixels of one channel, or take it off, in place."""
     part, light = light_of(shape, view)
     pixels[part] += sign * light
+
+
+def formed(form: Shape, own: Shape) -> Shape:
+    """Return another colour's form with a colour's own light."""
+    numbers = form.numbers.copy()
+    numbers[FIRST_I:FIRST_DISC] = own.numbers[FIRST_I:FIRST_DISC]
+    return replace(form, numbers=numbers)
 
 
 def darkened(shape: Shape) -> Shape:

@@ -15,7 +15,8 @@ from ..kernels.measure_pupil import BELOW, FIRST_G, FIRST_I
 from ..model.ghost_model import Blades
 from .evenly import evenly
 from .find import Candidate, Slopes, candidates, slopes_of
-from .fit import brightens, cost_of, render
+from .fit import brightens, cost_of
+from .footprint import overlap
 from .found import Found, darkened, left_beside
 from .grow import Growth, grow
 from .jointly import fitted_jointly
@@ -42,9 +43,8 @@ LEFT_BEHIND = 0.08
 LEFT_AS_SPECKS, _BESIDE = 0.2, 3
 # a candidate no larger than this is looked at with what is this far around it, pixels
 SPECK, BESIDE_SPECK = 3.5, 3.0
-# part of what either covers that a fit shares with the outline it began at, where it is brighter than this part of its
-# brightest place; so many views tell
-COVERS, LIT, _LOOKED = 0.35, 0.1, 4
+# part of what either covers that a fit shares with the outline it began at; so many views tell
+COVERS, _LOOKED = 0.35, 4
 # who was refused is tried again when twice as many ghosts are known, and so many more; but no more often than this
 _SOON, _TRIES = 2, 3
 # steps of all ghosts at once after some were found
@@ -353,14 +353,7 @@ def _stays(trial: Candidate, start: Shape, shape: Shape, views: Sequence[View]) 
     if trial.radius <= SPECK:
         # a speck is no larger than what was looked at
         return largest_size(shape, [view.sigma for view in views]) <= trial.radius + BESIDE_SPECK
-    shared = covered = 0
-    for view in views[:: max(1, len(views) // _LOOKED)]:
-        seen = render(start, view) > 0.0
-        light = render(shape, view)
-        lit = light > LIT * float(light.max(initial=0.0))
-        shared += int(np.count_nonzero(seen & lit))
-        covered += int(np.count_nonzero(seen | lit))
-    return shared > COVERS * covered
+    return overlap(start, shape, views[:: max(1, len(views) // _LOOKED)]) > COVERS
 
 
 def _near(speck: Candidate, view: View) -> View:

@@ -14,7 +14,7 @@ from ..kernels.measure_pupil import DISC_NUMBERS, FIRST_DISC, FIRST_I
 from ..model.ghost_model import AberrationGhost, Blades
 from .find import rims_of
 from .fit import Fit, cost_of, improve, refine
-from .found import CHANNELS, Found, alone, by_light, exchange, leading, noise_of, rest_of
+from .found import CHANNELS, Found, alone, by_light, exchange, formed, leading, noise_of, rest_of
 from .grow import RIM_PAYS, Growth, grow
 from .joint import lit
 from .jointly import fitted_jointly
@@ -120,17 +120,10 @@ def _jointly(
         likes = [None if (lead := leading(ghost, noise)) == m else ghost.shapes[lead] for ghost in out]
         fitted = partial(fitted_jointly, out, views, pixels, m, steps=_STEPS, likes=[] if first else likes, pool=pool)
         for k, shape in enumerate(steps.step(fitted)):
-            shapes = [_formed(shape, old) if first else old for old in out[k].shapes]
+            shapes = [formed(shape, old) if first else old for old in out[k].shapes]
             shapes[m] = shape
             out[k] = replace(out[k], shapes=(shapes[0], shapes[1], shapes[2]))
     return out
-
-
-def _formed(other: Shape, own: Shape) -> Shape:
-    """Return another colour's form with a colour's own light."""
-    numbers = other.numbers.copy()
-    numbers[FIRST_I:FIRST_DISC] = own.numbers[FIRST_I:FIRST_DISC]
-    return replace(other, numbers=numbers)
 
 
 def _again(

@@ -14,6 +14,7 @@ from ..errors import FlarewrightError
 from ..model.capture import MergedRun
 from ..model.corrections import Corrections
 from ..model.ghost_model import AberrationGhost, Blades, GhostModel, Reference, Star
+from .apart import taken_apart
 from .dimmed import LEFT_BEHIND, Dimmed, dimmed_beside
 from .evenly import evenly
 from .found import CHANNELS, Found, rest_of
@@ -97,6 +98,7 @@ def find_ghosts(
             journal=journal,
         )  # fmt: skip
         found = lit(joined(lit(found, seen, pool=pool), seen, pool=pool, tell=tell), small, pool=pool)
+        found = lit(taken_apart(found, small, iris=iris, pool=pool, tell=tell, journal=journal), small, pool=pool)
     tell_pointed(known, pointed, found, tell)
     ghosts = to_model([_sized(ghost, 2.0**times) for ghost in found], searched)
     wanted = kept(known, ghosts, tell)
@@ -172,8 +174,9 @@ def fit_ghosts(
         for _ in range(again):
             # with more ghosts known, the glow is better known and leaves more to be found
             dim = dimmed_beside(settled, views, dim.star, pool)
-            settled += _more(settled, views, dim.views, most - len(settled), iris, pool, tell, next(parts), journal)
-            settled = _whole(settled, dim.views, pool, tell)
+            more = _more(settled, views, dim.views, most - len(settled), iris, pool, tell, next(parts), journal)
+            settled = _whole(settled, more, dim.views, pool, tell)
+            settled = taken_apart(settled, dim.views, iris=iris, pool=pool, tell=tell, journal=journal)
             settled = settle(
                 settled, dim.views, how=settling, iris=iris, pool=pool, tell=tell, progress=next(parts),
                 journal=journal,
@@ -227,10 +230,13 @@ def _among(ghost: Found, numbers: Sequence[int]) -> Found:
     return replace(ghost, first=int(first), last=int(beyond) - 1)
 
 
-def _whole(ghosts: Sequence[Found], views: Sequence[View], pool: ThreadPoolExecutor, tell: Tell) -> list[Found]:
-    """Join ghosts that are one, at the search's resolution; a fit shows better than a search what belongs together."""
+def _whole(
+    known: Sequence[Found], more: Sequence[Found], views: Sequence[View], pool: ThreadPoolExecutor, tell: Tell
+) -> list[Found]:
+    """Return all ghosts, new ones joined with those that they are a part of, at the search's resolution."""
     times, small = _for_search(views)
-    found = joined([_sized(ghost, 0.5**times) for ghost in ghosts], small, pool=pool, tell=tell)
+    ghosts = [_sized(ghost, 0.5**times) for ghost in (*known, *more)]
+    found = joined(ghosts, small, parts=range(len(known), len(ghosts)), pool=pool, tell=tell)
     return [_sized(ghost, 2.0**times) for ghost in found]
 
 
