@@ -31,8 +31,9 @@ from .spans import LEAST_VIEWS, respanned, span_of
 from .specks import RADII, highest_near, specks
 from .views import Pixels, View, distances
 
-# votes below which a candidate is chance
-SCORE = 0.9
+# votes below which a candidate is chance, and so many of each view where there are many: what is left of ghosts has as
+# many
+SCORE, _OF_EACH = 0.9, 0.04
 # part of the light's squares inside its windows that a ghost must explain
 EXPLAINS = 0.06
 # standard deviations of its brightness over all views
@@ -140,7 +141,8 @@ def pursue(
     refused: list[_Refused] = []
     waiting = list(first)
     steps = journal or Journal()
-    fallen = _Fallen(progress)
+    least = max(SCORE, _OF_EACH * len(views))
+    fallen = _Fallen(progress, least)
     rims: list[Candidate] = []
     small: list[Candidate] = []
     known_to = asked_at = 0
@@ -152,13 +154,13 @@ def pursue(
         if asked > known_to:
             known_to = asked + _SPARE
             rims, small = steps.step(partial(_candidates, shown, left, masks, known_to, iris, pool))
-        trials = _open([*rims[:asked], *small[:asked], *low], refused, len(found))
+        trials = _open([*rims[:asked], *small[:asked], *low], refused, len(found), least)
         # what is left of ghosts votes for lunes as well, so they are looked for late, and again when more is taken off
         enough = len(found) >= _MANY_MORE * low_at if trials else len(found) > low_at
         if enough and (not trials or trials[0].score < _LUNES_FROM):
             low, low_at = steps.step(partial(_lunes, shown, left, masks, pool)), len(found)
-            trials = _open([*rims[:asked], *small[:asked], *low], refused, len(found))
-        fallen(trials[0].score if trials else SCORE, len(found))
+            trials = _open([*rims[:asked], *small[:asked], *low], refused, len(found), least)
+        fallen(trials[0].score if trials else least, len(found))
         trials, waiting = [*waiting[:_ROUND], *trials], waiting[_ROUND:]
         queue, before = trials[:_ROUND], len(found)
         while queue:
@@ -215,13 +217,13 @@ def _with_refused(refused: Sequence[_Refused], trial: Candidate, known: int) -> 
     return [*others, _Refused(trial, 1 + max((one.times for one in before), default=0), known)]
 
 
-def _open(votes: Sequence[Candidate], refused: Sequence[_Refused], known: int) -> list[Candidate]:
-    """Return the candidates to try while so many ghosts are known, the best first.
+def _open(votes: Sequence[Candidate], refused: Sequence[_Refused], known: int, least: float) -> list[Candidate]:
+    """Return the candidates to try while so many ghosts are known, the best first, with more than so many votes.
 
     Beside ghosts that are not known yet one explains little of what is in its windows, and runs off to their light. So
     one that was refused waits until many more are known; where nothing else is left, until any more are.
     """
-    likely = sorted([each for each in votes if each.score > SCORE], key=lambda each: -each.score)
+    likely = sorted([each for each in votes if each.score > least], key=lambda each: -each.score)
     for latest in (known // 2 - _SOON, known - 1):
         barred = [one.candidate for one in refused if one.known > latest or one.times >= _TRIES]
         trials = [each for each in likely if not any(_same(each, other) for other in barred)]
@@ -233,14 +235,14 @@ def _open(votes: Sequence[Candidate], refused: Sequence[_Refused], known: int) -
 class _Fallen:
     """Tells the finished part of a search by its best votes, which fall until only chance is left."""
 
-    def __init__(self, progress: Callable[[float, str], None]) -> None:
-        self._progress, self._first, self._part = progress, 0.0, 0.0
+    def __init__(self, progress: Callable[[float, str], None], least: float) -> None:
+        self._progress, self._least, self._first, self._part = progress, least, 0.0, 0.0
 
     def __call__(self, score: float, found: int) -> None:
         self._first = max(self._first, score)
-        if self._first > SCORE:
-            self._part = max(self._part, 1.0 - log(score / SCORE) / log(self._first / SCORE))
-        self._progress(self._part, f"{found} ghosts, votes {score:.1f} of at least {SCORE:g}")
+        if self._first > self._least:
+            self._part = max(self._part, 1.0 - log(score / self._least) / log(self._first / self._least))
+        self._progress(self._part, f"{found} ghosts, votes {score:.1f} of at least {self._least:g}")
 
 
 def _candidates(
