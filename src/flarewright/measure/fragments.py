@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
@@ -35,7 +35,6 @@ def joined(
     ghosts: Sequence[Found],
     views: Sequence[View],
     *,
-    parts: Container[int] | None = None,
     pool: ThreadPoolExecutor | None = None,
     tell: Callable[[str], None] = lambda _: None,
 ) -> list[Found]:
@@ -46,8 +45,6 @@ def joined(
     ghosts : sequence of Found
     views : sequence of View
         Glow taken off; what shall not count has infinite variance.
-    parts : container of int, optional
-        The places of those that may be a part of another; None: all.
     pool : executor, optional
     tell : callable
         Gets a line for each pair that became one.
@@ -66,7 +63,7 @@ def joined(
     """
     out = list(ghosts)
     rest = rest_of(out, views, 1, pool)
-    for ghost in [out[k] for k in reversed(by_light(out)) if parts is None or k in parts]:
+    for ghost in [out[k] for k in reversed(by_light(out))]:
         if _is_speck(ghost, views):
             continue
         for other in _hosts(ghost, out):

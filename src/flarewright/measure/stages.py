@@ -174,8 +174,8 @@ def fit_ghosts(
         for _ in range(again):
             # with more ghosts known, the glow is better known and leaves more to be found
             dim = dimmed_beside(settled, views, dim.star, pool)
-            more = _more(settled, views, dim.views, most - len(settled), iris, pool, tell, next(parts), journal)
-            settled = _whole(settled, more, dim.views, pool, tell)
+            settled += _more(settled, views, dim.views, most - len(settled), iris, pool, tell, next(parts), journal)
+            settled = _whole(settled, dim.views, pool, tell)
             settled = taken_apart(settled, dim.views, iris=iris, pool=pool, tell=tell, journal=journal)
             settled = settle(
                 settled, dim.views, how=settling, iris=iris, pool=pool, tell=tell, progress=next(parts),
@@ -230,13 +230,10 @@ def _among(ghost: Found, numbers: Sequence[int]) -> Found:
     return replace(ghost, first=int(first), last=int(beyond) - 1)
 
 
-def _whole(
-    known: Sequence[Found], more: Sequence[Found], views: Sequence[View], pool: ThreadPoolExecutor, tell: Tell
-) -> list[Found]:
-    """Return all ghosts, new ones joined with those that they are a part of, at the search's resolution."""
+def _whole(ghosts: Sequence[Found], views: Sequence[View], pool: ThreadPoolExecutor, tell: Tell) -> list[Found]:
+    """Join ghosts that are one, at the search's resolution; a fit shows better than a search what belongs together."""
     times, small = _for_search(views)
-    ghosts = [_sized(ghost, 0.5**times) for ghost in (*known, *more)]
-    found = joined(ghosts, small, parts=range(len(known), len(ghosts)), pool=pool, tell=tell)
+    found = joined([_sized(ghost, 0.5**times) for ghost in ghosts], small, pool=pool, tell=tell)
     return [_sized(ghost, 2.0**times) for ghost in found]
 
 
