@@ -15,8 +15,14 @@ from flarewright.measure.patches import patches_of
 from flarewright.measure.shape import Shape, free_numbers
 
 ANGLES = np.linspace(4.0, 22.0, 19)
-# a small bright one, and a larger one that goes along before it
-SMALL, LARGE = shape(58.0, 10.0, 1.0), shape(76.0, 14.0, 0.6)
+
+
+def pair(side: float = 1.0) -> tuple[Shape, Shape]:
+    """Return a small bright ghost and a larger one that goes along before it, on one side of the axis."""
+    return shape(side * 58.0, 10.0, 1.0), shape(side * 76.0, 14.0, 0.6)
+
+
+SMALL, LARGE = pair()
 
 
 def fitted(start: Shape, shown) -> Found:
@@ -44,11 +50,11 @@ def test_where_a_shape_has_light():
     assert overlap(dark, dark, [shown]) == 0.0
 
 
-@pytest.mark.parametrize("beyond", [1.0, -1.0])
-def test_a_ghost_that_was_fitted_for_two_is_taken_apart(beyond):
-    small, large = (shape(beyond * speed, size, level) for speed, size, level in ((58.0, 10.0, 1.0), (76.0, 14.0, 0.6)))
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_ghost_that_was_fitted_for_two_is_taken_apart(side):
+    small, large = pair(side)
     shown = views((small, large), angles=ANGLES)
-    one = fitted(shape(beyond * 68.0, 15.0, 1.0), shown)
+    one = fitted(shape(side * 68.0, 15.0, 1.0), shown)
     assert nearest(small, [one], shown) < 0.5
     told: list[str] = []
     two = taken_apart([one], shown, tell=told.append)

@@ -17,14 +17,14 @@ import numpy as np
 from ..model.ghost_model import Blades
 from .evenly import evenly
 from .find import Candidate, rim_outline, rims_of, searched, slopes_of
-from .fit import Fit, brightens, cost_of, light_of, refine
+from .fit import Fit, brightens, cost_of, fitted_numbers, refine
 from .footprint import footprint, overlap
-from .found import CHANNELS, Found, alone, by_light, exchange, formed, lay_over, leading, noise_of, rest_of
+from .found import CHANNELS, Found, add_light, alone, by_light, exchange, formed, lay_over, leading, noise_of, rest_of
 from .grow import Growth, grow
 from .journal import Journal
 from .patches import patches_of
 from .pursuit import COVERS, beginning
-from .shape import Indices, Shape, free_numbers
+from .shape import Indices, Shape
 from .spans import LEAST_VIEWS
 from .views import Pixels, View, all_known
 
@@ -148,9 +148,8 @@ def _beside_each_other(
     ghost: Found, other: Shape, life: range, shown: Sequence[View], lead: int, pool: ThreadPoolExecutor | None
 ) -> tuple[Fit, Shape] | None:
     """Fit a ghost and another in turn; None when they do not explain enough beyond what the ghost does."""
-    old, known = ghost.shapes[lead], ghost.fits[lead]
-    same = known is not None and known.shape.discs == old.discs
-    free = known.free if known is not None and same else free_numbers(1, old.discs, 1, True)
+    old = ghost.shapes[lead]
+    free, its = fitted_numbers(ghost.fits[lead], old), fitted_numbers(None, other)
 
     def without_other() -> list[View]:
         return [_without(other, view) if k in life else view for k, view in enumerate(shown)]
@@ -161,9 +160,7 @@ def _beside_each_other(
         if fit is None:
             return None
         one = fit.shape
-        anew = _fitted(
-            other, [_without(one, shown[k]) for k in life], lead, free_numbers(1, other.discs, 1, True), pool
-        )
+        anew = _fitted(other, [_without(one, shown[k]) for k in life], lead, its, pool)
         if anew is None:
             return None
         other = anew.shape
@@ -221,9 +218,8 @@ def _doubted(view: View) -> View:
 
 def _without(shape: Shape, view: View) -> View:
     """Return a view of one ghost without a shape's light."""
-    part, light = light_of(shape, view)
     picture = view.pixels[..., 0].copy()
-    picture[part] -= light
+    add_light(shape, view, picture, -1.0)
     return view.showing_one(picture)
 
 

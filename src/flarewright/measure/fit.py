@@ -18,7 +18,7 @@ from .normal import inverse
 from .numbers import NUMBERS, Floats
 from .patches import Missed, Patch, Patches, equations, laid_out, missed
 from .room import Room
-from .shape import Indices, Shape, stepped
+from .shape import Indices, Shape, free_numbers, stepped
 from .views import View
 
 Part = tuple[slice, slice]
@@ -75,6 +75,13 @@ class Fit:
         excess = max(self.doubt, self.cost / max(self.count - self.free.size, 1))
         deviation[self.free] = np.sqrt(np.maximum(np.diag(self.covariance), 0.0) * excess)
         return deviation
+
+
+def fitted_numbers(known: Fit | None, shape: Shape) -> Indices:
+    """Return which numbers of a shape to fit again: those of a fit with as many discs, or first-order ones."""
+    if known is not None and known.shape.discs == shape.discs:
+        return known.free
+    return free_numbers(1, shape.discs, 1, True)
 
 
 def render(shape: Shape, view: View, scale: float = 1.0) -> Floats:

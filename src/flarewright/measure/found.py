@@ -111,7 +111,7 @@ def alone(
 
     def one(k: int) -> View:
         own = rest[k].copy()
-        _add(ghost.shapes[channel], views[k], own, 1.0)
+        add_light(ghost.shapes[channel], views[k], own, 1.0)
         return views[k].showing_one(own)
 
     return shared_out(one, evenly(range(ghost.first, ghost.last + 1), most), pool=pool)
@@ -134,10 +134,10 @@ def lay_over(
     pool: ThreadPoolExecutor | None,
 ) -> None:
     """Add a shape's light to a channel's pixels of the views in which a ghost is there, or take it off, in place."""
-    shared_out(lambda k: _add(shape, views[k], pixels[k], sign), range(ghost.first, ghost.last + 1), pool=pool)
+    shared_out(lambda k: add_light(shape, views[k], pixels[k], sign), range(ghost.first, ghost.last + 1), pool=pool)
 
 
-def _add(shape: Shape, view: View, pixels: Pixels, sign: float) -> None:
+def add_light(shape: Shape, view: View, pixels: Pixels, sign: float) -> None:
     """Add a shape's light to a view's pixels of one channel, or take it off, in place."""
     part, light = light_of(shape, view)
     pixels[part] += sign * light

@@ -13,7 +13,7 @@ import numpy as np
 from ..kernels.measure_pupil import DISC_NUMBERS, FIRST_DISC, FIRST_I
 from ..model.ghost_model import AberrationGhost, Blades
 from .find import rims_of
-from .fit import Fit, cost_of, improve, refine
+from .fit import Fit, cost_of, fitted_numbers, improve, refine
 from .found import CHANNELS, Found, alone, by_light, exchange, formed, leading, noise_of, rest_of
 from .grow import RIM_PAYS, Growth, grow
 from .joint import lit
@@ -250,8 +250,7 @@ def _refined(
     patches = patches_of(start, alone, channel)
     if not patches:
         return None
-    same = known is not None and known.shape.discs == start.discs
-    free = known.free if known is not None and same else free_numbers(1, start.discs, 1, True)
+    free = fitted_numbers(known, start)
     return refine(start, patches, free, width=alone[0].size_px[0], steps=8, like=like, pool=pool)
 
 

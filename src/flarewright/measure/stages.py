@@ -37,7 +37,7 @@ Tell = Callable[[str], None]
 Progress = Callable[[float, str], None]
 
 # ghosts are looked for in pictures halved until they are no wider, of no more constellations than this: with more of
-# them a vote costs more and tells no more, and `pursuit.SCORE` is what chance reaches with so many
+# them a vote costs more and tells no more
 SEARCH_WIDTH, SEARCHED = 400, 50
 
 
