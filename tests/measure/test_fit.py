@@ -428,3 +428,14 @@ def test_a_rim_that_leaves_nothing_to_fit_is_none(monkeypatch):
     fit = grow(GHOSTS[1], seen, 1, most=Growth(order=1, discs=1))
     assert fit is not None
     assert fit.shape.discs == 0
+
+
+def test_of_light_beyond_the_frame_an_even_background_tells_nothing():
+    """With one for each view, all that a ghost without a border in the picture adds would be nobody's."""
+    wide, start = shape(0.0, 400.0, 0.3), shape(0.0, 400.0, 0.2)
+    for each in (wide, start):
+        each.numbers[1:10] = each.numbers[11:20] = each.numbers[21:] = 0.0
+    seen = views([wide], angles=np.linspace(2.0, LARGEST, 6))
+    fits = {offset: grow(start, seen, 1, most=Growth(order=0, discs=0, offset=offset)) for offset in (True, False)}
+    assert render(fits[False].shape, seen[0]).mean() == pytest.approx(0.3, rel=0.05)
+    assert abs(render(fits[True].shape, seen[0]).mean() - 0.3) > 0.05

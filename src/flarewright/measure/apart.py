@@ -167,8 +167,9 @@ def _beside_each_other(
     if fit is None or not (brightens(one, shown) and brightens(other, [shown[k] for k in life])):
         return None
     # in the same windows
+    cost = partial(cost_of, offset=False, error=_NOTHING)
     whole, parted = (patches_of(one, look, lead, beside=old) for look in (shown, without_other()))
-    if cost_of(one, parted, error=_NOTHING) > (1.0 - _PAYS) * cost_of(old, whole, error=_NOTHING):
+    if cost(one, parted) > (1.0 - _PAYS) * cost(old, whole):
         return None
     return fit, other
 
@@ -230,4 +231,6 @@ def _fitted(
     patches = patches_of(start, views, lead, area=_AREA)
     if not patches:
         return None
-    return refine(start, patches, free, width=views[0].size_px[0], steps=_STEPS, error=_NOTHING, pool=pool)
+    return refine(
+        start, patches, free, width=views[0].size_px[0], steps=_STEPS, offset=False, error=_NOTHING, pool=pool
+    )

@@ -255,13 +255,14 @@ def improve(
     *,
     width: int,
     steps: int,
+    offset: bool = True,
     error: float = MODEL_ERROR,
     tails: bool = True,
     alike: bool = True,
     pool: ThreadPoolExecutor | None = None,
 ) -> tuple[Shape, float]:
     """Return what `refine` makes of a shape, and its cost: for trials, of which nobody asks how sure they are."""
-    search = _Search(laid_out(patches), free, width, True, error, tails, alike and error > 0.0, pool)
+    search = _Search(laid_out(patches), free, width, offset, error, tails, alike and error > 0.0, pool)
     last, _ = search.descend(shape, steps)
     return last.shape, last.cost
 

@@ -39,6 +39,8 @@ class Growth:
     ----------
     order, intensity_order, discs : int
         At most.
+    offset : bool
+        Every view has an unknown even background around the ghost: others that are not known yet.
     error : float
         Part of the light that the model may miss.
     soft : bool
@@ -54,6 +56,7 @@ class Growth:
     order: int = 2
     intensity_order: int = 1
     discs: int = 2
+    offset: bool = True
     error: float = MODEL_ERROR
     soft: bool = True
     below: bool = True
@@ -87,6 +90,8 @@ def grow(
         None when no view shows it.
     """
     width = views[0].size_px[0]
+    refined = partial(refine, width=width, offset=most.offset, error=most.error, alike=most.alike, pool=pool)
+    cost = partial(cost_of, offset=most.offset, error=most.error)
 
     def polish(start: Shape, order: int, light: int, steps: int, old: Shape | None) -> tuple[Fit, list[Patch]] | None:
         # a ghost that shrinks shall not forget the light that it leaves
@@ -94,8 +99,7 @@ def grow(
         if not patches or not shows(start, views):
             return None
         free = free_numbers(order, start.discs, light, most.soft and order > 0, below=most.below and order > 0)
-        fit = refine(start, patches, free, width=width, steps=steps, error=most.error, alike=most.alike, pool=pool)
-        return fit, patches
+        return refined(start, patches, free, steps=steps), patches
 
     found = polish(shape, 0, 0, 8, None)
     order = 0
@@ -104,8 +108,8 @@ def grow(
         grown: Shape | None = None
         if fit.shape.discs < most.discs:
             grown = _with_rim(fit.shape, patches, free_numbers(order, 0, min(order, 1)), width, most, pool)
-            before = cost_of(fit.shape, patches, error=most.error)
-            if grown is not None and cost_of(grown, patches, error=most.error) < (1.0 - RIM_PAYS) * before:
+            before = cost(fit.shape, patches)
+            if grown is not None and cost(grown, patches) < (1.0 - RIM_PAYS) * before:
                 # a rim may leave too little to fit: then it is none
                 rimmed = polish(grown, order, min(order, most.intensity_order), 6, fit.shape)
                 if rimmed is not None:
@@ -116,7 +120,7 @@ def grow(
         higher = polish(fit.shape, order + 1, min(order + 1, most.intensity_order), 10, shape)
         if higher is None:
             break
-        before = cost_of(fit.shape, higher[1], error=most.error)
+        before = cost(fit.shape, higher[1])
         if order == 1 and higher[0].cost > (1.0 - ORDER_PAYS) * before:
             break
         found, order = higher, order + 1
@@ -186,7 +190,9 @@ def _with_rim(
             starts.append(replace(shape, numbers=numbers, discs=shape.discs + 1))
 
     def tried(look: Sequence[Patch], numbers: Indices, steps: int, start: Shape) -> tuple[Shape, float]:
-        return improve(start, look, numbers, width=width, steps=steps, error=most.error, alike=most.alike)
+        return improve(
+            start, look, numbers, width=width, steps=steps, offset=most.offset, error=most.error, alike=most.alike
+        )
 
     # each in one thread: a trial is too small to be shared out
     trials = shared_out(partial(tried, rough, own, 3), starts, pool=pool)

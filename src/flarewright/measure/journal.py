@@ -106,7 +106,7 @@ def journal(path: Path, digest: str) -> Iterator[Journal]:
     OutputError
         When the file cannot be written.
     """
-    head = {"journal": 7, "version": __version__, "digest": digest}
+    head = {"journal": 8, "version": __version__, "digest": digest}
     known = _read(path, head)
     text = "".join(json.dumps(line) + "\n" for line in (head, *known))
 

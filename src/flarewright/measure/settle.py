@@ -10,7 +10,7 @@ from functools import partial
 
 import numpy as np
 
-from ..kernels.measure_pupil import DISC_NUMBERS, FIRST_DISC, FIRST_I
+from ..kernels.measure_pupil import FIRST_DISC, FIRST_I
 from ..model.ghost_model import AberrationGhost, Blades
 from .find import rims_of
 from .fit import Fit, cost_of, fitted_numbers, improve, refine
@@ -22,7 +22,7 @@ from .journal import Journal
 from .numbers import Floats, blades_of, channel_of, with_blades
 from .patches import patches_of
 from .presence import usual_amplitude
-from .shape import Shape, free_numbers
+from .shape import Shape, free_numbers, without_discs
 from .shared_out import side_by_side
 from .spans import respanned
 from .views import Pixels, View
@@ -142,7 +142,9 @@ def _again(
     def leader() -> Fit | None:
         shown = alone(ghost, lead, views, rest[lead], how.views, pool)
         if ghost.fits[lead] is None:
-            return _grown(_rimmed(shapes[lead], shown, lead, iris, pool), shown, lead, how.most, pool)
+            # all that is known of the others is taken off: an even background would be light that nobody gets
+            most = replace(how.most, offset=False)
+            return _grown(_rimmed(shapes[lead], shown, lead, iris, pool), shown, lead, most, pool)
         return _refined(shapes[lead], shown, lead, ghost.fits[lead], pool)
 
     def like_leader(m: int) -> Fit | None:
@@ -175,7 +177,7 @@ def _grown(
     if fit is None or bare is None:
         return fit
     patches = patches_of(fit.shape, shown, channel, beside=bare.shape)
-    costs = [cost_of(each.shape, patches, error=most.error) for each in (fit, bare)]
+    costs = [cost_of(each.shape, patches, offset=most.offset, error=most.error) for each in (fit, bare)]
     return bare if costs[1] * (1.0 - RIM_PAYS) ** (fit.shape.discs - bare.shape.discs) <= costs[0] else fit
 
 
@@ -190,7 +192,7 @@ def _rimmed(
     best, least = shape, np.inf
     for start in kinds_of(shape, iris):
         free = free_numbers(1, start.discs, 1)
-        trial, cost = improve(start, few, free, width=shown[0].size_px[0], steps=4, pool=pool)
+        trial, cost = improve(start, few, free, width=shown[0].size_px[0], steps=4, offset=False, pool=pool)
         cost /= (1.0 - RIM_PAYS) ** start.discs
         if cost < least:
             best, least = trial, cost
@@ -221,13 +223,6 @@ def kinds_of(shape: Shape, iris: Blades | None) -> list[Shape]:
     return found
 
 
-def without_discs(shape: Shape) -> Shape:
-    """Return a shape that no rim cuts but its first."""
-    numbers = shape.numbers.copy()
-    numbers[FIRST_DISC : FIRST_DISC + DISC_NUMBERS * shape.discs] = 0.0
-    return replace(shape, numbers=numbers, discs=0)
-
-
 def _like(lead: Shape, own: Shape, alone: Sequence[View], channel: int) -> Shape:
     """Return the shape of the colour that leads as bright as another colour is."""
     amplitude = usual_amplitude(lead, alone, channel)
@@ -251,7 +246,7 @@ def _refined(
     if not patches:
         return None
     free = fitted_numbers(known, start)
-    return refine(start, patches, free, width=alone[0].size_px[0], steps=8, like=like, pool=pool)
+    return refine(start, patches, free, width=alone[0].size_px[0], steps=8, offset=False, like=like, pool=pool)
 
 
 def to_model(ghosts: Sequence[Found], views: Sequence[View]) -> tuple[AberrationGhost, ...]:

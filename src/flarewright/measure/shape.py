@@ -77,6 +77,13 @@ def largest_size(shape: Shape, sigmas: Iterable[float]) -> float:
     return float(max(abs(size + growth * sigma**2) for sigma in sigmas))
 
 
+def without_discs(shape: Shape) -> Shape:
+    """Return a shape that no rim cuts but its first."""
+    numbers = shape.numbers.copy()
+    numbers[FIRST_DISC : FIRST_DISC + DISC_NUMBERS * shape.discs] = 0.0
+    return replace(shape, numbers=numbers, discs=0)
+
+
 def stepped(shape: Shape, free: Indices, step: Floats) -> Shape:
     """Return a shape moved by a step; a disc never shrinks below a twentieth, and softness not below 0."""
     numbers = shape.numbers.copy()

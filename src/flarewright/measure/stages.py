@@ -14,6 +14,7 @@ from ..errors import FlarewrightError
 from ..model.capture import MergedRun
 from ..model.corrections import Corrections
 from ..model.ghost_model import AberrationGhost, Blades, GhostModel, Reference, Star
+from .anew import begun_anew
 from .apart import taken_apart
 from .dimmed import LEFT_BEHIND, Dimmed, dimmed_beside
 from .evenly import evenly
@@ -97,7 +98,8 @@ def find_ghosts(
             seen, measured, most=most, first=pointed, iris=iris, pool=pool, tell=tell, progress=progress,
             journal=journal,
         )  # fmt: skip
-        found = lit(joined(lit(found, seen, pool=pool), seen, pool=pool, tell=tell), small, pool=pool)
+        found = joined(lit(found, seen, pool=pool), seen, pool=pool, tell=tell)
+        found = lit(begun_anew(found, seen, pool=pool, journal=journal), small, pool=pool)
         found = lit(taken_apart(found, small, iris=iris, pool=pool, tell=tell, journal=journal), small, pool=pool)
     tell_pointed(known, pointed, found, tell)
     ghosts = to_model([_sized(ghost, 2.0**times) for ghost in found], searched)
