@@ -143,7 +143,7 @@ def test_find_and_fit_stopped_half_way_end_with_the_same_bytes(tmp_path, capsys,
             assert command(["measure", stage, str(folder), "--every", "3"]) == 130
         lines = (folder / f"{stage}.journal").read_text().splitlines()
         assert len(lines) == 1 + done // 2
-        assert json.loads(lines[0])["journal"] == 7
+        assert json.loads(lines[0])["journal"] == 8
         capsys.readouterr()
         assert command(["measure", stage, str(folder), "--every", "3"]) == 0
         assert f"goes on after {done // 2} steps" in capsys.readouterr().err

@@ -44,6 +44,16 @@ def straight(x, y):
     return np.stack([0.2 * (x - 15.0), 0.1 * (x - 15.0) + 0.3 * (y - 10.0), 0.2 * (10.0 - y)], axis=-1)
 
 
+def test_records_that_were_read_are_equal_as_those_that_were_not():
+    one, same, other = sprite(slope()), sprite(slope()), sprite(slope() + 1.0)
+    # what was read is kept, and of two arrays it cannot be told whether they are equal
+    assert one.pictures.shape == same.pictures.shape == other.pictures.shape
+    assert one == same == sprite(slope())
+    assert hash(one) == hash(same)
+    assert one != other
+    assert one != "a sprite"
+
+
 def test_cells_come_back_to_their_step():
     values = np.random.default_rng(0).normal(size=(3, 5, 4, 3)) * np.geomspace(0.01, 100.0, 3)[:, None, None, None]
     back = sprite(values, constellation_deg=(0.0, 1.0, 2.0)).pictures

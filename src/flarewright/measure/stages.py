@@ -18,7 +18,7 @@ from .anew import begun_anew
 from .apart import taken_apart
 from .dimmed import LEFT_BEHIND, Dimmed, dimmed_beside
 from .evenly import evenly
-from .found import CHANNELS, Found, rest_of
+from .found import CHANNELS, Found, by_light, rest_of
 from .fragments import joined
 from .glow_fit import fit_star, iris_of, register
 from .joint import lit
@@ -167,6 +167,8 @@ def fit_ghosts(
         found = [
             replace(_found(ghost, views), unwanted=k >= len(rough.ghosts)) for k, ghost in enumerate(ghosts)
         ]  # fmt: skip
+        # in whatever order they come: sums in another order differ in their last digits, and searches amplify that
+        found = [found[k] for k in by_light(found)]
         dim = dimmed_beside(found, views, _star_of(views, pool), pool)
         iris = iris_of(dim.star)
         parts = iter(_parts(2 * again + 1, progress))

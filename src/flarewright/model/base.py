@@ -12,6 +12,16 @@ class Frozen(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
+    def __eq__(self, other: object) -> bool:
+        """Tell whether another record is of the same type and has equal fields.
+
+        What a record keeps beside its fields, such as an array that was read from one of them, does not count: pydantic
+        compares it first, and of arrays it cannot be told whether they are equal.
+        """
+        if type(self) is not type(other):
+            return NotImplemented
+        return all(getattr(self, name) == getattr(other, name) for name in type(self).model_fields)
+
     def replace(self, **changes: Any) -> Any:
         """Return a validated copy with some fields changed.
 
