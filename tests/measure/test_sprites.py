@@ -45,10 +45,10 @@ def straight(x, y):
 
 
 def test_records_that_were_read_are_equal_as_those_that_were_not():
-    one, same, other = sprite(slope()), sprite(slope()), sprite(slope() + 1.0)
+    one, same, other = sprite([slope()]), sprite([slope()]), sprite([slope() + 1.0])
     # what was read is kept, and of two arrays it cannot be told whether they are equal
     assert one.pictures.shape == same.pictures.shape == other.pictures.shape
-    assert one == same == sprite(slope())
+    assert one == same == sprite([slope()])
     assert hash(one) == hash(same)
     assert one != other
     assert one != "a sprite"

@@ -7,7 +7,8 @@ from typing import Any
 from pydantic import BaseModel, ConfigDict
 
 
-class Frozen(BaseModel):
+# pydantic gives what is frozen a hash of its fields
+class Frozen(BaseModel):  # noqa: PLW1641
     """Base of every record: immutable, unknown keys refused, NaN and infinity refused."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
