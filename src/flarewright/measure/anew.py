@@ -1,8 +1,8 @@
 """Ghosts that were found one after the other are begun anew, plainly and all at once.
 
 While most ghosts are unknown, a fit makes up for their light with what it may: rims that cut a border off, light that
-fades over the pupil. Once the others are known these stay, for a rim in a wrong place holds a ghost fast that would
-otherwise move on. Without them all ghosts together find their places.
+fades over the pupil. Once the others are known these stay, though that light has another reason now. Without them all
+ghosts together find their places.
 """
 
 from __future__ import annotations
