@@ -93,6 +93,6 @@ def _plain(ghost: Found) -> Found:
 
 
 def _plain_shape(shape: Shape) -> Shape:
-    numbers = without_discs(shape).numbers.copy()
+    numbers = without_discs(shape).numbers
     numbers[FIRST_I + 1 : FIRST_DISC] = 0.0
     return Shape(numbers)

@@ -81,8 +81,7 @@ def left_beside(
         left = pixels[k].astype(float)
         for ghost in ghosts:
             if ghost.first <= k <= ghost.last:
-                part, light = light_of(ghost.shapes[channel], views[k])
-                left[part] -= light
+                add_light(ghost.shapes[channel], views[k], left, -1.0)
         return left.astype(np.float32)
 
     return shared_out(one, range(len(views)), pool=pool)
@@ -137,7 +136,7 @@ def lay_over(
     shared_out(lambda k: add_light(shape, views[k], pixels[k], sign), range(ghost.first, ghost.last + 1), pool=pool)
 
 
-def add_light(shape: Shape, view: View, pixels: Pixels, sign: float) -> None:
+def add_light(shape: Shape, view: View, pixels: Pixels | Floats, sign: float) -> None:
     """Add a shape's light to a view's pixels of one channel, or take it off, in place."""
     part, light = light_of(shape, view)
     pixels[part] += sign * light

@@ -39,18 +39,14 @@ class Blocks(Frozen):
 
     @model_validator(mode="after")
     def _fits(self) -> Blocks:
-        # not kept, for what is kept is compared where records are
-        self._sound(self._read())
+        self._sound(self.bytes_of_blocks)
         return self
 
     def _sound(self, numbers: NDArray[np.uint8]) -> None:
         """Raise ValueError where bytes, shape (intervals, rows, columns, count), are none of this kind."""
 
-    def _read(self) -> NDArray[np.uint8]:
-        shape = self.intervals, self.rows, self.columns, self.count
-        return np.frombuffer(read_bytes(self.numbers, prod(shape), self.what), np.uint8).reshape(shape)
-
     @cached_property
     def bytes_of_blocks(self) -> NDArray[np.uint8]:
         """Shape (intervals, rows, columns, count)."""
-        return self._read()
+        shape = self.intervals, self.rows, self.columns, self.count
+        return np.frombuffer(read_bytes(self.numbers, prod(shape), self.what), np.uint8).reshape(shape)
