@@ -51,28 +51,69 @@ def test_at_captures_and_next_to_them_nothing_changes(unknown):
             assert np.abs(there - own).max() < 1e-4 * np.abs(own).max()
 
 
-def test_a_speck_of_light_is_carried_over_a_gap_wider_than_itself():
-    pictures = np.zeros((5, 24, 80, 3), np.float32)
-    for k in range(5):
-        pictures[k, 10:14, 8 + 12 * k : 13 + 12 * k] = 1.0
+def bare(pictures):
+    """Return a model of five pictures of 24 by 80 cells, a degree apart, and no ghost."""
     unit, cells = packed(pictures, 1e-3)
     sprite = Sprite(
         follows="ghosts", grain_px=3.0, corner_px=(-120.0, -36.0), constellation_deg=(1.0, 2.0, 3.0, 4.0, 5.0), rows=24,
         columns=80, unit=unit, cells=cells,
     )  # fmt: skip
-    empty = GhostModel(
+    return GhostModel(
         size_px=(240, 72), axis_px=(120.0, 36.0), focal_px=1e3, largest_deg=5.0, constellation_deg=(1.0, 5.0),
         ghosts=(), sprites=(sprite,),
     )  # fmt: skip
-    model = cast(GhostModel, with_moves(empty))
+
+
+def row_of(model, angle):
+    """Return the light of the row of cells in the middle."""
+    return np.maximum(carried(model.sprites[0], pack(model), model, angle)[11, :, 1], 0.0)
+
+
+def test_a_speck_of_light_is_carried_over_a_gap_wider_than_itself():
+    pictures = np.zeros((5, 24, 80, 3), np.float32)
+    for k in range(5):
+        pictures[k, 10:14, 8 + 12 * k : 13 + 12 * k] = 1.0
+    model = cast(GhostModel, with_moves(bare(pictures)))
     for angle in (2.25, 2.5, 3.75):
-        there = carried(model.sprites[0], pack(model), model, angle)[..., 1]
-        light = np.maximum(there, 0.0)
-        middle = (light.sum(axis=0) @ np.arange(80)) / light.sum()
+        light = row_of(model, angle)
+        middle = (light @ np.arange(80)) / light.sum()
         assert middle == pytest.approx(10.0 + 12.0 * (angle - 1.0), abs=0.5)
         # one, as wide as it is, not two of half the light
-        assert light[11].max() == pytest.approx(1.0, abs=0.1)
-        assert (light[11] > 0.5).sum() in range(4, 8)
+        assert light.max() == pytest.approx(1.0, abs=0.1)
+        assert (light > 0.5).sum() in range(4, 8)
+
+
+def test_what_is_soft_and_wide_is_followed_farther_than_a_block_is_looked_for():
+    columns, pictures = np.arange(80), np.zeros((5, 24, 80, 3), np.float32)
+    # 25 cells from one picture to the next, out of the picture at both ends
+    places = 25.0 * np.arange(5) - 10.0
+    for k, place in enumerate(places):
+        pictures[k] = np.exp(-0.5 * ((columns - place) / 5.0) ** 2)[:, None]
+    told = with_moves(bare(pictures)).sprites[0].moves
+    for k in (1, 2):
+        halfway_there = int(0.5 * (places[k] + places[k + 1])) // 4
+        moves = told.steps(k)[0, 1:-1, halfway_there - 1 : halfway_there + 2, 1]
+        assert np.abs(moves - 25.0).max() < 0.5
+
+
+def test_one_block_that_looks_like_another_does_not_leave_its_neighbours():
+    """A grating fits itself one period on; what does not repeat, farther off, tells which it is."""
+    columns, pictures = np.arange(80), np.zeros((5, 24, 80, 3), np.float32)
+    for k in range(5):
+        x = columns - 5.0 * k
+        marks = np.exp(-0.5 * ((x - 12.0) / 2.0) ** 2) + np.exp(-0.5 * ((x - 50.0) / 2.0) ** 2)
+        pictures[k] = (marks + 0.3 * np.sin(2.0 * np.pi * x / 6.0) * ((x > 10.0) & (x < 52.0)))[:, None]
+    model = cast(GhostModel, with_moves(bare(pictures)))
+    told = model.sprites[0].moves.steps(1)[0]
+    # between the marks, where the grating alone would go one cell back, for that is nearer than five on
+    assert (np.abs(told[1:-1, 6:12, 1] - 5.0) < 0.3).all()
+
+
+def test_nothing_moves_in_darkness_or_where_all_is_alike():
+    rng = np.random.default_rng(3)
+    for pictures in (np.ones((5, 24, 80, 3), np.float32), rng.normal(0.0, 1e-4, (5, 24, 80, 3)).astype(np.float32)):
+        told = with_moves(bare(pictures)).sprites[0].moves
+        assert all((told.steps(k)[..., 2] == 0.0).all() for k in range(4))
 
 
 def test_two_pictures_give_no_moves(unknown):
@@ -93,7 +134,7 @@ def test_moves_come_back_from_a_file_to_their_step(unknown):
     _, model = unknown
     assert GhostModel.model_validate_json(model.model_dump_json()) == model
     rng = np.random.default_rng(1)
-    steps = rng.uniform(-15.0, 15.0, (3, 2, 4, 5, 3))
+    steps = rng.uniform(-150.0, 150.0, (3, 2, 4, 5, 3))
     steps[..., 2] = rng.integers(0, 128, (3, 2, 4, 5))
     shares = rng.dirichlet((1.0, 1.0, 1.0), (3, 4, 5))[..., :2].transpose(0, 3, 1, 2)
     back = packed_moves(4, steps, shares)
@@ -112,7 +153,9 @@ def test_broken_moves_are_told(unknown):
     with pytest.raises(ValueError, match="more than"):
         moves.replace(rows=1)
     with pytest.raises(ValueError, match="127 at most together"):
-        Moves(block=4, intervals=1, rows=1, columns=1, numbers=b64encode(compress(bytes(6) + b"\x60\x60")).decode())
+        Moves(
+            block=4, intervals=1, rows=1, columns=1, numbers=b64encode(compress(bytes(12) + 2 * b"\x60\x00")).decode()
+        )
     with pytest.raises(ValueError, match="do not cover"):
         sprite.replace(moves=packed_moves(4, np.zeros((1, 2, 3, 3, 3)), np.zeros((1, 2, 3, 3))))
     with pytest.raises(ValueError, match='only a sprite that follows "ghosts"'):

@@ -1,15 +1,11 @@
 """Find by how much two pictures differ in place, block by block."""
 
-from math import sqrt
-
 import numpy as np
 
 from ._jit import compiled, inner
 
 # how far a bowl's bends may differ before it is a valley
 _VALLEY = 0.01
-# what rounding may make of a bound that is none below the misfit
-_ROUNDED = 0.999
 
 
 @inner
@@ -27,34 +23,13 @@ def _widened(picture, down, along):
 
 
 @inner
-def _sums(wide, side):
-    """Return the sum of each colour in each block of `side` by `side` cells, by its first row and number."""
-    rows, numbers = wide.shape[0] - side + 1, wide.shape[1] - 3 * (side - 1)
-    columns = np.zeros((rows, wide.shape[1]))
-    for r in range(rows):
-        for k in range(side):
-            for x in range(wide.shape[1]):
-                columns[r, x] += wide[r + k, x]
-    out = np.zeros((rows, numbers))
-    for r in range(rows):
-        for k in range(side):
-            for x in range(numbers):
-                out[r, x] += columns[r, x + 3 * k]
-    return out
-
-
-@inner
-def _apart(here, there, row, at, other_row, other_at, rows, count, enough):
-    """Add up the squares by which two blocks of `rows` rows of `count` numbers differ, no further than `enough`."""
+def _apart(here, there, row, at, other_row, other_at, side):
+    """Add up the squares by which two blocks of `side` by `side` cells differ."""
     total = 0.0
-    for r in range(rows):
-        squares = 0.0
-        for x in range(count):
+    for r in range(side):
+        for x in range(3 * side):
             apart = here[row + r, at + x] - there[other_row + r, other_at + x]
-            squares += apart * apart
-        total += squares
-        if total > enough:
-            break
+            total += apart * apart
     return total
 
 
@@ -72,23 +47,6 @@ def _apart_halfway(before, after, row, column, half, down, along):
             for m in range(3):
                 apart = before[ra, ca, m] - after[rb, cb, m]
                 total += apart * apart
-    return total
-
-
-@inner
-def _structure(picture, row, column, half):
-    """Add up the squares by which a block differs from its mean."""
-    last_row, last_column = picture.shape[0] - 1, picture.shape[1] - 1
-    total = 0.0
-    for m in range(3):
-        light, squares = 0.0, 0.0
-        for r in range(row - half, row + half + 1):
-            ra = min(max(r, 0), last_row)
-            for c in range(column - half, column + half + 1):
-                value = picture[ra, min(max(c, 0), last_column), m]
-                light += value
-                squares += value * value
-        total += squares - light * light / (2 * half + 1) ** 2
     return total
 
 
@@ -115,8 +73,8 @@ def _lowest(misfits, p, q, out):
 
 
 @compiled
-def match_blocks(here, there, rows, columns, half, reach, stiff, noise, out):
-    """Find where blocks of a picture are in another one.
+def block_misfits(here, there, rows, columns, half, around, out):
+    """Compare blocks of a picture with another picture, moved in all ways around one.
 
     Parameters
     ----------
@@ -126,53 +84,70 @@ def match_blocks(here, there, rows, columns, half, reach, stiff, noise, out):
         Cells in the middle of blocks.
     half : int
         A block goes so many cells to each side of its middle.
-    reach : ndarray, shape (2,), int64
-        Farthest moves down and along, cells.
-    stiff : float
-        By which part of itself a misfit is larger for each cell of the move.
-    noise : float
-        Sum of squares that is added to every misfit, so that a block without light stays.
-    out : ndarray, shape (R, C, 3), float64
-        Filled: moves down and along, in whole cells, and by how much the misfit is less than without, but not more than
-        the squares by which the block differs from its mean. Of moves that do as well, the shortest.
-
-    Notes
-    -----
-    Full search (Jain and Jain 1981, Displacement measurement and its application in interframe image coding).
+    around : ndarray, shape (R, C, 2), int64
+        Move of each block in the middle of those that are tried, cells down and along.
+    out : ndarray, shape (R, C, 2 V + 1, 2 H + 1), float32
+        Filled: sums of squares by which blocks differ, for moves up to V cells down and H along from `around`.
     """
-    down, along = reach[0], reach[1]
-    count = (2 * down + 1) * (2 * along + 1)
-    moves = np.empty((count, 2), np.int64)
-    lengths = np.empty(count)
-    for n in range(count):
-        moves[n, 0], moves[n, 1] = n // (2 * along + 1) - down, n % (2 * along + 1) - along
-        lengths[n] = sqrt(moves[n, 0] ** 2 + moves[n, 1] ** 2)
-    order = np.argsort(lengths, kind="mergesort")
-    side = 2 * half + 1
-    wide, other = _widened(here, half, half), _widened(there, half + down, half + along)
-    # blocks differ by no less than their means do: most moves are told by that (Li and Salari 1995, Successive
-    # elimination algorithm for motion estimation)
-    own, others, per = _sums(wide, side), _sums(other, side), _ROUNDED / side**2
+    down, along = (out.shape[2] - 1) // 2, (out.shape[3] - 1) // 2
+    far = [0, 0]
+    for m in range(2):
+        for i in range(rows.size):
+            for j in range(columns.size):
+                far[m] = max(far[m], abs(around[i, j, m]))
+    side, up, left = 2 * half + 1, down + far[0], along + far[1]
+    wide, other = _widened(here, half, half), _widened(there, half + up, half + left)
+    height, width = wide.shape[0], wide.shape[1] // 3
+    squares, sums = np.empty((height, width), np.float32), np.empty(width, np.float32)
+    for v in range(2 * down + 1):
+        for h in range(2 * along + 1):
+            row, at = v + far[0], 3 * (h + far[1])
+            for r in range(height):
+                for c in range(width):
+                    red = wide[r, 3 * c] - other[r + row, 3 * c + at]
+                    green = wide[r, 3 * c + 1] - other[r + row, 3 * c + 1 + at]
+                    blue = wide[r, 3 * c + 2] - other[r + row, 3 * c + 2 + at]
+                    squares[r, c] = red * red + green * green + blue * blue
+            for i in range(rows.size):
+                for c in range(width):
+                    sums[c] = squares[rows[i], c]
+                for r in range(rows[i] + 1, rows[i] + side):
+                    for c in range(width):
+                        sums[c] += squares[r, c]
+                for j in range(columns.size):
+                    total = np.float32(0.0)
+                    for c in range(columns[j], columns[j] + side):
+                        total += sums[c]
+                    out[i, j, v, h] = total
+    # most blocks stay about where they are and share their squares; few have a way of their own
     for i in range(rows.size):
         for j in range(columns.size):
-            best, chosen, still = np.inf, 0, 0.0
-            for n in order:
-                factor = 1.0 + stiff * lengths[n]
-                enough = best / factor - noise
-                row, at, x = rows[i] + down + moves[n, 0], 3 * (columns[j] + along + moves[n, 1]), 3 * columns[j]
-                red, green = own[rows[i], x] - others[row, at], own[rows[i], x + 1] - others[row, at + 1]
-                blue = own[rows[i], x + 2] - others[row, at + 2]
-                if per * (red * red + green * green + blue * blue) > enough:
-                    continue
-                misfit = _apart(wide, other, rows[i], x, row, at, side, 3 * side, enough)
-                cost = (misfit + noise) * factor
-                if n == order[0]:
-                    still = cost
-                if cost < best:
-                    best, chosen = cost, n
-            out[i, j, 0], out[i, j, 1] = moves[chosen, 0], moves[chosen, 1]
-            # darkness finds darkness where light was before, and that is nothing that moves
-            out[i, j, 2] = min(still - best, _structure(here, rows[i], columns[j], half))
+            if around[i, j, 0] == 0 and around[i, j, 1] == 0:
+                continue
+            for v in range(2 * down + 1):
+                for h in range(2 * along + 1):
+                    row = rows[i] + far[0] + around[i, j, 0] + v
+                    at = 3 * (columns[j] + far[1] + around[i, j, 1] + h)
+                    out[i, j, v, h] = _apart(wide, other, rows[i], 3 * columns[j], row, at, side)
+
+
+@compiled
+def block_structure(picture, rows, columns, half, out):
+    """Fill the squares by which blocks of a picture differ from their means, shape (R, C); as `block_misfits`."""
+    last_row, last_column = picture.shape[0] - 1, picture.shape[1] - 1
+    for i in range(rows.size):
+        for j in range(columns.size):
+            total = 0.0
+            for m in range(3):
+                light, squares = 0.0, 0.0
+                for r in range(rows[i] - half, rows[i] + half + 1):
+                    row = min(max(r, 0), last_row)
+                    for c in range(columns[j] - half, columns[j] + half + 1):
+                        value = picture[row, min(max(c, 0), last_column), m]
+                        light += value
+                        squares += value * value
+                total += squares - light * light / (2 * half + 1) ** 2
+            out[i, j] = total
 
 
 @compiled

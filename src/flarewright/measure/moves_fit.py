@@ -1,7 +1,8 @@
 """Learn how what is left moves between photographs, and where that is to be believed.
 
-Block by block the move is looked for that takes one picture to the next. Then every photograph is foretold from the one
-before and the one after it, in each way, and where a way does well it counts more.
+Block by block the move is looked for that takes one picture to the next, first in coarser pictures, and so that
+neighbours agree. Then every photograph is foretold from the one before and the one after it, in each way, and where a
+way does well it counts more.
 """
 
 from __future__ import annotations
@@ -13,7 +14,8 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernels.measure_motion import match_blocks, refine_blocks
+from ..kernels.measure_agree import agree
+from ..kernels.measure_motion import block_misfits, block_structure, refine_blocks
 from ..model.ghost_model import GhostModel
 from ..model.moves import packed_moves
 from ..model.sprite import Sprite
@@ -26,11 +28,16 @@ Floats = NDArray[np.float64]
 
 # cells to each side of a block, and cells to each side of its middle that are compared
 _BLOCK, _HALF = 4, 3
-# farthest moves from one picture to the next, cells: across the light's line and along it
-_REACH = (8, 14)
+# farthest moves from one picture to the next, or from what a coarser one tells, cells: across the light's line and
+# along it
+_REACH = np.array([8, 14])
+# how often pictures are halved to see moves that are longer, and cells by which a coarser picture may be wrong
+_HALVED, _COARSE = 2, 4
+# what it costs when neighbours differ by a cell, and by more: logarithms of squares
+_STEP, _LEAP = 0.25, 4.0
 # cells around a move that was told by a place nearby
 _NEARBY = 2
-# by which part a misfit is taken for larger with each cell of the move, for longer ones have more choice
+# by which part a misfit is taken for larger with each cell of the move
 _STIFF = 0.02
 # cells to each side over which a way's misfits are averaged, and how fast a way counts less the more it misses by
 _ABOUT, _STEEP = 5, 4.0
@@ -80,16 +87,71 @@ def _inner(pictures: Pixels) -> range:
 
 def _steps(here: Pixels, there: Pixels, unit: float, pool: ThreadPoolExecutor) -> Floats:
     """Return the moves of each block from pictures to others, and their weights, shape (K - 1, R, C, 3)."""
-    rows, columns = (middles(count, _BLOCK) for count in here.shape[1:3])
-    noise = 3 * (2 * _HALF + 1) ** 2 * (_MATCH * unit) ** 2
 
     def match(k: int) -> Floats:
-        out = np.empty((rows.size, columns.size, 3))
-        match_blocks(here[k], there[k], rows, columns, _HALF, np.array(_REACH), _STIFF, noise, out)
-        out[..., 2] = np.minimum(_LOUD * np.log2(1.0 + np.maximum(out[..., 2], 0.0) / noise), _LOUDEST)
-        return out
+        around = _coarse(here[k], there[k], unit, _HALVED)
+        moves, apart = _agreed(here[k], there[k], unit, around)
+        rows, columns, noise = *_middles(here[k]), _noise(unit)
+        still, structure = np.empty((*around.shape[:2], 1, 1), np.float32), np.empty(around.shape[:2])
+        block_misfits(here[k], there[k], rows, columns, _HALF, np.zeros_like(around), still)
+        block_structure(here[k], rows, columns, _HALF, structure)
+        gained = still[..., 0, 0] - apart - (apart + noise) * _STIFF * np.hypot(moves[..., 0], moves[..., 1])
+        # darkness finds darkness where light was before, and that is nothing that moves
+        gained = np.maximum(np.minimum(gained, structure), 0.0)
+        weight = np.minimum(_LOUD * np.log2(1.0 + gained / noise), _LOUDEST)
+        return np.concatenate([moves, weight[..., None]], axis=-1)
 
     return np.stack(list(pool.map(match, range(len(here)))))
+
+
+def _middles(picture: Pixels) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return the rows and the columns of cells in the middle of blocks."""
+    return middles(picture.shape[0], _BLOCK), middles(picture.shape[1], _BLOCK)
+
+
+def _noise(unit: float) -> float:
+    """Return the squares by which two blocks may differ in any case."""
+    return 3 * (2 * _HALF + 1) ** 2 * (_MATCH * unit) ** 2
+
+
+def _coarse(here: Pixels, there: Pixels, unit: float, halved: int) -> NDArray[np.int64]:
+    """Return around which move of each block to look, as pictures tell that are so often halved, shape (R, C, 2).
+
+    It is none where none is so long that it would not be found without.
+    """
+    rows, columns = _middles(here)
+    if not halved:
+        return np.zeros((rows.size, columns.size, 2), np.int64)
+    small, other = _half_as_fine(here), _half_as_fine(there)
+    # a cell of four has half their noise
+    found, _ = _agreed(small, other, 0.5 * unit, _coarse(small, other, 0.5 * unit, halved - 1))
+    told = 2 * found[np.ix_(rows // (2 * _BLOCK), columns // (2 * _BLOCK))]
+    return np.asarray(np.sign(told) * np.maximum(np.abs(told) - (_REACH - _COARSE), 0))
+
+
+def _half_as_fine(picture: Pixels) -> Pixels:
+    """Return means of two by two cells; at the border one may stand for two."""
+    whole = np.pad(picture, [(0, picture.shape[0] % 2), (0, picture.shape[1] % 2), (0, 0)], mode="edge")
+    rows, columns = (count // 2 for count in whole.shape[:2])
+    return np.ascontiguousarray(whole.reshape(rows, 2, columns, 2, 3).mean(axis=(1, 3)))
+
+
+def _agreed(
+    here: Pixels, there: Pixels, unit: float, around: NDArray[np.int64]
+) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
+    """Return moves that suit blocks and their neighbours, shape (R, C, 2), and the squares by which they miss."""
+    rows, columns = _middles(here)
+    down, along = (np.arange(-reach, reach + 1) for reach in _REACH)
+    apart = np.empty((rows.size, columns.size, down.size, along.size), np.float32)
+    block_misfits(here, there, rows, columns, _HALF, around, apart)
+    # longer moves have more choice
+    long = np.hypot(around[..., 0, None, None] + down[:, None], around[..., 1, None, None] + along)
+    costs = np.log1p(apart / np.float32(_noise(unit))) + np.log1p(_STIFF * long).astype(np.float32)
+    sums = np.empty_like(costs)
+    agree(costs, around, _STEP, _LEAP, sums)
+    best = sums.reshape(*around.shape[:2], -1).argmin(axis=2)
+    misses = np.take_along_axis(apart.reshape(*best.shape, -1), best[..., None], axis=2)[..., 0]
+    return around + np.stack([down[best // along.size], along[best % along.size]], axis=-1), misses
 
 
 def _halfway(onward: Floats, back: Floats) -> Floats:
