@@ -1,11 +1,11 @@
-"""Along a line of blocks moves cost what trying all of them together tells."""
+"""Moves cost what their misfits tell, and along a line of blocks what trying all of them together tells."""
 
 from itertools import pairwise, product
 
 import numpy as np
 import pytest
 
-from flarewright.kernels.measure_agree import agree
+from flarewright.kernels.measure_agree import agree, move_costs
 
 STEP, LEAP = 0.3, 0.8
 
@@ -21,6 +21,16 @@ def apart(one, other):
     """Return what it costs when neighbours have these moves."""
     down, along = abs(one[0] - other[0]), abs(one[1] - other[1])
     return min(STEP * (down + along), LEAP) if max(down, along) <= 1 else LEAP
+
+
+def test_a_move_costs_what_it_misses_by_and_more_the_longer_it_is():
+    rng = np.random.default_rng(4)
+    misfits, around = rng.uniform(0.0, 9.0, (2, 3, 3, 5)).astype(np.float32), rng.integers(-9, 10, (2, 3, 2))
+    out = np.full_like(misfits, np.nan)
+    move_costs(misfits, around, 2.0, 0.1, out)
+    down = around[..., 0, None, None] + np.arange(-1, 2)[:, None]
+    along = around[..., 1, None, None] + np.arange(-2, 3)
+    assert out == pytest.approx(np.log1p(misfits / 2.0) + np.log1p(0.1 * np.hypot(down, along)), rel=1e-5)
 
 
 @pytest.mark.parametrize("upright", [False, True])

@@ -1,5 +1,7 @@
 """Find out what moves of blocks cost when neighbours' moves should agree."""
 
+from math import log, sqrt
+
 import numpy as np
 
 from ._jit import compiled, inner
@@ -31,6 +33,34 @@ def _eased(costs, step, leap, work, out):
                 best = min(best, work[a + 1, b] + step)
             out[a, b] = min(best, least + leap)
     return least
+
+
+@compiled
+def move_costs(misfits, around, noise, stiff, out):
+    """Fill what moves of blocks cost by themselves.
+
+    Parameters
+    ----------
+    misfits : ndarray, shape (R, C, 2 V + 1, 2 H + 1), float32
+        Sums of squares by which a block differs, for moves up to V cells down and H along from `around`.
+    around : ndarray, shape (R, C, 2), int64
+        Move in the middle of each block's, cells down and along.
+    noise : float
+        Squares by which blocks differ in any case.
+    stiff : float
+        By which part a misfit is taken for larger with each cell of the move, for longer ones have more choice.
+    out : ndarray, shape (R, C, 2 V + 1, 2 H + 1), float32
+        Filled: logarithms of misfits, 0 for none and no move.
+    """
+    rows, columns, height, width = misfits.shape
+    for i in range(rows):
+        for j in range(columns):
+            for a in range(height):
+                down = around[i, j, 0] + a - height // 2
+                for b in range(width):
+                    along = around[i, j, 1] + b - width // 2
+                    longer = 1.0 + stiff * sqrt(down * down + along * along)
+                    out[i, j, a, b] = log((1.0 + misfits[i, j, a, b] / noise) * longer)
 
 
 @compiled

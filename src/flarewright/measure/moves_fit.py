@@ -14,7 +14,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernels.measure_agree import agree
+from ..kernels.measure_agree import agree, move_costs
 from ..kernels.measure_motion import block_misfits, block_structure, refine_blocks
 from ..model.ghost_model import GhostModel
 from ..model.moves import packed_moves
@@ -144,10 +144,8 @@ def _agreed(
     down, along = (np.arange(-reach, reach + 1) for reach in _REACH)
     apart = np.empty((rows.size, columns.size, down.size, along.size), np.float32)
     block_misfits(here, there, rows, columns, _HALF, around, apart)
-    # longer moves have more choice
-    long = np.hypot(around[..., 0, None, None] + down[:, None], around[..., 1, None, None] + along)
-    costs = np.log1p(apart / np.float32(_noise(unit))) + np.log1p(_STIFF * long).astype(np.float32)
-    sums = np.empty_like(costs)
+    costs, sums = np.empty_like(apart), np.empty_like(apart)
+    move_costs(apart, around, _noise(unit), _STIFF, costs)
     agree(costs, around, _STEP, _LEAP, sums)
     best = sums.reshape(*around.shape[:2], -1).argmin(axis=2)
     misses = np.take_along_axis(apart.reshape(*best.shape, -1), best[..., None], axis=2)[..., 0]
