@@ -64,23 +64,24 @@ def bare(pictures):
     )  # fmt: skip
 
 
-def row_of(model, angle):
-    """Return the light of the row of cells in the middle."""
-    return np.maximum(carried(model.sprites[0], pack(model), model, angle)[11, :, 1], 0.0)
-
-
 def test_a_speck_of_light_is_carried_over_a_gap_wider_than_itself():
     pictures = np.zeros((5, 24, 80, 3), np.float32)
     for k in range(5):
         pictures[k, 10:14, 8 + 12 * k : 13 + 12 * k] = 1.0
     model = cast(GhostModel, with_moves(bare(pictures)))
     for angle in (2.25, 2.5, 3.75):
-        light = row_of(model, angle)
-        middle = (light @ np.arange(80)) / light.sum()
+        there = carried(model.sprites[0], pack(model), model, angle)[..., 1]
+        light = np.maximum(there, 0.0)
+        middle = (light.sum(axis=0) @ np.arange(80)) / light.sum()
         assert middle == pytest.approx(10.0 + 12.0 * (angle - 1.0), abs=0.5)
         # one, as wide as it is, not two of half the light
-        assert light.max() == pytest.approx(1.0, abs=0.1)
-        assert (light > 0.5).sum() in range(4, 8)
+        assert light[11].max() == pytest.approx(1.0, abs=0.1)
+        assert (light[11] > 0.5).sum() in range(4, 8)
+    # light is followed, and darkness farther off is not
+    told = model.sprites[0].moves.steps(1)[0]
+    assert tuple(told[2, 6, :2]) == (0.0, 12.0)
+    assert told[2, 6, 2] > 0.0
+    assert (told[:, 11:] == 0.0).all()
 
 
 def test_what_is_soft_and_wide_is_followed_farther_than_a_block_is_looked_for():
@@ -113,7 +114,7 @@ def test_nothing_moves_in_darkness_or_where_all_is_alike():
     rng = np.random.default_rng(3)
     for pictures in (np.ones((5, 24, 80, 3), np.float32), rng.normal(0.0, 1e-4, (5, 24, 80, 3)).astype(np.float32)):
         told = with_moves(bare(pictures)).sprites[0].moves
-        assert all((told.steps(k)[..., 2] == 0.0).all() for k in range(4))
+        assert all((told.steps(k) == 0.0).all() for k in range(4))
 
 
 def test_two_pictures_give_no_moves(unknown):

@@ -23,6 +23,7 @@ from .carried import boxed
 from .moved import displaced, ghosts_light, landed, middles, spread
 from .packed import Packed, pack
 from .sprites import Pixels, samples, where_foretold
+from .views import halved
 
 Floats = NDArray[np.float64]
 
@@ -131,9 +132,7 @@ def _coarse(here: Pixels, there: Pixels, unit: float, halved: int) -> NDArray[np
 
 def _half_as_fine(picture: Pixels) -> Pixels:
     """Return means of two by two cells; at the border one may stand for two."""
-    whole = np.pad(picture, [(0, picture.shape[0] % 2), (0, picture.shape[1] % 2), (0, 0)], mode="edge")
-    rows, columns = (count // 2 for count in whole.shape[:2])
-    return np.ascontiguousarray(whole.reshape(rows, 2, columns, 2, 3).mean(axis=(1, 3)))
+    return halved(np.pad(picture, [(0, picture.shape[0] % 2), (0, picture.shape[1] % 2), (0, 0)], mode="edge"), 1)
 
 
 def _agreed(
