@@ -157,7 +157,7 @@ def test_what_is_held_lies_between_what_both_photographs_show():
     before[:, 5] = 3.0
     wild = np.full((12, 12, 3), 9.0)
     wild[::2] = -9.0
-    out = held(wild, before, after, sprite, 0, frame((6.0, 6.0), 0.0, 1.0, 1.0))
+    out = held(wild, before, after, sprite, 0, 0.5, frame((6.0, 6.0), 0.0, 1.0, 1.0))
     # anything goes in the first block
     np.testing.assert_array_equal(out[:6, :6], wild[:6, :6])
     assert out[0, 8] == pytest.approx(0.2)
@@ -196,3 +196,30 @@ def test_reaches_come_back_from_a_file_and_broken_ones_are_told(at_an_edge):
 def test_two_pictures_tell_no_reaches():
     model, seen = bare(np.full((2, 8, 8, 3), 0.1), [1.0, 2.0])
     assert with_reaches(model, seen).sprites[0].reaches is None
+
+
+def test_what_is_dark_for_less_than_three_pixels_is_no_darkness():
+    model, _ = bare(np.full((3, 4, 4, 3), 0.5), [1.0, 2.0, 3.0])
+    block = np.zeros((2, 2, 2, 2), int)
+    block[..., 1] = ANYWHERE
+    sprite = model.sprites[0].replace(reaches=packed_reaches(2, block))
+    before, after = np.full((2, 12, 12, 3), 1.0)
+    for one in (before, after):
+        one[3, 3] = one[8, 2:8] = 0.0
+        one[1:4, 7:10] = 0.1
+    black = np.zeros((12, 12, 3))
+
+    def out(part, scale=1.0):
+        return held(black, before, after, sprite, 0, part, frame((6.0, 6.0), 0.0, 1.0, scale))[..., 1]
+
+    middle = out(0.5)
+    # a pixel, and a line of them
+    assert middle[3, 3] == middle[8, 4] == pytest.approx(0.8)
+    # a square of three is believed
+    np.testing.assert_allclose(middle[1:4, 7:10], 0.1)
+    assert (middle[5:7] == 1.0).all()
+    # towards photographs less and less of it, up to none
+    assert 0.0 < out(0.9)[3, 3] < 0.5 * middle[3, 3]
+    np.testing.assert_array_equal(out(1.0), before[..., 1])
+    # the same of the model in a picture that is finer
+    assert out(0.5, 1.5)[2, 8] == pytest.approx(0.8)

@@ -152,9 +152,10 @@ def _held(
     if k is None or crossed:
         return parts
     before, after = (_photographed(model, angle, roll_deg, size) for angle in angles[k : k + 2])
+    part = (constellation_deg - angles[k]) / (angles[k + 1] - angles[k])
     whole = _sum(parts)
     placed = frame_in(model, constellation_deg, roll_deg, size)
-    parts["residual"] = parts["residual"] + held(whole, before, after, sprite, k, placed) - whole
+    parts["residual"] = parts["residual"] + held(whole, before, after, sprite, k, part, placed) - whole
     return parts
 
 
