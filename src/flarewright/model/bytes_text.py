@@ -7,6 +7,7 @@ import zlib
 
 # the last level makes texts 2 % shorter, and takes three to nine times as long
 _LEVEL = 6
+_REMEDY = "the file was changed by hand or made by another flarewright; make it anew (measure run)"
 
 
 def told_bytes(whole: bytes) -> str:
@@ -34,8 +35,8 @@ def read_bytes(text: str, size: int, what: str) -> bytes:
         # a few bytes can stand for more than any memory holds
         whole = zlib.decompressobj().decompress(base64.b64decode(text, validate=True), size + 1)
     except (ValueError, zlib.error):
-        raise ValueError(f"{what} are not base64 of zlib") from None
+        raise ValueError(f"{what} are not base64 of zlib: {_REMEDY}") from None
     if len(whole) != size:
         found = f"{len(whole)}" if len(whole) < size else f"more than {size}"
-        raise ValueError(f"{what} hold {found} bytes instead of {size}")
+        raise ValueError(f"{what} hold {found} bytes instead of {size}: {_REMEDY}")
     return whole
