@@ -1,39 +1,65 @@
-"""Photographs without ghosts: star, haze, veil and noise, while the light goes out of the picture."""
+"""Photographs without ghosts: star, haze, veil and noise, while the light stays in the picture or goes out of it."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from star_run import HEAD
+from star_run import ANGLES, HEAD, light_px, shoot, star
 from synthetic_camera import Setup, expose, poses, scale_of, truth_of
 
 from flarewright.cli.app import run as command
 from flarewright.io.ghost_model_file import read_ghost_model
 
 SETUP = Setup(size_px=(180, 120), angles_deg=tuple(3.0 * k for k in range(8)), pitch_deg=0.3, axis_offset_px=(2, -1))
+# the light goes no farther than a third of the picture's width
+NEAR = replace(
+    SETUP, lens="double-gauss-tronnier", size_px=(240, 160), angles_deg=tuple(1.0 * k for k in range(14)), seed=0
+)
 
 
-@pytest.fixture(scope="module")
-def ghostless():
-    scale = scale_of(SETUP)
-    truths = [truth_of(SETUP, pose, scale) for pose in poses(SETUP)]
+def ghosts_found(captures, run):
+    """Run the stages that find and fit, and return how many ghosts each has."""
+    assert command(["measure", "run", str(captures), "-o", str(run), "--stages", "merge,find,fit"]) == 0
+    return tuple(len(read_ghost_model(run / name).ghosts) for name in ("found.json", "model.json"))
+
+
+def photographed(folder, camera, truths):
+    lines = []
+    for pose, light in zip(poses(camera), truths, strict=True):
+        for j, seconds in enumerate(camera.exposures_s):
+            name = f"{pose.number}-{j}.npy"
+            np.save(folder / name, expose(camera, light, seconds, pose.brightness[j], (pose.number, j)))
+            lines.append(f"{name},{pose.nominal_deg:g},{seconds!r},100,8,light\n")
+    (folder / "captures.csv").write_text(HEAD + "".join(lines))
+    (folder / "camera.json").write_text(f'{{"black_level": {camera.black}, "white_level": {camera.white}}}')
+    return folder / "captures.csv"
+
+
+def ghostless(setup):
+    """Return what a setup's lens shows without its ghosts."""
+    scale = scale_of(setup)
+    truths = [truth_of(setup, pose, scale) for pose in poses(setup)]
     return [truth.total - truth.ghosts for truth in truths]
 
 
+@pytest.fixture(scope="module")
+def going_out():
+    return ghostless(SETUP)
+
+
 @pytest.mark.parametrize("seed", [0, 1])
-def test_no_ghosts_are_found_where_there_are_none(ghostless, tmp_path, seed):
-    camera = replace(SETUP, seed=seed)
-    lines = []
-    for pose, light in zip(poses(camera), ghostless, strict=True):
-        for j, seconds in enumerate(camera.exposures_s):
-            name = f"{pose.number}-{j}.npy"
-            np.save(tmp_path / name, expose(camera, light, seconds, pose.brightness[j], (pose.number, j)))
-            lines.append(f"{name},{pose.nominal_deg:g},{seconds!r},100,8,light\n")
-    (tmp_path / "captures.csv").write_text(HEAD + "".join(lines))
-    (tmp_path / "camera.json").write_text(f'{{"black_level": {camera.black}, "white_level": {camera.white}}}')
-    run = tmp_path / "run"
-    assert (
-        command(["measure", "run", str(tmp_path / "captures.csv"), "-o", str(run), "--stages", "merge,find,fit"]) == 0
-    )
-    assert read_ghost_model(run / "found.json").ghosts == ()
-    assert read_ghost_model(run / "model.json").ghosts == ()
+def test_no_ghosts_are_found_where_there_are_none(going_out, tmp_path, seed):
+    captures = photographed(tmp_path, replace(SETUP, seed=seed), going_out)
+    assert ghosts_found(captures, tmp_path / "run") == (0, 0)
+
+
+def test_what_a_star_leaves_around_it_is_no_ghost(tmp_path):
+    captures = shoot(tmp_path, {angle: star(light_px(angle)) for angle in ANGLES})
+    assert ghosts_found(captures, tmp_path / "run") == (0, 0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("haze", [0.05, 0.5])
+def test_what_haze_leaves_around_a_light_that_stays_in_the_picture_is_no_ghost(tmp_path, haze):
+    camera = replace(NEAR, haze=haze)
+    assert ghosts_found(photographed(tmp_path, camera, ghostless(camera)), tmp_path / "run") == (0, 0)

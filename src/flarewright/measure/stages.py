@@ -21,6 +21,7 @@ from .evenly import evenly
 from .found import CHANNELS, Found, by_light, rest_of
 from .fragments import joined
 from .glow_fit import fit_star, iris_of, register
+from .glow_left import glow_left
 from .joint import lit
 from .journal import Journal
 from .light_law import light_law
@@ -102,8 +103,12 @@ def find_ghosts(
         found = lit(begun_anew(found, seen, pool=pool, journal=journal), small, pool=pool)
         found = lit(taken_apart(found, small, iris=iris, pool=pool, tell=tell, journal=journal), small, pool=pool)
     tell_pointed(known, pointed, found, tell)
-    ghosts = to_model([_sized(ghost, 2.0**times) for ghost in found], searched)
-    wanted = kept(known, ghosts, tell)
+    whole = [_sized(ghost, 2.0**times) for ghost in found]
+    ghosts = to_model(whole, searched)
+    glow = [ghost.name for ghost, left in zip(ghosts, glow_left(whole, searched), strict=True) if left]
+    for name in glow:
+        tell(f"ghost {name} is no more than halo and star leave around the light: left out")
+    wanted = tuple(ghost for ghost in kept(known, ghosts, tell) if ghost.name not in glow)
     rough: GhostModel = _model(run, wanted, dim, views).replace(
         removed=tuple(ghost for ghost in ghosts if ghost not in wanted)
     )
@@ -186,7 +191,9 @@ def fit_ghosts(
                 journal=journal,
             )  # fmt: skip
         dim = dimmed_beside(settled, views, dim.star, pool)
-    wanted = [ghost for ghost in settled if not ghost.unwanted]
+    wanted = [
+        ghost for ghost, left in zip(settled, glow_left(settled, views), strict=True) if not (left or ghost.unwanted)
+    ]
     model = _model(run, to_model(wanted, views), dim, views)
     return with_rest(model, views, threads) if rest else model
 

@@ -339,7 +339,8 @@ class GhostModel(Frozen):
         Range that was measured.
     ghosts : tuple of AberrationGhost or BezierGhost
     removed : tuple of AberrationGhost or BezierGhost
-        What a person says is no ghost of the lens: a fit accounts for its light, and nothing draws it.
+        What a person says is no ghost of the lens, or is no more than halo and star leave around the light: a fit
+        accounts for its light, and nothing draws it.
     halo : Halo or None
     star : Star or None
     sprites : tuple of Sprite
