@@ -62,6 +62,21 @@ def test_a_folder_of_raw_files_tells_its_exposures_itself(tmp_path):
         read_captures(tmp_path)
 
 
+def test_raw_files_tell_their_focal_length_though_a_list_tells_the_rest(tmp_path):
+    write_dng(tmp_path / "a.dng", np.full((4, 4), 600, np.uint16), exposure=(1, 8))
+    (tmp_path / "b.dng").write_bytes(b"damaged")
+    row = "{}.dng,{},1,100,8{}\n"
+    head = "file,constellation_deg,exposure_s,iso,f_number{}\n"
+    (tmp_path / "list.csv").write_text(head.format("") + row.format("a", 1, ""))
+    (found,) = read_captures(tmp_path / "list.csv")
+    assert (found.exposure_s, found.iso, found.f_number, found.focal_mm) == (1.0, 100.0, 8.0, 50.0)
+    (tmp_path / "list.csv").write_text(head.format(",focal_mm") + row.format("a", 1, ",35"))
+    assert read_captures(tmp_path / "list.csv")[0].focal_mm == 35.0
+    # merging tells of a damaged one
+    (tmp_path / "list.csv").write_text(head.format("") + row.format("b", 1, ""))
+    assert read_captures(tmp_path / "list.csv")[0].focal_mm is None
+
+
 @pytest.mark.parametrize(("text", "rule"), [("0+0.2", (0, 0.2)), ("-5 + .5", (-5, 0.5)), ("30-1", (30, -1))])
 def test_rules_are_start_and_step(text, rule):
     assert parse_rule(text) == AngleRule(*rule)

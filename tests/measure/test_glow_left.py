@@ -13,6 +13,7 @@ from flarewright.measure.glow_left import glow_left
 # where the light is at field 1, pixels from the axis
 WAY = 70.0
 ANGLES = np.linspace(1.0, 24.0, 12)
+LAST = len(ANGLES) - 1
 
 
 def seen_beside(glow, ghosts=()):
@@ -26,7 +27,7 @@ def seen_beside(glow, ghosts=()):
     return out
 
 
-def found(speed, size, level, first=0, last=len(ANGLES) - 1):
+def found(speed, size, level, first=0, last=LAST):
     one = shape(speed, size, level)
     return Found((one, one, one), first, last)
 

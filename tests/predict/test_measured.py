@@ -137,6 +137,21 @@ def test_scene_with_a_measured_camera(file, tmp_path, capsys):
     assert data["ranking"][0]["brightest_stops_from_clipping"] is None
 
 
+def test_a_spectrum_that_makes_no_difference_is_told(file, tmp_path, capsys):
+    scene = tmp_path / "scene.toml"
+    scene.write_text(SCENE.format(x=1.0))
+    assert run(["predict", str(scene), "--json"]) == 0
+    plain = json.loads(capsys.readouterr().out)
+    assert plain["cameras"][0]["k_ideal"] == pytest.approx(99.0 / 101.0)
+    (veil,), (real,) = plain["cameras"][0]["veil_cd_m2"], plain["cameras"][0]["k_real"]
+    assert real == pytest.approx(99.0 / (101.0 + 2.0 * veil))
+    scene.write_text(SCENE.format(x=1.0) + 'spectrum = "black-body:3000"\n')
+    assert run(["predict", str(scene), "--json"]) == 0
+    data = json.loads(capsys.readouterr().out)
+    assert "A: measured in its captures' light: the spectrum of lamp makes no difference" in data["remarks"]
+    assert data["ranking"] == plain["ranking"]
+
+
 def test_beyond_what_was_measured_is_told(file, tmp_path, capsys):
     scene = tmp_path / "scene.toml"
     scene.write_text(SCENE.format(x=10.0))
@@ -159,6 +174,7 @@ def test_beyond_what_was_measured_is_told(file, tmp_path, capsys):
     [
         (["--fstop", "8"], "--fstop has no meaning for a measured flare"),
         (["--unit-per-cd-m2", "0"], "--unit-per-cd-m2 0 is no unit"),
+        (["--luminance", "1,100"], "--luminance 1,100 tells nothing without --unit-per-cd-m2"),
         (["--to", "50"], "up to 26"),
         (["--glare"], "--glare has no meaning"),
         (["--check", "3"], "--check has no meaning for a measured flare"),

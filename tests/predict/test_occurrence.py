@@ -182,6 +182,7 @@ def test_command_tells_curves_and_writes_a_page_that_asks_for_nothing(tmp_path, 
     data = json.loads(capsys.readouterr().out)
     assert len(data["constellation_deg"]) == len(data["statistics"]["mean"]["values"]) == len(data["k_ratio"]) == 14
     assert data["k_ideal"] == pytest.approx(4950.0 / 5050.0)
+    assert data["k_real"][0] == pytest.approx(4950.0 / (5050.0 + 2.0 * data["veil_cd_m2"][0]))
     veil = data["statistics"]["mean"]["values"][0] * 1e5 / data["scene_irradiance_per_radiance"]
     assert data["k_ratio"][0] == pytest.approx(5050.0 / (5050.0 + 2.0 * veil))
     text = page.read_text("utf-8")

@@ -31,7 +31,7 @@ FOUND, MODEL, TRACKS, COMPACT = "found.json", "model.json", "tracks.json", "comp
 STAGES = ("find", "fit", "track", "compress")
 
 Folder = Annotated[Path, typer.Argument(metavar="DIR", help="A folder that `measure merge` has written.")]
-Every = Annotated[int, typer.Option(min=1, help="Use every n-th constellation only; the others never enter.")]
+Every = Annotated[int, typer.Option(min=1, help="Use every n-th merged constellation only; the others never enter.")]
 CorrectionsFile = Annotated[
     Path | None,
     typer.Option(
@@ -48,6 +48,9 @@ By = Annotated[
     ),
 ]
 Threads = Annotated[int | None, typer.Option(min=1, help="All cores when left out.")]
+TrackThreads = Annotated[
+    int | None, typer.Option(min=1, help="Two at most, forward and backward; so many when left out.")
+]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
 
 
@@ -67,7 +70,7 @@ def fit(folder: Folder, every: Every = 1, by: By = "joint", threads: Threads = N
     _one("fit", folder, every, None, threads, as_json, by)
 
 
-def track(folder: Folder, every: Every = 1, threads: Threads = None, as_json: Json = False) -> None:
+def track(folder: Folder, every: Every = 1, threads: TrackThreads = None, as_json: Json = False) -> None:
     """Follow the ghosts of DIR/model.json from frame to frame: births, deaths and crossings, in DIR/tracks.json."""
     _one("track", folder, every, None, threads, as_json)
 

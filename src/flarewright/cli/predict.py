@@ -169,6 +169,11 @@ def predict(
         _refuse({**lens_flags, **measured}, "a measured flare", "it was measured")
         if unit_per_cd_m2 is not None and not 0.0 < unit_per_cd_m2 < math.inf:
             raise ProjectError(f"--unit-per-cd-m2 {unit_per_cd_m2:g} is no unit; give a number above 0")
+        if unit_per_cd_m2 is None and luminance is not None:
+            raise ProjectError(
+                f"--luminance {luminance} tells nothing without --unit-per-cd-m2: how bright a scene is in a measured "
+                "flare's captures is not known"
+            )
         project, flares = None, model_flares(subject, size, unit_per_cd_m2)
         if not flares.sampled.per_lux:
             untold = "it does not tell luminance_cd_m2 and solid_angle_sr of its captures' light"

@@ -180,7 +180,7 @@ def scene_flare(
     threads : int or None
     """
     if camera.model is not None:
-        return _model_in_scene(camera, SHOWN_PX if shown else SIDE_PX)
+        return _model_in_scene(camera, light, SHOWN_PX if shown else SIDE_PX)
     from ..predict.lens_flare import lens_flare, square_flare, statistics_quality
 
     project = camera_project(camera, light, diameter_deg)
@@ -192,7 +192,7 @@ def scene_flare(
     return square_flare(project, statistics_quality(quality), threads=threads)
 
 
-def _model_in_scene(camera: SceneCamera, width_px: int) -> tuple[Flare, Frame]:
+def _model_in_scene(camera: SceneCamera, light: SceneLight, width_px: int) -> tuple[Flare, Frame]:
     from dataclasses import replace
 
     from ..io.ghost_model_file import read_ghost_model
@@ -211,6 +211,9 @@ def _model_in_scene(camera: SceneCamera, width_px: int) -> tuple[Flare, Frame]:
             f"measured at f/{reference.f_number:g}: at f/{camera.f_number:g} flare and scene change together, but "
             "ghosts of another opening differ"
         )
+        flare = replace(flare, remarks=(*flare.remarks, told))
+    if light.spectrum != type(light).model_fields["spectrum"].default:
+        told = f"measured in its captures' light: the spectrum of {light.name} makes no difference"
         flare = replace(flare, remarks=(*flare.remarks, told))
     return flare, flare.sensor
 

@@ -204,11 +204,15 @@ def _with_exif(row: dict[str, Any], folder: Path, where: str, problems: list[str
     if not file.is_file():
         problems.append(f"{where}: {file} does not exist: check the path and the spelling")
         return None
-    if {"exposure_s", "iso", "f_number"} <= row.keys():
+    told = {"exposure_s", "iso", "f_number"} <= row.keys()
+    if told and "focal_mm" in row:
         return row
     try:
         facts = photo_facts(file)
     except FlarewrightError as error:
+        if told:
+            # merging tells of a damaged photograph
+            return row
         problems.append(f"{where}: {error}")
         return None
     full = {**facts, **row}

@@ -224,8 +224,8 @@ def occurrence_data(found: Occurrence) -> dict[str, Any]:
     if ratio is not None and found.setting.luminance_cd_m2 is not None:
         low_cd, high_cd = found.setting.luminance_cd_m2
         data["scene_luminance_cd_m2"] = [low_cd, high_cd]
-        data["k_ideal"] = contrast(high_cd, low_cd, 0.0).k_ideal
-        data["k_ratio"] = ratio.tolist()
+        ideal = contrast(high_cd, low_cd, 0.0).k_ideal
+        data |= {"k_ideal": ideal, "k_real": (ideal * ratio).tolist(), "k_ratio": ratio.tolist()}
     if found.check is not None:
         data["check"] = {
             "constellation_deg": found.check.constellation_deg.tolist(),

@@ -97,6 +97,14 @@ class Plan:
             total = total + pair.column("mean")
         return total / self.scene_scale(camera)
 
+    @property
+    def ideal_contrast(self) -> float | None:
+        """K_ideal (equation 9.1), or None when the scene's luminance is not told."""
+        if self.scene.luminance_cd_m2 is None:
+            return None
+        low, high = self.scene.luminance_cd_m2
+        return contrast(high, low, 0.0).k_ideal
+
     def contrast_left(self, veil_cd_m2: Floats) -> Floats | None:
         """Return K_real / K_ideal under a veil (equation 9.3), or None when the scene's luminance is not told."""
         if self.scene.luminance_cd_m2 is None:
@@ -245,7 +253,7 @@ def plan_scene(scene: Scene, maker: FlareMaker, told: Callable[[str], Progress],
     draw_ahead(tables, seen, told("flares"))
     pairs, remarks = [], []
     for c, (camera, row) in enumerate(zip(scene.cameras, seen, strict=True)):
-        remarks += [f"{camera.name}: {remark}" for remark in tables[c][0].flare.remarks]
+        remarks += [f"{camera.name}: {remark}" for table in tables[c] for remark in table.flare.remarks]
         line = []
         for k, (light, sighting) in enumerate(zip(scene.lights, row, strict=True)):
             pair = _measured(tables[c][k], sighting)

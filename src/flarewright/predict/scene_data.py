@@ -147,7 +147,7 @@ def _rendered(worst: Worst | None) -> dict[str, Any]:
 def _camera(plan: Plan, c: int, glare: VeilingGlare | None) -> dict[str, Any]:
     camera, table = plan.scene.cameras[c], plan.tables[c][0]
     veil = plan.veil(c)
-    left = plan.contrast_left(veil)
+    left, ideal = plan.contrast_left(veil), plan.ideal_contrast
     out: dict[str, Any] = {
         "name": camera.name,
         "flare": table.flare.name,
@@ -155,6 +155,8 @@ def _camera(plan: Plan, c: int, glare: VeilingGlare | None) -> dict[str, Any]:
         "lux_per_cd_m2": table.flare.scene_scale,
         "veil_cd_m2": veil.tolist(),
         "contrast_left": None if left is None else left.tolist(),
+        "k_ideal": ideal,
+        "k_real": None if left is None or ideal is None else (ideal * left).tolist(),
         "lights": [],
     }
     if glare is not None:
