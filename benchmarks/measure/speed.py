@@ -1,4 +1,4 @@
-"""How fast a measured flare replays: a hundred planted ghosts of all sizes, in colour, one core."""
+"""How fast a measured flare replays: a hundred planted ghosts of all sizes, in colour, one core; also Walch's."""
 
 from __future__ import annotations
 
@@ -10,12 +10,13 @@ import numpy as np
 from flarewright.kernels.measure_pupil import SOFT
 from flarewright.measure.numbers import NUMBERS, channel_of
 from flarewright.measure.replay import draw_packed, pack
-from flarewright.model.ghost_model import AberrationGhost, GhostModel
+from flarewright.model.ghost_model import AberrationGhost, BezierGhost, GhostModel
 
 SIZE = (960, 540)
 _ANGLES = (4.0, 10.0, 18.0, 25.0)
 # of borders, pixels; fitted ghosts have 0.5 to 3
 _SOFT = (0.0, 1.0, 2.5)
+_SHARP = "replay, ghosts a second and core"
 
 
 def planted(count: int = 100, seed: int = 0, soft_px: float = 0.0) -> GhostModel:
@@ -40,11 +41,25 @@ def planted(count: int = 100, seed: int = 0, soft_px: float = 0.0) -> GhostModel
     )  # fmt: skip
 
 
+def curved(count: int = 100, seed: int = 0) -> GhostModel:
+    """Return a model of as many ghosts by Walch's primitive, as large, whose borders fade inwards over all or part."""
+    rng = np.random.default_rng(seed)
+    ghosts = []
+    for k in range(count):
+        size = float(np.exp(rng.uniform(np.log(10.0), np.log(140.0))))
+        control = 0.55 * size
+        place = float(rng.uniform(-250.0, 250.0))
+        shape = [(place, place), (0.0,), (size,), (size,), (size,), *[(control,)] * 4]
+        light = [(3.0,), (float(rng.uniform(0.2, 1.0)) * size,), (1.5,), (1.5,), *[(1.0,)] * 3, *[(0.4,)] * 3]
+        ghosts.append(BezierGhost(name=str(k), numbers=(*shape, *light), visible_deg=(0.0, 30.0)))
+    return planted(0).replace(ghosts=tuple(ghosts))
+
+
 def replay_speed(repeat: int = 5) -> dict[str, Any]:
     """Return ghosts in colour a second of CPU time, by softness: over the constellations, the best of some runs."""
+    models = {f"softness {soft_px:g} px" if soft_px else _SHARP: planted(soft_px=soft_px) for soft_px in _SOFT}
     told: dict[str, Any] = {}
-    for soft_px in _SOFT:
-        model = planted(soft_px=soft_px)
+    for name, model in (models | {"Walch's primitive": curved()}).items():
         packed = pack(model)
         rates = []
         for angle in _ANGLES:
@@ -55,6 +70,5 @@ def replay_speed(repeat: int = 5) -> dict[str, Any]:
                 draw_packed(packed, model, angle, 10.0, SIZE, pool=None)
                 best = min(best, time.process_time() - start)
             rates.append(len(model.ghosts) / best)
-        name = f"softness {soft_px:g} px" if soft_px else "replay, ghosts a second and core"
         told |= {name: round(float(np.median(rates))), f"{name}, by angle": [round(x) for x in rates]}
     return told

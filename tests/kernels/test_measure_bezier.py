@@ -85,3 +85,17 @@ def test_nothing_lies_outside_the_window():
     whole = draw(NUMBERS, (0, 0, 150, 110))
     left, top, width, height = bezier_window(NUMBERS, FRAME, 150, 110)
     assert whole.sum() == pytest.approx(whole[top : top + height, left : left + width].sum())
+
+
+@pytest.mark.parametrize("scale", [0.4, 1.0, 2.3])
+@pytest.mark.parametrize(("outside", "inside"), [(3.0, 5.0), (12.0, 40.0), (0.0, 0.0)])
+def test_what_lies_far_from_the_border_is_drawn_like_the_rest(scale, outside, inside):
+    numbers = NUMBERS.copy()
+    numbers[9:11] = outside, inside
+    frame = np.array([FRAME[0], FRAME[1], np.cos(0.7), np.sin(0.7), scale])
+    # with its derivatives every pixel is asked for its distance, without them those are not that are too far for it
+    whole, quick = np.full((2, 110, 150, 3), 0.25)
+    draw_bezier(numbers, frame, 0, 0, whole, np.zeros((110, 150, 3, 19)))
+    draw_bezier(numbers, frame, 0, 0, quick, NONE)
+    np.testing.assert_allclose(quick, whole, rtol=0.0, atol=1e-15)
+    assert np.ptp(whole) > 0.1

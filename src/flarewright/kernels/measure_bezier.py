@@ -16,9 +16,10 @@ NUMBERS = 19
 SHAPE = 9
 FALL_OUT, FALL_IN, POWER_OUT, POWER_IN, BORDER, INNER = 9, 10, 11, 12, 13, 16
 
-_STARTS = 4
-_HALVINGS = 14
-_POLISH = 3
+# places on a curve that are compared first, and steps from the nearest of them, which end below a part of the curve
+_PLACES = 13
+_STEPS = 12
+_ENOUGH = 1e-7
 
 
 @inner
@@ -46,51 +47,76 @@ def _curve(control, t):
 
 
 @inner
-def _square(control, t, x, y):
-    """Return the squared distance of (x, y) to the curve's point at t."""
-    bx, by, _, _ = _curve(control, t)
-    return (bx - x) ** 2 + (by - y) ** 2
+def _places(control, places):
+    """Fill places on a curve; return how far a point of it is from the nearest of them at most."""
+    apart = 0.0
+    for k in range(_PLACES):
+        places[k, 0], places[k, 1], _, _ = _curve(control, k / (_PLACES - 1.0))
+    # no part of a curve is longer than its control polygon: its speed is no more than that of its fastest side
+    for k in range(3):
+        dx, dy = control[k + 1, 0] - control[k, 0], control[k + 1, 1] - control[k, 1]
+        apart = max(apart, 3.0 * sqrt(dx * dx + dy * dy))
+    return 0.5 * apart / (_PLACES - 1.0)
 
 
 @inner
-def _nearest(control, x, y):
-    """Return where the curve is nearest: the best of a few parts, halved again and again, then Newton's steps."""
-    best, t = 1e300, 0.0
-    for k in range(_STARTS):
-        middle = (k + 0.5) / _STARTS
-        square = _square(control, middle, x, y)
+def _first(places, x, y):
+    """Return the squared distance of (x, y) to the nearest place, and which it is."""
+    best, at = 1e300, 0
+    for k in range(_PLACES):
+        square = (places[k, 0] - x) ** 2 + (places[k, 1] - y) ** 2
         if square < best:
-            best, t = square, middle
-    half = 0.5 / _STARTS
-    for _ in range(_HALVINGS):
-        half *= 0.5
-        lower, upper = max(t - half, 0.0), min(t + half, 1.0)
-        low, high = _square(control, lower, x, y), _square(control, upper, x, y)
-        if low < best and low <= high:
-            best, t = low, lower
-        elif high < best:
-            best, t = high, upper
-    for _ in range(_POLISH):
-        bx, by, dx, dy = _curve(control, t)
-        slope = (bx - x) * dx + (by - y) * dy
-        square = dx * dx + dy * dy
-        if square < 1e-18:
-            break
-        # Gauss and Newton's step; the curvature's part is left out, so it never climbs
-        trial = min(max(t - slope / square, 0.0), 1.0)
-        distance = _square(control, trial, x, y)
-        if distance >= best:
-            break
-        best, t = distance, trial
-    return best, t
+            best, at = square, k
+    return best, at
 
 
 @inner
-def _signed_distance(left, right, x, y):
+def _nearest(control, best, at, x, y):
+    """Return the squared distance to the curve near one of its places, and where on it: Newton's steps or halvings."""
+    t = at / (_PLACES - 1.0)
+    lower, upper = max(t - 1.0 / (_PLACES - 1.0), 0.0), min(t + 1.0 / (_PLACES - 1.0), 1.0)
+    found = t
+    for _ in range(_STEPS):
+        bx, by, dx, dy = _curve(control, t)
+        square = (bx - x) ** 2 + (by - y) ** 2
+        if square <= best:
+            best, found = square, t
+        slope = (bx - x) * dx + (by - y) * dy
+        if slope > 0.0:
+            upper = t
+        else:
+            lower = t
+        if upper - lower < _ENOUGH:
+            break
+        # the second derivative is linear in t
+        s = 1.0 - t
+        ax = 6.0 * (s * (control[2, 0] - 2.0 * control[1, 0] + control[0, 0])
+                    + t * (control[3, 0] - 2.0 * control[2, 0] + control[1, 0]))  # fmt: skip
+        ay = 6.0 * (s * (control[2, 1] - 2.0 * control[1, 1] + control[0, 1])
+                    + t * (control[3, 1] - 2.0 * control[2, 1] + control[1, 1]))  # fmt: skip
+        bend = dx * dx + dy * dy + (bx - x) * ax + (by - y) * ay
+        trial = t - slope / bend if bend > 0.0 else -1.0
+        if not lower < trial < upper:
+            trial = 0.5 * (lower + upper)
+        if abs(trial - t) < _ENOUGH:
+            break
+        t = trial
+    return best, found
+
+
+@inner
+def _signed_distance(left, right, places_l, places_r, apart, x, y):
     """Return the signed distance to the border, positive inside; the side, the place on it, and the inward normal."""
     above = abs(y)
-    square_l, t_l = _nearest(left, x, above)
-    square_r, t_r = _nearest(right, x, above)
+    square_l, at_l = _first(places_l, x, above)
+    square_r, at_r = _first(places_r, x, above)
+    # a curve whose places are all farther than the other's nearest one by more than it may come nearer is not asked
+    far_l, far_r = sqrt(square_l), sqrt(square_r)
+    t_l, t_r = 0.0, 1.0
+    if far_l <= far_r + apart:
+        square_l, t_l = _nearest(left, square_l, at_l, x, above)
+    if far_r <= far_l + apart:
+        square_r, t_r = _nearest(right, square_r, at_r, x, above)
     if square_l < square_r:
         side, t, square = -1.0, t_l, square_l
         bx, by, dx, dy = _curve(left, t)
@@ -143,8 +169,12 @@ def signed_distances(numbers, points, out):
     left, right = np.empty((4, 2)), np.empty((4, 2))
     _segment(numbers, -1.0, left)
     _segment(numbers, 1.0, right)
+    places_l, places_r = np.empty((_PLACES, 2)), np.empty((_PLACES, 2))
+    apart = max(_places(left, places_l), _places(right, places_r))
     for k in range(points.shape[0]):
-        out[k], _, _, _, _ = _signed_distance(left, right, points[k, 0], points[k, 1] - numbers[1])
+        out[k], _, _, _, _ = _signed_distance(
+            left, right, places_l, places_r, apart, points[k, 0], points[k, 1] - numbers[1]
+        )
 
 
 @inner
@@ -208,17 +238,29 @@ def draw_bezier(numbers, frame, left, top, pixels, changes):
     control_l, control_r = np.empty((4, 2)), np.empty((4, 2))
     _segment(numbers, -1.0, control_l)
     _segment(numbers, 1.0, control_r)
+    places_l, places_r = np.empty((_PLACES, 2)), np.empty((_PLACES, 2))
+    apart = max(_places(control_l, places_l), _places(control_r, places_r))
     by = np.empty(SHAPE)
     derive = changes.shape[0] > 0
     for r in range(pixels.shape[0]):
+        # pixels that follow and are as far from the border as makes no difference any more, and whether outside
+        same, out = 0, False
         for c in range(pixels.shape[1]):
+            if same > 0:
+                same -= 1
+                if not out:
+                    for m in range(3):
+                        pixels[r, c, m] += numbers[INNER + m]
+                continue
             dx, dy = (left + c + 0.5 - frame[0]) / frame[4], (frame[1] - top - r - 0.5) / frame[4]
             x, y = frame[2] * dx + frame[3] * dy, frame[2] * dy - frame[3] * dx - numbers[1]
-            distance, side, t, nx, ny = _signed_distance(control_l, control_r, x, y)
+            distance, side, t, nx, ny = _signed_distance(control_l, control_r, places_l, places_r, apart, x, y)
             out = distance < 0.0
-            faded, by_d, by_reach, by_power = _share(
-                distance, numbers[FALL_OUT if out else FALL_IN], numbers[POWER_OUT if out else POWER_IN]
-            )
+            reach = numbers[FALL_OUT if out else FALL_IN]
+            faded, by_d, by_reach, by_power = _share(distance, reach, numbers[POWER_OUT if out else POWER_IN])
+            if not derive:
+                # a step of a pixel changes the distance by a pixel at most
+                same = max(int(frame[4] * (abs(distance) - max(reach, 1e-6))), 0)
             if derive:
                 _bernstein_changes(t, side, nx, ny, 1.0 if y >= 0.0 else -1.0, by)
             for m in range(3):

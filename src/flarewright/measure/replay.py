@@ -248,15 +248,24 @@ def draw_packed(
             pool=pool,
         )  # fmt: skip
         sum_into(planes, pixels)
-    for ghost, part in zip(curves, _there(model, curves, constellation_deg), strict=True):
-        if part > 0.0:
-            numbers = bezier_numbers(ghost, constellation_deg)
-            numbers[BORDER:] *= part
-            left, top, w, h = bezier_window(numbers, placed, width, height)
-            if w:
-                window = pixels[top : top + h, left : left + w]
-                draw_bezier(numbers, placed, left, top, window, _NOTHING)
+    shown = [pair for pair in zip(curves, _there(model, curves, constellation_deg), strict=True) if pair[1] > 0.0]
+    drawn = shared_out(lambda pair: _curved(*pair, constellation_deg, placed, size_px), shown, pool=pool)
+    # added up in their order, whichever is ready first
+    for window, light in drawn:
+        pixels[window] += light
     return pixels
+
+
+def _curved(
+    ghost: BezierGhost, part: float, constellation_deg: float, placed: Floats, size_px: tuple[int, int]
+) -> tuple[tuple[slice, slice], Floats]:
+    """Return the rows and columns of a picture that a Bezier ghost touches, and its light there."""
+    numbers = bezier_numbers(ghost, constellation_deg)
+    numbers[BORDER:] *= part
+    left, top, width, height = bezier_window(numbers, placed, *size_px)
+    light = np.zeros((height, width, 3))
+    draw_bezier(numbers, placed, left, top, light, _NOTHING)
+    return (slice(top, top + height), slice(left, left + width)), light
 
 
 def _most_light(ghost: AberrationGhost | BezierGhost) -> float:
