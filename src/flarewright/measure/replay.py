@@ -248,8 +248,11 @@ def draw_packed(
             pool=pool,
         )  # fmt: skip
         sum_into(planes, pixels)
-    shown = [pair for pair in zip(curves, _there(model, curves, constellation_deg), strict=True) if pair[1] > 0.0]
-    drawn = shared_out(lambda pair: _curved(*pair, constellation_deg, placed, size_px), shown, pool=pool)
+    there = _there(model, curves, constellation_deg)
+    shown = np.flatnonzero(there > 0.0).tolist()
+    drawn = shared_out(
+        lambda k: _curved(curves[k], float(there[k]), constellation_deg, placed, size_px), shown, pool=pool
+    )
     # added up in their order, whichever is ready first
     for window, light in drawn:
         pixels[window] += light
