@@ -19,13 +19,17 @@ _SOFT = (0.0, 1.0, 2.5)
 _SHARP = "replay, ghosts a second and core"
 
 
+def _radius(rng: np.random.Generator) -> float:
+    return float(np.exp(rng.uniform(np.log(10.0), np.log(140.0))))
+
+
 def planted(count: int = 100, seed: int = 0, soft_px: float = 0.0) -> GhostModel:
     """Return a model of ghosts of radius 10 to 140 pixels, a little aberrated, with no, one or two rims."""
     rng = np.random.default_rng(seed)
     ghosts = []
     for k in range(count):
         numbers = np.zeros(NUMBERS)
-        size = float(np.exp(rng.uniform(np.log(10.0), np.log(140.0))))
+        size = _radius(rng)
         numbers[:4] = rng.uniform(-500.0, 500.0), 0.05 * size, -0.05 * size, 20.0 * rng.normal()
         numbers[10:14] = size, 0.08 * size * rng.normal(), 0.05 * size, -0.05 * size
         numbers[20:23] = size**2 * np.array([1.0, 0.2 * rng.normal(), 0.05])
@@ -46,7 +50,7 @@ def curved(count: int = 100, seed: int = 0) -> GhostModel:
     rng = np.random.default_rng(seed)
     ghosts = []
     for k in range(count):
-        size = float(np.exp(rng.uniform(np.log(10.0), np.log(140.0))))
+        size = _radius(rng)
         control = 0.55 * size
         place = float(rng.uniform(-250.0, 250.0))
         shape = [(place, place), (0.0,), (size,), (size,), (size,), *[(control,)] * 4]

@@ -206,16 +206,15 @@ def _model_in_scene(camera: SceneCamera, light: SceneLight, width_px: int) -> tu
             "its captures; write them into its reference, else it cannot be put into a scene"
         )
     flare = model_flare(model, Path(camera.model).name, camera.sensor_mm[0], camera.unit_per_cd_m2, width_px)
+    told: list[str] = []
     if camera.f_number is not None and reference.f_number not in (None, camera.f_number):
-        told = (
+        told.append(
             f"measured at f/{reference.f_number:g}: at f/{camera.f_number:g} flare and scene change together, but "
             "ghosts of another opening differ"
         )
-        flare = replace(flare, remarks=(*flare.remarks, told))
     if light.spectrum != type(light).model_fields["spectrum"].default:
-        told = f"measured in its captures' light: the spectrum of {light.name} makes no difference"
-        flare = replace(flare, remarks=(*flare.remarks, told))
-    return flare, flare.sensor
+        told.append(f"measured in its captures' light: the spectrum of {light.name} makes no difference")
+    return replace(flare, remarks=(*flare.remarks, *told)), flare.sensor
 
 
 def camera_project(camera: SceneCamera, light: SceneLight, diameter_deg: float) -> Project:

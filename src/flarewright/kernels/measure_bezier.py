@@ -16,8 +16,8 @@ NUMBERS = 19
 SHAPE = 9
 FALL_OUT, FALL_IN, POWER_OUT, POWER_IN, BORDER, INNER = 9, 10, 11, 12, 13, 16
 
-# places on a curve that are compared first, and steps from the nearest of them, which end below a part of the curve
-_PLACES = 13
+# parts of a curve whose ends are compared first, and steps from the nearest of them, which end below a part of it
+_PARTS = 12
 _STEPS = 12
 _ENOUGH = 1e-7
 
@@ -50,20 +50,28 @@ def _curve(control, t):
 def _places(control, places):
     """Fill places on a curve; return how far a point of it is from the nearest of them at most."""
     apart = 0.0
-    for k in range(_PLACES):
-        places[k, 0], places[k, 1], _, _ = _curve(control, k / (_PLACES - 1.0))
+    for k in range(_PARTS + 1):
+        places[k, 0], places[k, 1], _, _ = _curve(control, k / _PARTS)
     # no part of a curve is longer than its control polygon: its speed is no more than that of its fastest side
     for k in range(3):
         dx, dy = control[k + 1, 0] - control[k, 0], control[k + 1, 1] - control[k, 1]
         apart = max(apart, 3.0 * sqrt(dx * dx + dy * dy))
-    return 0.5 * apart / (_PLACES - 1.0)
+    return 0.5 * apart / _PARTS
+
+
+@inner
+def _border(numbers, left, right, places_l, places_r):
+    """Fill both curves and places on them; return how far a point of either is from the nearest of them at most."""
+    _segment(numbers, -1.0, left)
+    _segment(numbers, 1.0, right)
+    return max(_places(left, places_l), _places(right, places_r))
 
 
 @inner
 def _first(places, x, y):
     """Return the squared distance of (x, y) to the nearest place, and which it is."""
     best, at = 1e300, 0
-    for k in range(_PLACES):
+    for k in range(_PARTS + 1):
         square = (places[k, 0] - x) ** 2 + (places[k, 1] - y) ** 2
         if square < best:
             best, at = square, k
@@ -73,8 +81,8 @@ def _first(places, x, y):
 @inner
 def _nearest(control, best, at, x, y):
     """Return the squared distance to the curve near one of its places, and where on it: Newton's steps or halvings."""
-    t = at / (_PLACES - 1.0)
-    lower, upper = max(t - 1.0 / (_PLACES - 1.0), 0.0), min(t + 1.0 / (_PLACES - 1.0), 1.0)
+    t = at / _PARTS
+    lower, upper = max(t - 1.0 / _PARTS, 0.0), min(t + 1.0 / _PARTS, 1.0)
     found = t
     for _ in range(_STEPS):
         bx, by, dx, dy = _curve(control, t)
@@ -167,10 +175,8 @@ def signed_distances(numbers, points, out):
     Walch 2017, equations 6.2 and 6.3; compared with the roots of the fifth-order polynomial in the tests.
     """
     left, right = np.empty((4, 2)), np.empty((4, 2))
-    _segment(numbers, -1.0, left)
-    _segment(numbers, 1.0, right)
-    places_l, places_r = np.empty((_PLACES, 2)), np.empty((_PLACES, 2))
-    apart = max(_places(left, places_l), _places(right, places_r))
+    places_l, places_r = np.empty((_PARTS + 1, 2)), np.empty((_PARTS + 1, 2))
+    apart = _border(numbers, left, right, places_l, places_r)
     for k in range(points.shape[0]):
         out[k], _, _, _, _ = _signed_distance(
             left, right, places_l, places_r, apart, points[k, 0], points[k, 1] - numbers[1]
@@ -236,10 +242,8 @@ def draw_bezier(numbers, frame, left, top, pixels, changes):
         Filled with the derivatives by every number when it is not empty.
     """
     control_l, control_r = np.empty((4, 2)), np.empty((4, 2))
-    _segment(numbers, -1.0, control_l)
-    _segment(numbers, 1.0, control_r)
-    places_l, places_r = np.empty((_PLACES, 2)), np.empty((_PLACES, 2))
-    apart = max(_places(control_l, places_l), _places(control_r, places_r))
+    places_l, places_r = np.empty((_PARTS + 1, 2)), np.empty((_PARTS + 1, 2))
+    apart = _border(numbers, control_l, control_r, places_l, places_r)
     by = np.empty(SHAPE)
     derive = changes.shape[0] > 0
     for r in range(pixels.shape[0]):
@@ -258,11 +262,11 @@ def draw_bezier(numbers, frame, left, top, pixels, changes):
             out = distance < 0.0
             reach = numbers[FALL_OUT if out else FALL_IN]
             faded, by_d, by_reach, by_power = _share(distance, reach, numbers[POWER_OUT if out else POWER_IN])
-            if not derive:
-                # a step of a pixel changes the distance by a pixel at most
-                same = max(int(frame[4] * (abs(distance) - max(reach, 1e-6))), 0)
             if derive:
                 _bernstein_changes(t, side, nx, ny, 1.0 if y >= 0.0 else -1.0, by)
+            else:
+                # a step of a pixel changes the distance by a pixel at most
+                same = max(int(frame[4] * (abs(distance) - max(reach, 1e-6))), 0)
             for m in range(3):
                 level = 0.0 if out else numbers[INNER + m]
                 step = level - numbers[BORDER + m]

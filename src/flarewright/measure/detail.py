@@ -67,7 +67,7 @@ def detail_at(sprite: Sprite, detail: Detail, constellation_deg: float) -> Pixel
         before, far = between(angles, constellation_deg)
         return detail.picture(int(before + (far > 0.0)), *cells)
     assert sprite.moves is not None
-    part = float((constellation_deg - angles[k]) / (angles[k + 1] - angles[k]))
+    part = float(between(angles, constellation_deg)[1])
     ways = detail.ways(k)[None, ..., None]
     moves = np.take_along_axis(ways_on(sprite.moves, k, part), ways, axis=0)[0]
     shift = detail.parts * fine(moves, sprite, detail.block, detail.parts)

@@ -10,9 +10,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..kernels.measure_pupil import BELOW, FIRST_G
-from .dimmed import AROUND_LIGHT, LEFT_BEHIND, off_light
+from .dimmed import AROUND_LIGHT, LEFT_BEHIND, masks_of
 from .evenly import evenly
 from .fit import light_of
 from .found import CHANNELS, Found, leading, noise_of
@@ -46,29 +47,22 @@ def glow_left(ghosts: Sequence[Found], views: Sequence[View]) -> list[bool]:
         Those that lie around the light wherever they are seen, and are faint beside it or hardly larger than what is
         not looked at around it; and those that are next to nothing of the light at their place.
     """
-    noise = noise_of(views)
-    return [_is_glow(ghost, leading(ghost, noise), views) for ghost in ghosts]
+    noise, masks = noise_of(views), masks_of(views)
+    return [_is_glow(ghost, leading(ghost, noise), views, masks) for ghost in ghosts]
 
 
-def _is_glow(ghost: Found, lead: int, views: Sequence[View]) -> bool:
-    off = _off_light(ghost, lead, views)
-    if off <= _HIDDEN_OFF and _hidden(ghost, lead, views):
-        return True
-    part = _part(ghost, views)
-    return any(off <= far and part <= most for far, most in _GLOW)
-
-
-def _seen(ghost: Found, views: Sequence[View]) -> Sequence[View]:
-    return views[ghost.first : ghost.last + 1]
-
-
-def _off_light(ghost: Found, lead: int, views: Sequence[View]) -> float:
-    """Return by how much a ghost's middle is off the light at most, part of its size or of the light's way."""
-    seen = _seen(ghost, views)
+def _is_glow(ghost: Found, lead: int, views: Sequence[View], masks: Sequence[NDArray[np.bool_]]) -> bool:
+    seen = views[ghost.first : ghost.last + 1]
     place, size = _placed(ghost.shapes[lead], np.array([view.sigma for view in seen]))
-    light = np.array([_along(view) for view in seen])
+    light = np.array([view.off_axis_px for view in seen])
     off = np.abs(place - light)
-    return float(max((off / np.maximum(size, 1e-9)).max(), off.max() / max(light.max(), 1e-9)))
+    # at most, part of its size or of the light's way
+    far = max((off / np.maximum(size, 1e-9)).max(), off.max() / max(light.max(), 1e-9))
+    hidden = _HIDDEN * AROUND_LIGHT * views[0].size_px[0] + _COARSE_PX
+    if far <= _HIDDEN_OFF and size.max() <= hidden:
+        return True
+    part = _part(ghost, views, masks)
+    return any(far <= least and part <= most for least, most in _GLOW)
 
 
 def _placed(shape: Shape, sigma: Floats) -> tuple[Floats, Floats]:
@@ -80,25 +74,13 @@ def _placed(shape: Shape, sigma: Floats) -> tuple[Floats, Floats]:
     return place, np.abs(shape.numbers[FIRST_G : FIRST_G + 10] @ terms) / below
 
 
-def _along(view: View) -> float:
-    """Return how far the light is from the axis, pixels."""
-    return float(np.hypot(view.light_px[0] - view.frame[0], view.light_px[1] - view.frame[1]))
-
-
-def _hidden(ghost: Found, lead: int, views: Sequence[View]) -> bool:
-    """Tell whether a ghost looks out hardly anywhere from where nothing is looked for."""
-    _, size = _placed(ghost.shapes[lead], np.array([view.sigma for view in _seen(ghost, views)]))
-    return bool(size.max() <= _HIDDEN * AROUND_LIGHT * views[0].size_px[0] + _COARSE_PX)
-
-
-def _part(ghost: Found, views: Sequence[View]) -> float:
-    """Return which part of all light that is seen at its place, away from the light, is a ghost's; 0 where none is."""
+def _part(ghost: Found, views: Sequence[View], masks: Sequence[NDArray[np.bool_]]) -> float:
+    """Return which part of all light that is seen at its place, where ghosts are looked for, is a ghost's; or 0."""
     own, every = 0.0, 0.0
-    for view in evenly(_seen(ghost, views), _VIEWS):
-        far = off_light(view) > AROUND_LIGHT * view.size_px[0]
+    for k in evenly(range(ghost.first, ghost.last + 1), _VIEWS):
         for m in range(CHANNELS):
-            part, light = light_of(ghost.shapes[m], view)
-            there = far[part] & (light > 0.0) & np.isfinite(view.variance[part][..., m])
+            part, light = light_of(ghost.shapes[m], views[k])
+            there = masks[k][part] & (light > 0.0)
             own += float(light[there].sum())
-            every += float(view.pixels[part][..., m][there].sum())
+            every += float(views[k].pixels[part][..., m][there].sum())
     return own / every if every > 0.0 else 0.0

@@ -29,7 +29,7 @@ def light_law(views: Sequence[View], px_per_rad: float) -> tuple[float, float]:
         Taken where fewer than four of them have the light well off the axis.
     """
     t = np.array([np.tan(np.radians(abs(view.constellation_deg))) for view in views])
-    away = np.array([np.hypot(*np.subtract(view.light_px, view.frame[:2])) for view in views])
+    away = np.array([view.off_axis_px for view in views])
     inside = [all(0.0 <= at <= side for at, side in zip(view.light_px, view.size_px, strict=True)) for view in views]
     seen = np.array(inside) & (t > _OFF_AXIS)
     if np.unique(np.round(t[seen], 4)).size < 4:

@@ -115,17 +115,17 @@ def _noise(unit: float) -> float:
     return 3 * (2 * _HALF + 1) ** 2 * (_MATCH * unit) ** 2
 
 
-def _coarse(here: Pixels, there: Pixels, unit: float, halved: int) -> NDArray[np.int64]:
+def _coarse(here: Pixels, there: Pixels, unit: float, times: int) -> NDArray[np.int64]:
     """Return around which move of each block to look, as pictures tell that are so often halved, shape (R, C, 2).
 
     It is none where none is so long that it would not be found without.
     """
     rows, columns = _middles(here)
-    if not halved:
+    if not times:
         return np.zeros((rows.size, columns.size, 2), np.int64)
     small, other = _half_as_fine(here), _half_as_fine(there)
     # a cell of four has half their noise
-    found, _ = _agreed(small, other, 0.5 * unit, _coarse(small, other, 0.5 * unit, halved - 1))
+    found, _ = _agreed(small, other, 0.5 * unit, _coarse(small, other, 0.5 * unit, times - 1))
     told = 2 * found[np.ix_(rows // (2 * _BLOCK), columns // (2 * _BLOCK))]
     return np.asarray(np.sign(told) * np.maximum(np.abs(told) - (_REACH - _COARSE), 0))
 

@@ -25,7 +25,7 @@ from .numbers import bezier_numbers, field, fit_in, frame_in, visible
 from .packed import Packed, pack, posed_numbers
 from .rest_drawn import draw_rest
 from .shared_out import shared_out
-from .sprites import interval
+from .sprites import between, interval
 
 Floats = NDArray[np.float64]
 
@@ -152,7 +152,7 @@ def _held(
     if k is None or crossed:
         return parts
     before, after = (_photographed(model, angle, roll_deg, size) for angle in angles[k : k + 2])
-    part = (constellation_deg - angles[k]) / (angles[k + 1] - angles[k])
+    part = float(between(np.array(angles), constellation_deg)[1])
     whole = _sum(parts)
     placed = frame_in(model, constellation_deg, roll_deg, size)
     parts["residual"] = parts["residual"] + held(whole, before, after, sprite, k, part, placed) - whole

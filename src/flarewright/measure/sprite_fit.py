@@ -199,7 +199,7 @@ def drawn(sprites: Sequence[Sprite], view: View) -> Pixels:
 
 def _off_axis(view: View) -> float:
     """Return how far a view's light is from the axis, part of the picture's width."""
-    return float(np.hypot(*np.subtract(view.light_px, view.frame[:2]))) / view.size_px[0]
+    return view.off_axis_px / view.size_px[0]
 
 
 def darkest_noise(views: Sequence[View]) -> float:

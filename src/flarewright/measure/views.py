@@ -53,6 +53,11 @@ class View:
         turn = float(np.degrees(np.arctan2(self.frame[3], self.frame[2])))
         return turn - (180.0 if self.constellation_deg < 0.0 else 0.0)
 
+    @property
+    def off_axis_px(self) -> float:
+        """How far the light is from the axis."""
+        return float(np.hypot(*np.subtract(self.light_px, self.frame[:2])))
+
     @cached_property
     def darkest_noise(self) -> float:
         """Standard deviation of its darkest pixels; infinite where nothing was measured."""
