@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from flarewright.kernels.measure_bezier import bezier_window, draw_bezier, signed_distances
+from flarewright.kernels.measure_bezier import bezier_window, draw_bezier, draw_beziers
+from flarewright.kernels.measure_border import signed_distances
 
 NUMBERS = np.array([
     20.0, 1.5, 30.0, 36.0, 24.0, 18.0, 15.0, 14.0, 17.0, 6.0, 15.0, 1.3, 1.8, 1.0, 0.8, 0.5, 0.3, 0.25, 0.2,
 ])  # fmt: skip
 FRAME = np.array([60.2, 55.1, np.cos(0.4), np.sin(0.4), 1.0])
-NONE = np.empty((0, 0, 3, 19))
 
 
 def by_roots(numbers, x, y):
@@ -32,12 +32,22 @@ def by_roots(numbers, x, y):
     return best
 
 
-def test_distance_is_that_of_the_polynomials_roots():
-    points = np.random.default_rng(3).uniform(-60.0, 90.0, (400, 2))
+CIRCLE = np.array([5.0, 0.0, 60.0, 72.0, 72.0, *[33.0] * 4, *NUMBERS[9:]])
+# with a hollow on its left, and control points on the ends of its right curve
+HOLLOW = np.array([0.0, -3.0, 25.0, 60.0, 40.0, 55.0, 2.0, 0.0, 0.0, *NUMBERS[9:]])
+
+
+# where two feet are all but equally far, the place nearest to a point may lie beside the farther one
+@pytest.mark.parametrize(("numbers", "error"), [(NUMBERS, 1e-6), (CIRCLE, 1e-6), (HOLLOW, 1e-3)])
+def test_distance_is_that_of_the_polynomials_roots(numbers, error):
+    rng = np.random.default_rng(3)
+    # on a turned grid there are points on the line through the middle, with a foot on either side
+    grid = np.stack(np.meshgrid(np.arange(-80.0, 80.0, 8.0), np.arange(-70.0, 70.0, 8.0)), axis=-1).reshape(-1, 2)
+    points = np.concatenate([rng.uniform(-60.0, 90.0, (400, 2)), grid, grid @ [[0.985, 0.174], [-0.174, 0.985]]])
     found = np.empty(len(points))
-    signed_distances(NUMBERS, points, found)
-    exact = [by_roots(NUMBERS, *point) for point in points]
-    assert np.allclose(np.abs(found), exact, atol=2e-4)
+    signed_distances(numbers, points, found)
+    exact = [by_roots(numbers, *point) for point in points]
+    assert np.allclose(np.abs(found), exact, rtol=0.0, atol=error)
 
 
 def test_inside_is_positive():
@@ -47,13 +57,37 @@ def test_inside_is_positive():
     assert list(found > 0.0) == [True, True, False, True, False, True, False]
 
 
+@pytest.mark.parametrize("numbers", [NUMBERS, CIRCLE, HOLLOW])
+def test_inside_is_what_the_border_encloses(numbers):
+    t = np.linspace(0.0, 1.0, 4001)[:, None]
+    corners = []
+    for side, at, extent in ((1.0, 7, numbers[4]), (-1.0, 5, numbers[3])):
+        x0, height = numbers[0], numbers[2]
+        p = np.array([[x0, height], [x0 + side * numbers[at], height], [x0 + side * extent, numbers[at + 1]],
+                      [x0 + side * extent, 0.0]])  # fmt: skip
+        curve = (1 - t) ** 3 * p[0] + 3 * (1 - t) ** 2 * t * p[1] + 3 * (1 - t) * t**2 * p[2] + t**3 * p[3]
+        corners.append(curve if side > 0.0 else curve[::-1])
+    x, y = np.concatenate(corners[::-1]).T
+    points = np.random.default_rng(5).uniform(-90.0, 90.0, (3000, 2))
+    px, py = points[:, :1], np.abs(points[:, 1:] - numbers[1])
+    # how often a ray upwards crosses the upper border
+    over = (x[:-1] <= px) != (x[1:] <= px)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        at = y[:-1] + (px - x[:-1]) / (x[1:] - x[:-1]) * (y[1:] - y[:-1])
+    inside = (over & (at > py)).sum(axis=1) % 2 == 1
+    found = np.empty(len(points))
+    signed_distances(numbers, points, found)
+    sure = np.abs(found) > 0.01
+    np.testing.assert_array_equal(found[sure] > 0.0, inside[sure])
+
+
 def test_transfer_function_is_that_of_equation_6_4():
     # a nearly straight border seen from the side: the right end of a very high ghost
     numbers = NUMBERS.copy()
     numbers[:9] = 0.0, 0.0, 4000.0, 50.0, 10.0, 50.0, 3900.0, 10.0, 3900.0
     frame = np.array([0.0, 0.5, 1.0, 0.0, 1.0])
     pixels = np.zeros((1, 40, 3))
-    draw_bezier(numbers, frame, 0, 0, pixels, NONE)
+    draw_beziers(numbers[None], frame, 0, 0, pixels)
     distance = 10.0 - (np.arange(40) + 0.5)
     inside = 1.0 + (0.3 - 1.0) * np.clip(np.abs(distance) / 15.0, 0.0, 1.0) ** 1.8
     outside = 1.0 - np.clip(np.abs(distance) / 6.0, 0.0, 1.0) ** 1.3
@@ -63,7 +97,7 @@ def test_transfer_function_is_that_of_equation_6_4():
 def draw(numbers, window):
     left, top, width, height = window
     pixels = np.zeros((height, width, 3))
-    draw_bezier(numbers, FRAME, left, top, pixels, NONE)
+    draw_beziers(numbers[None], FRAME, left, top, pixels)
     return pixels
 
 
@@ -96,6 +130,17 @@ def test_what_lies_far_from_the_border_is_drawn_like_the_rest(scale, outside, in
     # with its derivatives every pixel is asked for its distance, without them those are not that are too far for it
     whole, quick = np.full((2, 110, 150, 3), 0.25)
     draw_bezier(numbers, frame, 0, 0, whole, np.zeros((110, 150, 3, 19)))
-    draw_bezier(numbers, frame, 0, 0, quick, NONE)
-    np.testing.assert_allclose(quick, whole, rtol=0.0, atol=1e-15)
+    draw_beziers(numbers[None], frame, 0, 0, quick)
+    np.testing.assert_allclose(quick, whole, rtol=0.0, atol=1e-11)
     assert np.ptp(whole) > 0.1
+
+
+def test_rows_may_be_drawn_a_few_at_a_time():
+    ghosts = np.array([NUMBERS, CIRCLE, HOLLOW])
+    whole, parts = np.zeros((2, 110, 150, 3))
+    draw_beziers(ghosts, FRAME, 0, 0, whole)
+    for top in range(0, 110, 11):
+        draw_beziers(ghosts, FRAME, 0, top, parts[top : top + 11])
+    np.testing.assert_allclose(parts, whole, rtol=0.0, atol=1e-12)
+    alone = sum(draw(numbers, (0, 0, 150, 110)) for numbers in ghosts)
+    np.testing.assert_allclose(whole, alone, rtol=0.0, atol=1e-12)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import FlarewrightError
-from ..kernels.measure_bezier import BORDER, bezier_window, draw_bezier
+from ..kernels.measure_bezier import BORDER, draw_beziers
 from ..kernels.measure_edges import sum_into
 from ..kernels.measure_ghosts import draw_ghosts
 from ..model.ghost_model import AberrationGhost, BezierGhost, GhostModel
@@ -33,7 +33,8 @@ Floats = NDArray[np.float64]
 BEYOND_DEG = 1.0
 # of all of a ghost's light, in one pixel: less is none
 _ROUNDING = 1e-12
-_NOTHING = np.empty((0, 0, 3, 19))
+# Bezier ghosts are drawn in so many rows at a time: the same pixels, however many threads there are
+_ROWS = 30
 # it is kept: what a thread has had of memory it need not ask for again
 _POOL = ThreadPoolExecutor(CHANNELS)
 
@@ -249,26 +250,21 @@ def draw_packed(
         )  # fmt: skip
         sum_into(planes, pixels)
     there = _there(model, curves, constellation_deg)
-    shown = np.flatnonzero(there > 0.0).tolist()
-    drawn = shared_out(
-        lambda k: _curved(curves[k], float(there[k]), constellation_deg, placed, size_px), shown, pool=pool
-    )
-    # added up in their order, whichever is ready first
-    for window, light in drawn:
-        pixels[window] += light
+    shown = [_curved(ghost, part, constellation_deg) for ghost, part in zip(curves, there, strict=True) if part > 0.0]
+    if shown:
+        curved = np.array(shown)
+        shared_out(
+            lambda top: draw_beziers(curved, placed, 0, top, pixels[top : top + _ROWS]), range(0, height, _ROWS),
+            pool=pool,
+        )  # fmt: skip
     return pixels
 
 
-def _curved(
-    ghost: BezierGhost, part: float, constellation_deg: float, placed: Floats, size_px: tuple[int, int]
-) -> tuple[tuple[slice, slice], Floats]:
-    """Return the rows and columns of a picture that a Bezier ghost touches, and its light there."""
+def _curved(ghost: BezierGhost, part: float, constellation_deg: float) -> Floats:
+    """Return the numbers of a Bezier ghost of which a part is there."""
     numbers = bezier_numbers(ghost, constellation_deg)
     numbers[BORDER:] *= part
-    left, top, width, height = bezier_window(numbers, placed, *size_px)
-    light = np.zeros((height, width, 3))
-    draw_bezier(numbers, placed, left, top, light, _NOTHING)
-    return (slice(top, top + height), slice(left, left + width)), light
+    return numbers
 
 
 def _most_light(ghost: AberrationGhost | BezierGhost) -> float:

@@ -7,12 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernels.measure_bezier import BORDER, INNER, NUMBERS, bezier_window, draw_bezier
+from ..kernels.measure_bezier import BORDER, INNER, NUMBERS, bezier_window, draw_bezier, draw_beziers
 from .numbers import Floats
 
 # how much the edges' part of the cost counts
 EDGES = 4.0
-_NOTHING = np.empty((0, 0, 3, NUMBERS))
 
 
 @dataclass(frozen=True)
@@ -36,7 +35,7 @@ def draw(numbers: Floats, frame: Floats, window: tuple[int, int, int, int]) -> F
     """Draw a Bezier ghost inside a window (left, top, width, height), shape (h, w, 3)."""
     left, top, width, height = window
     pixels = np.zeros((height, width, 3))
-    draw_bezier(numbers, frame, left, top, pixels, _NOTHING)
+    draw_beziers(numbers[None], frame, left, top, pixels)
     return pixels
 
 
