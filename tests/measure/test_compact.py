@@ -24,6 +24,7 @@ from flarewright.measure.curves import Pose, posed, spline_basis, value_at
 from flarewright.measure.fit import cost_of, refine, render
 from flarewright.measure.found import Found
 from flarewright.measure.glow import offsets
+from flarewright.measure.journal import Journal
 from flarewright.measure.numbers import NUMBERS, channel_of
 from flarewright.measure.orders import needed_numbers, parabola
 from flarewright.measure.patches import patches_of
@@ -199,7 +200,7 @@ def test_wide_pictures_are_asked_in_small_and_shifts_told_in_full_pixels():
         seen.append(view.showing(np.repeat(light[..., None], 3, axis=2).astype(np.float32)))
     found = Found((ghost, ghost, ghost), 0, len(seen) - 1)
     with ThreadPoolExecutor(2) as pool:
-        (curves,) = curves_of([found], [(0.0, LARGEST)], seen, pool, lambda *_: None)
+        (curves,) = curves_of([found], [(0.0, LARGEST)], seen, pool, Journal(), lambda *_: None)
     assert value_at(curves.along_px, 12.0, (0.0, LARGEST)) == pytest.approx(4.0, abs=0.05)
     assert value_at(curves.brightness, 12.0, (0.0, LARGEST)) == pytest.approx(1.3, abs=0.01)
 

@@ -6,6 +6,7 @@ import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from functools import partial
 from math import ceil, floor, isfinite, log10
 
 import numpy as np
@@ -16,11 +17,13 @@ from ..model.ghost_tracks import GhostTrack, Tracks
 from .curves import Pose
 from .fit import MODEL_ERROR, Fit, cost_of, refine
 from .found import CHANNELS, Found, alone, by_light, exchange, leading, noise_of, rest_of
+from .journal import Journal
 from .normal import inverse
 from .numbers import NUMBERS, Floats, channel_numbers, channel_of
 from .orders import needed_numbers, parabola
 from .patches import patches_of
 from .shape import Indices, Shape, enlarged, free_numbers
+from .shared_out import done_by
 from .smooth import smooth_curve
 from .together import Measured, Shapes, halvings, measure_together
 from .views import Pixels, View, coarse
@@ -31,6 +34,8 @@ Tell = Callable[[float, str], None]
 _VIEWS = 32
 # fewer numbers may cost so much of what the views hold, and so much with an even background held at none
 _WORSE, _UNEVEN = 0.002, 0.05
+# views that are asked at once
+_AT_ONCE = 8
 # numbers are written to this part of the standard deviation that they have with all others held
 _DIGITS = 0.05
 
@@ -42,6 +47,7 @@ def compact(
     *,
     threads: int | None = None,
     tell: Tell = lambda _part, _words: None,
+    journal: Journal | None = None,
 ) -> GhostModel:
     """Make a model small.
 
@@ -56,6 +62,8 @@ def compact(
     threads : int, optional
     tell : callable
         Gets the finished part and words.
+    journal : Journal, optional
+        Of an earlier run that was stopped; the result is the same with and without.
 
     Returns
     -------
@@ -75,8 +83,9 @@ def compact(
     found = [_found(ghost, span, views) for ghost, span in zip(kept, spans, strict=True)]
     tell(0.0, f"{len(kept)} ghosts")
     with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
-        found = _fewer(found, kept, views, pool, lambda part, words: tell(0.7 * part, words))
-        curves = curves_of(found, spans, views, pool, lambda part, words: tell(0.7 + 0.3 * part, words))
+        steps = journal or Journal()
+        found = _fewer(found, kept, views, pool, steps, lambda part, words: tell(0.7 * part, words))
+        curves = curves_of(found, spans, views, pool, steps, lambda part, words: tell(0.7 + 0.3 * part, words))
     ghosts = tuple(
         _written(ghost, each, span, curve)
         for ghost, each, span, curve in zip(kept, found, spans, curves, strict=True)
@@ -117,6 +126,7 @@ def _fewer(
     kept: Sequence[AberrationGhost],
     views: Sequence[View],
     pool: ThreadPoolExecutor,
+    steps: Journal,
     tell: Tell,
 ) -> list[Found]:
     """Drop numbers that do not help and fit the others, each ghost against all others, brightest first."""
@@ -124,7 +134,7 @@ def _fewer(
     rest, noise = [rest_of(out, views, m, pool) for m in range(CHANNELS)], noise_of(views)
     for done, k in enumerate(by_light(out)):
         old = out[k]
-        new = _smaller(old, fitted_numbers(kept[k]), views, rest, noise, pool)
+        new = steps.step(partial(_smaller, old, fitted_numbers(kept[k]), views, rest, noise, pool))
         for m in range(CHANNELS):
             exchange(old.shapes[m], new.shapes[m], old, views, rest[m], pool)
         out[k] = new
@@ -192,6 +202,7 @@ def curves_of(
     spans: Sequence[tuple[float, float]],
     views: Sequence[View],
     pool: ThreadPoolExecutor,
+    steps: Journal,
     tell: Tell,
 ) -> list[Curves]:
     """Ask every frame again and turn what differs over the constellation into curves.
@@ -203,6 +214,7 @@ def curves_of(
         Where each is drawn, degrees.
     views : sequence of View
     pool : executor
+    steps : Journal
     tell : callable
 
     Returns
@@ -220,7 +232,12 @@ def curves_of(
     def one(view: View, there: list[int]) -> Measured:
         return measure_together([shapes[g] for g in there], [Pose()] * len(there), coarse(view, times))
 
-    for k, (view, there, here) in enumerate(zip(views, alive, pool.map(one, views, alive), strict=True)):
+    measured: list[Measured] = []
+    for at in range(0, len(views), _AT_ONCE):
+        some = slice(at, at + _AT_ONCE)
+        measured += steps.step(partial(done_by, pool, one, views[some], alive[some]))
+        tell(len(measured) / len(views), f"{views[len(measured) - 1].constellation_deg:.1f} degrees")
+    for view, there, here in zip(views, alive, measured, strict=True):
         for g, pose, error, inside in zip(there, here.poses, here.error, here.inside, strict=True):
             if inside > 0.0 and isfinite(error[0]):
                 values = (pose.brightness, factor * pose.along_px, pose.size)
@@ -228,7 +245,6 @@ def curves_of(
                 placed = pose.brightness > 0.35
                 told = (error[0], factor * error[1] if placed else np.inf, error[2] if placed else np.inf)
                 said[g].append(_Said(view.constellation_deg, values, told))
-        tell((k + 1) / len(views), f"{view.constellation_deg:.1f} degrees")
     return [_curves(each, ghost, span) for each, ghost, span in zip(said, ghosts, spans, strict=True)]
 
 

@@ -21,15 +21,17 @@ from .. import __version__
 from ..errors import OutputError
 from ..io.atomic import write_atomically
 from ..model.ghost_model import Blades
+from .curves import Pose
 from .find import Candidate
 from .fit import Fit
 from .found import Found
 from .shape import Shape
+from .together import Measured
 
 Made = TypeVar("Made")
 
 # what steps may be made of besides numbers, texts, lists and arrays
-_RECORDS: dict[str, type[Any]] = {one.__name__: one for one in (Candidate, Shape, Fit, Found, Blades)}
+_RECORDS: dict[str, type[Any]] = {one.__name__: one for one in (Candidate, Shape, Fit, Found, Blades, Pose, Measured)}
 
 
 class Journal:

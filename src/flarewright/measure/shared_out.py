@@ -34,6 +34,11 @@ def shared_out(work: Callable[..., Made], *given: Sequence[Any], pool: ThreadPoo
     return out  # type: ignore[return-value]
 
 
+def done_by(pool: ThreadPoolExecutor, work: Callable[..., Made], *given: Sequence[Any]) -> list[Made]:
+    """Return what is made of each piece, in their order: large ones, one task each."""
+    return list(pool.map(work, *given))
+
+
 def dealt_out(work: Callable[[int, int], None], count: int, pool: ThreadPoolExecutor | None) -> None:
     """Have pieces of work done by kernels that are told which: from the first one on, every so many.
 

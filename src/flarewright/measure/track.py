@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from threading import Event, Lock
+from functools import partial
 from typing import Literal
 
 import numpy as np
@@ -17,6 +17,8 @@ from numpy.typing import NDArray
 
 from ..model.ghost_tracks import GhostTrack, Life, State, Step, Tracks, Turn, Turning
 from .curves import Pose
+from .journal import Journal
+from .shared_out import done_by
 from .together import Measured, Shapes, measure_together
 from .views import View
 
@@ -34,6 +36,9 @@ _HISTORY = 5
 # factors, is another one
 _LOST, _LARGER, _BRIGHTER = 0.5, 1.5, 3.0
 
+# of each ghost, where it was seen of late, and how
+_Past = list[list[tuple[float, Pose]]]
+
 
 def follow(
     names: Sequence[str],
@@ -42,6 +47,7 @@ def follow(
     *,
     threads: int | None = None,
     tell: Callable[[float, str], None] = lambda _part, _words: None,
+    journal: Journal | None = None,
 ) -> Tracks:
     """Follow all ghosts over all views.
 
@@ -56,6 +62,8 @@ def follow(
         Both ways at once when None; the tracks do not depend on it.
     tell : callable
         Gets the finished part and words.
+    journal : Journal, optional
+        Of an earlier run that was stopped; the result is the same with and without.
 
     Returns
     -------
@@ -71,41 +79,30 @@ def follow(
     if not ghosts:
         return Tracks(ghosts=())
     radii = np.array([abs(float(shapes[1].numbers[10])) for shapes in ghosts])
-    told, stopped = Lock(), Event()
-    done = 0
+    steps = journal or Journal()
+    up: dict[int, Measured] = {}
+    down: dict[int, Measured] = {}
+    both: list[_Past] = [[[] for _ in ghosts], [[] for _ in ghosts]]
 
-    def along(way: list[int]) -> dict[int, Measured]:
-        nonlocal done
-        found = {}
-        history: list[list[tuple[float, Pose]]] = [[] for _ in ghosts]
-        for k in way:
-            if stopped.is_set():
-                break
-            view = views[k]
-            expected = [_foretold(past, view.constellation_deg) for past in history]
-            here = measure_together(ghosts, expected, view)
-            for g, pose in enumerate(here.poses):
-                if _state(here, g, radii[g]) == "seen" and np.isfinite(here.error[g]).all():
-                    history[g] = [*history[g], (view.constellation_deg, pose)][-_HISTORY:]
-            found[k] = here
-            with told:
-                done += 1
-                tell(done / (2 * len(views)), f"{view.constellation_deg:.1f} degrees")
-        return found
+    def look(k: int, past: _Past) -> Measured:
+        view = views[k]
+        return measure_together(ghosts, [_foretold(one, view.constellation_deg) for one in past], view)
 
     with ThreadPoolExecutor(min(threads or 2, 2)) as pool:
-        try:
-            up, down = pool.map(along, (order, order[::-1]))
-        except BaseException:
-            # an interrupt: what has not begun need not
-            stopped.set()
-            raise
+        for done, places in enumerate(zip(order, order[::-1], strict=True)):
+            found = steps.step(partial(done_by, pool, look, places, both))
+            for k, here, past, ways in zip(places, found, both, (up, down), strict=True):
+                ways[k] = here
+                for g, pose in enumerate(here.poses):
+                    if _state(here, g, radii[g]) == "seen" and np.isfinite(here.error[g]).all():
+                        past[g] = [*past[g], (views[k].constellation_deg, pose)][-_HISTORY:]
+            tell((done + 1) / len(views), f"{views[places[0]].constellation_deg:.1f} degrees")
     measured = [down[k] if down[k].cost < up[k].cost else up[k] for k in order]
     angles = np.array([view.constellation_deg for view in views])
     tracks = []
     for g, name in enumerate(names):
-        steps = tuple(_step(one, g, float(angle), radii[g]) for one, angle in zip(measured, angles, strict=True))
-        tracks.append(GhostTrack(name=name, lives=lives(steps), steps=steps))
+        told = tuple(_step(one, g, float(angle), radii[g]) for one, angle in zip(measured, angles, strict=True))
+        tracks.append(GhostTrack(name=name, lives=lives(told), steps=told))
     return Tracks(ghosts=tuple(tracks))
 
 

@@ -14,6 +14,7 @@ from ..model.ghost_model import AberrationGhost, GhostModel
 from ..model.ghost_tracks import Tracks
 from .compact import compact
 from .dimmed import beside
+from .journal import Journal
 from .numbers import channel_numbers
 from .reading import read_views
 from .rest_fit import with_rest
@@ -34,6 +35,7 @@ def track_ghosts(
     every: int = 1,
     threads: int | None = None,
     tell: Tell = lambda _part, _words: None,
+    journal: Journal | None = None,
 ) -> Tracks:
     """Follow a model's ghosts through the frames of a run.
 
@@ -49,6 +51,8 @@ def track_ghosts(
         The tracks do not depend on it.
     tell : callable
         Gets the finished part and words.
+    journal : Journal, optional
+        Of an earlier run that was stopped; the result is the same with and without.
 
     Returns
     -------
@@ -66,7 +70,7 @@ def track_ghosts(
         views = beside(read_views(folder, run, every, pool), model.halo, model.star, pool)
         small = shared_out(partial(coarse, times=times), views, pool=pool)
     ghosts = [_shapes(ghost, 0.5**times) for ghost in _checked(model)]
-    tracks = follow([ghost.name for ghost in model.ghosts], ghosts, small, threads=threads, tell=tell)
+    tracks = follow([ghost.name for ghost in model.ghosts], ghosts, small, threads=threads, tell=tell, journal=journal)
     return tracks if times == 0 else _enlarged(tracks, 2.0**times)
 
 
@@ -79,6 +83,7 @@ def compress_ghosts(
     every: int = 1,
     threads: int | None = None,
     tell: Tell = lambda _part, _words: None,
+    journal: Journal | None = None,
 ) -> GhostModel:
     """Make a model small, judged by the frames of a run; see `compact.compact`.
 
@@ -95,7 +100,7 @@ def compress_ghosts(
     with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
         views = read_views(folder, run, every, pool)
         dim = beside(views, model.halo, model.star, pool)
-    small = compact(model, tracks, dim, threads=threads, tell=tell)
+    small = compact(model, tracks, dim, threads=threads, tell=tell, journal=journal)
     # they need not be there beside what `with_rest` makes
     del dim
     return with_rest(small, views, threads)
