@@ -11,7 +11,7 @@ from math import ceil, floor, isfinite, log10
 
 import numpy as np
 
-from ..kernels.measure_pupil import DISC_NUMBERS, FIRST_DISC, FIRST_G, SOFT
+from ..kernels.measure_pupil import DISC_NUMBERS, FIRST_DISC, FIRST_G
 from ..model.ghost_model import AberrationGhost, Channel, Curve, Curves, GhostModel
 from ..model.ghost_tracks import GhostTrack, Tracks
 from .curves import Pose
@@ -19,7 +19,7 @@ from .fit import MODEL_ERROR, Fit, cost_of, refine
 from .found import CHANNELS, Found, alone, by_light, exchange, leading, noise_of, rest_of
 from .journal import Journal
 from .normal import inverse
-from .numbers import NUMBERS, Floats, channel_numbers, channel_of
+from .numbers import NUMBERS, Floats, channel_deviation, channel_numbers, channel_of
 from .orders import needed_numbers, parabola
 from .patches import patches_of
 from .shape import Indices, Shape, enlarged, free_numbers
@@ -145,13 +145,8 @@ def _fewer(
 
 def fitted_numbers(ghost: AberrationGhost) -> Indices:
     """Return which numbers of a ghost the fit was free to choose, by what is told of their uncertainty."""
-    told = np.array(ghost.green.uncertainty)
-    end = FIRST_DISC + DISC_NUMBERS * len(ghost.green.discs)
-    known = np.flatnonzero(told > 0.0)
-    if known.size:
-        # softness and what follows it stand behind discs that are not there
-        return np.where(known < end, known, known - end + SOFT).astype(np.int64)
-    return free_numbers(2, len(ghost.green.discs), 2)
+    known = np.flatnonzero(channel_deviation(ghost.green) > 0.0)
+    return known.astype(np.int64) if known.size else free_numbers(2, len(ghost.green.discs), 2)
 
 
 def _smaller(

@@ -12,12 +12,12 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernels.measure_pupil import BELOW, FIRST_G
+from ..kernels.measure_middle import fill_middles
 from .dimmed import AROUND_LIGHT, LEFT_BEHIND, masks_of
 from .evenly import evenly
 from .fit import light_of
 from .found import CHANNELS, Found, leading, noise_of
-from .numbers import Floats, divided_by, ten_terms
+from .numbers import Floats
 from .shape import Shape
 from .views import View
 
@@ -67,11 +67,9 @@ def _is_glow(ghost: Found, lead: int, views: Sequence[View], masks: Sequence[NDA
 
 def _placed(shape: Shape, sigma: Floats) -> tuple[Floats, Floats]:
     """Return place along the light's line and size by a shape's pupil's middle at fields, pixels."""
-    none = np.zeros_like(sigma)
-    terms = ten_terms(none, none, sigma**2)
-    below = divided_by(shape.numbers[BELOW], shape.numbers[BELOW + 1], none, sigma**2)
-    place = sigma * (shape.numbers[:10] @ terms) / below
-    return place, np.abs(shape.numbers[FIRST_G : FIRST_G + 10] @ terms) / below
+    middles = np.zeros((3, sigma.size))
+    fill_middles(np.tile(shape.numbers, (sigma.size, 1)), sigma, middles)
+    return middles[0], np.abs(middles[1])
 
 
 def _part(ghost: Found, views: Sequence[View], masks: Sequence[NDArray[np.bool_]]) -> float:

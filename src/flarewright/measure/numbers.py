@@ -88,6 +88,19 @@ def channel_of(numbers: Floats, discs: int, uncertainty: Floats | None = None) -
     )  # fmt: skip
 
 
+def channel_deviation(channel: Channel) -> Floats:
+    """Return the standard deviation of each number of one colour, shape (53,); 0 for one that was not fitted or told.
+
+    In the place of softness, which is a variance, stands that of `soft_px`.
+    """
+    deviation, told = np.zeros(NUMBERS), np.array(channel.uncertainty)
+    # softness and what follows it stand behind discs that are not there
+    discs = min(FIRST_DISC + DISC_NUMBERS * len(channel.discs), told.size)
+    deviation[:discs] = told[:discs]
+    deviation[SOFT : SOFT + told.size - discs] = told[discs:]
+    return deviation
+
+
 def _written(numbers: Floats, least: int) -> int:
     """Return where the numbers of lateral colour that are written end: f' and g', or all; no earlier than `least`."""
     few = LATERAL + _FEW_LATERAL

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from math import hypot, log10
+from math import hypot
 from pathlib import Path
 
 import numpy as np
@@ -15,10 +15,11 @@ from ..io.atomic import write_atomically
 from ..model.capture import MergedRun
 from ..model.ghost_model import GhostModel
 from ..model.ghost_tracks import Tracks
-from ..render.chart import COLOURS, Series, chart, number
+from ..render.chart import COLOURS, Series, chart, number, with_deviation
 from ..render.page import figures, image, page, remark_list, section, table
 from .evenly import evenly
 from .overview import overview_picture
+from .report_curves import curves_section
 from .report_frames import frames_section, outlines_section, place_of, replays_section
 from .report_ghosts import ghosts_section, paths_of
 from .report_tracks import tracks_section
@@ -81,6 +82,7 @@ def write_report(
         colours = paths.colours()
         sections.append(outlines_section(folder, run, chosen, model, colours))
         sections += [replays_section(folder, run, chosen, model), ghosts_section(paths, model, colours)]
+        sections.append(curves_section(model, colours))
     if tracks is not None and tracks.ghosts:
         sections.append(tracks_section(tracks, colours))
     text = page("Measured flare", lead, sections)
@@ -171,7 +173,7 @@ def _known(value: float | None) -> str:
 def _with_error(value: float | None, error: float | None) -> str:
     if value is None or error is None:
         return _known(value)
-    return f"{value:.{max(0, 1 - int(np.floor(log10(max(error, 1e-9)))))}f} ± {error:.2g}"
+    return with_deviation(value, error)
 
 
 def _geometry(run: MergedRun) -> str:

@@ -9,7 +9,7 @@ from math import ceil, floor, log10
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .figure import FAINT, INK, Box, Figure, Line, Mark, Text
+from .figure import FAINT, INK, Area, Box, Figure, Line, Mark, Text
 
 Floats = NDArray[np.float64]
 Place = Callable[[float, float], tuple[float, float]]
@@ -22,8 +22,12 @@ _GRID = "#e3e8ed"
 _LEFT, _RIGHT, _TOP, _BOTTOM = 64.0, 14.0, 34.0, 44.0
 # of a legend
 _ROW = 14.0
+# of a curve's band; and how much wider than its curves' a chart's range becomes by bands: times this range, or factor
+_SHADE, _WIDER, _TIMES = 0.16, 0.5, 3.0
+# of digits behind the point more are not read
+_DIGITS = 6
 
-__all__ = ["COLOURS", "Series", "chart", "number"]
+__all__ = ["COLOURS", "Series", "chart", "number", "with_deviation"]
 
 
 @dataclass(frozen=True)
@@ -38,6 +42,8 @@ class Series:
     colour : str
     width : float
         Of the line; 0 draws dots.
+    deviation : array_like, shape (N,), or None
+        Standard deviation of `y`: a band so wide to each side, none where it is 0 or not finite. None: no band.
     """
 
     label: str
@@ -45,6 +51,7 @@ class Series:
     y: ArrayLike
     colour: str = COLOURS[0]
     width: float = 1.8
+    deviation: ArrayLike | None = None
 
 
 def number(value: float) -> str:
@@ -58,6 +65,16 @@ def number(value: float) -> str:
         return f"{value:.4g}" if size < 9999.5 else f"{value:.0f}"
     digits, _, power = f"{value:.2e}".partition("e")
     return f"{float(digits):g}e{int(power)}"
+
+
+def with_deviation(value: float, deviation: float) -> str:
+    """Return a number in as many digits as its standard deviation leaves, and this; one that is 0 is not told."""
+    if not (np.isfinite(value) and np.isfinite(deviation) and deviation > 0.0):
+        return number(value)
+    digits = max(0, 1 - floor(log10(deviation)))
+    if digits > _DIGITS:
+        return f"{number(value)} ± {number(float(f'{deviation:.2g}'))}"
+    return f"{value:.{digits}f} ± {deviation:.{digits}f}"
 
 
 def chart(
@@ -101,7 +118,9 @@ def chart(
     box = (_LEFT, width - _RIGHT, top, height - _BOTTOM)
     x_range = _range([np.asarray(one.x, dtype=np.float64) for one in series])
     values = [np.asarray(one.y, dtype=np.float64) for one in series]
-    low, high = _log_range(values, decades) if logarithmic else _range(values, zero=True)
+    edges = [_edges(one, y) for one, y in zip(series, values, strict=True)]
+    shown = [*values, *_near(edges, values, logarithmic)]
+    low, high = _log_range(shown, decades) if logarithmic else _range(shown, zero=True)
     marks: list[Mark] = [Text(_LEFT, 20.0, title, 13.0), Text(width - _RIGHT, 20.0, y_label, 10.0, FAINT, "end")]
 
     def place(x: float, y: float) -> tuple[float, float]:
@@ -116,9 +135,45 @@ def chart(
     for edge in bands:
         level = place(x_range[0], edge)[1]
         marks.append(Line([(box[0], level), (box[1], level)], "#f0c27a", 0.8))
+    for one, around in zip(series, edges, strict=True):
+        marks += _around(np.asarray(one.x, dtype=np.float64), around, one.colour, place)
     for one, y in zip(series, values, strict=True):
         marks += _curve(np.asarray(one.x, dtype=np.float64), y, one, place)
     return Figure(width, height, title, (*marks, *legend))
+
+
+def _edges(one: Series, y: Floats) -> Floats:
+    """Return where a curve's band ends below and above it, shape (2, N); NaN where there is none."""
+    if one.deviation is None:
+        return np.full((2, y.size), np.nan)
+    wide = np.asarray(one.deviation, dtype=np.float64)
+    wide = np.where(np.isfinite(wide) & (wide > 0.0), wide, np.nan)
+    return np.stack([y - wide, y + wide])
+
+
+def _near(edges: Sequence[Floats], values: Sequence[Floats], logarithmic: bool) -> list[Floats]:
+    """Return the edges of bands no farther from what curves reach than these may widen a chart."""
+    whole = np.concatenate(
+        [one[np.isfinite(one) & ((one > 0.0) | (not logarithmic))] for one in (*values, np.zeros(0))]
+    )
+    if whole.size == 0:
+        return []
+    low, high = float(whole.min()), float(whole.max())
+    if logarithmic:
+        return [np.clip(one, low / _TIMES, high * _TIMES) for one in edges]
+    room = _WIDER * (max(high, 0.0) - min(low, 0.0)) or np.inf
+    return [np.clip(one, low - room, high + room) for one in edges]
+
+
+def _around(x: Floats, edges: Floats, colour: str, place: Place) -> list[Mark]:
+    """Draw a band, in as many pieces as it has."""
+    marks: list[Mark] = []
+    known = np.flatnonzero(np.isfinite(edges).all(axis=0))
+    for piece in np.split(known, np.flatnonzero(np.diff(known) > 1) + 1):
+        if piece.size > 1:
+            below, above = ([place(float(x[k]), float(edge[k])) for k in piece] for edge in edges)
+            marks.append(Area([*above, *reversed(below)], colour, _SHADE))
+    return marks
 
 
 def _curve(x: Floats, y: Floats, one: Series, place: Place) -> list[Mark]:

@@ -31,6 +31,15 @@ class Line:
 
 
 @dataclass(frozen=True)
+class Area:
+    """A filled polygon through which what lies below it shows."""
+
+    points: Sequence[tuple[float, float]]
+    colour: str
+    opacity: float
+
+
+@dataclass(frozen=True)
 class Box:
     """A filled rectangle."""
 
@@ -64,7 +73,7 @@ class Picture:
     pixels: NDArray[np.uint8]
 
 
-Mark = Line | Box | Text | Picture
+Mark = Line | Area | Box | Text | Picture
 
 
 @dataclass(frozen=True)
@@ -121,11 +130,12 @@ def png_address(pixels: NDArray[np.uint8]) -> str:
 
 def _svg_mark(mark: Mark) -> str:
     if isinstance(mark, Line):
-        points = " ".join(f"{x:.2f},{y:.2f}" for x, y in mark.points)
         return (
-            f'<polyline points="{points}" fill="none" stroke="{mark.colour}" stroke-width="{mark.width:g}" '
-            'stroke-linejoin="round"/>'
+            f'<polyline points="{_svg_points(mark.points)}" fill="none" stroke="{mark.colour}" '
+            f'stroke-width="{mark.width:g}" stroke-linejoin="round"/>'
         )
+    if isinstance(mark, Area):
+        return f'<polygon points="{_svg_points(mark.points)}" fill="{mark.colour}" fill-opacity="{mark.opacity:g}"/>'
     if isinstance(mark, Box):
         return (
             f'<rect x="{mark.x:.2f}" y="{mark.y:.2f}" width="{mark.width:.2f}" height="{mark.height:.2f}" '
@@ -142,9 +152,13 @@ def _svg_mark(mark: Mark) -> str:
     )
 
 
+def _svg_points(points: Sequence[tuple[float, float]]) -> str:
+    return " ".join(f"{x:.2f},{y:.2f}" for x, y in points)
+
+
 def to_pixels(figure: Figure) -> NDArray[np.uint8]:
     """Return a figure as 8-bit sRGB pixels, shape (height, width, 3)."""
-    from PIL import Image, ImageDraw, ImageFont
+    from PIL import Image, ImageColor, ImageDraw, ImageFont
 
     s = _FINER
     sheet = Image.new("RGB", (figure.width * s, figure.height * s), PAPER)
@@ -153,6 +167,11 @@ def to_pixels(figure: Figure) -> NDArray[np.uint8]:
         if isinstance(mark, Line):
             points = [(x * s, y * s) for x, y in mark.points]
             draw.line(points, fill=mark.colour, width=max(1, round(mark.width * s)), joint="curve")
+        elif isinstance(mark, Area):
+            seen_through = ImageDraw.Draw(sheet, "RGBA")
+            red, green, blue = ImageColor.getrgb(mark.colour)[:3]
+            points = [(x * s, y * s) for x, y in mark.points]
+            seen_through.polygon(points, fill=(red, green, blue, round(255 * mark.opacity)))
         elif isinstance(mark, Box):
             # Pillow's boxes hold their last pixel too
             right, low = (mark.x + mark.width) * s - 1, (mark.y + mark.height) * s - 1

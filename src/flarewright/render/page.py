@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from .figure import Figure, png_address, to_svg
 
-__all__ = ["figures", "image", "page", "paragraph", "remark_list", "section", "table"]
+__all__ = ["figures", "folded", "image", "page", "paragraph", "remark_list", "section", "table"]
 
 # pixels that words below a narrow picture may take
 _CAPTION = 240
@@ -47,6 +47,11 @@ def page(title: str, lead: str, sections: Iterable[str]) -> str:
 def section(title: str, *parts: str) -> str:
     """Return a headline and HTML below it."""
     return f"<h2>{html.escape(title)}</h2>{''.join(parts)}"
+
+
+def folded(title: str, *parts: str) -> str:
+    """Return HTML that is seen once its title is clicked."""
+    return f"<details><summary>{html.escape(title)}</summary>{''.join(parts)}</details>"
 
 
 def paragraph(words: str) -> str:
