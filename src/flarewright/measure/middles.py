@@ -91,8 +91,11 @@ def middles_of(ghost: AberrationGhost, constellation_deg: Floats, largest_deg: f
     def poses(curves: Curves) -> list[Pose]:
         return [pose_at(curves, angle, ghost.visible_deg) for angle in constellation_deg.tolist()]
 
+    def colours(posing: Sequence[Pose]) -> Floats:
+        return np.stack([_look(one, posing, fields) for one in numbers])
+
     plain = poses(ghost.curves)
-    values = np.stack([_look(one, plain, fields) for one in numbers])
+    values = colours(plain)
     changes = []
     for m, channel in enumerate((ghost.red, ghost.green, ghost.blue)):
         deviation = channel_deviation(channel)
@@ -103,8 +106,7 @@ def middles_of(ghost: AberrationGhost, constellation_deg: Floats, largest_deg: f
             change[m] = _look(numbers[m] + step, plain, fields) - _look(numbers[m] - step, plain, fields)
             changes.append(change)
     for more, less in _moved(ghost.curves):
-        ends = [np.stack([_look(one, poses(curves), fields) for one in numbers]) for curves in (more, less)]
-        changes.append(ends[0] - ends[1])
+        changes.append(colours(poses(more)) - colours(poses(less)))
     return Middles(values, np.array(changes).reshape(-1, CHANNELS, *values.shape[1:]) / (2.0 * _STEP))
 
 

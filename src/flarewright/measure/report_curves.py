@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -20,6 +21,8 @@ from .report_numbers import numbers_table
 # constellations of a curve
 _STEPS = 41
 _RED, _GREEN, _BLUE = range(CHANNELS)
+# a colour is drawn as far off green as so many times what this part of all places is off at most
+_USUAL, _OFF = 0.9, 3.0
 # of a Bezier ghost's numbers
 _CENTRE, _HEIGHT, _AWAY, _TOWARDS = 0, 2, 3, 4
 
@@ -32,7 +35,7 @@ _DOUBTS = (
     "Bands, cut where the chart ends, are one standard deviation to each side, to first order by what the model tells "
     "of each number. How numbers go together it does not tell, so that is left out: where one makes up for another, "
     "less is in doubt. A Bezier ghost's are how far its numbers scatter about their polynomials. No band: nothing is "
-    "told."
+    "told. Where a colour is much farther off green than all others, it is left out."
 )
 
 
@@ -74,8 +77,8 @@ def curves_section(model: GhostModel, colours: Mapping[str, str]) -> str:
         return ""
     shown = [_followed(ghost, model, _STEPS) for ghost in model.ghosts if ghost.name in colours]
     rows = [_row(_followed(ghost, model, 1)) for ghost in model.ghosts]
-    head = ("ghost", "at, degrees", "place, pixels from the axis", "size, pixels", "radiance, red", "green", "blue",
-            "red, pixels from green", "blue")  # fmt: skip
+    head = ("ghost, at degrees", "place, pixels from the axis", "size, pixels", "radiance, red", "green", "blue",
+            "red, pixels off green", "blue")  # fmt: skip
     every = [folded(f"Ghost {ghost.name}", numbers_table(ghost)) for ghost in model.ghosts]
     return section(
         "The model's numbers",
@@ -119,10 +122,12 @@ def _charts(shown: Sequence[_Followed], colours: Mapping[str, str]) -> list[Figu
         drawn("Brightness of the middle", shown, lambda one: _one(one, RADIANCE), "radiance", rises=True),
     ]
     if meshes:
-        charts += [
-            drawn("Red's place", meshes, lambda one: _apart(one, _RED), "pixels from green's"),
-            drawn("Blue's place", meshes, lambda one: _apart(one, _BLUE), "pixels from green's"),
-        ]
+        for word, colour in (("Red", _RED), ("Blue", _BLUE)):
+            off = np.abs(np.concatenate([_apart(one, colour).value for one in meshes]))
+            most = _OFF * float(np.quantile(off, _USUAL))
+            charts.append(
+                drawn(f"{word}'s place", meshes, partial(_apart, colour=colour, most=most), "pixels off green's")
+            )
     if curves:
         charts += [
             drawn("Bezier ghosts' extent to the light", curves, lambda one: one.numbers[_TOWARDS], "pixels"),
@@ -144,12 +149,13 @@ def _one(one: _Followed, quantity: int, colour: int = _GREEN) -> Known:
     return one.numbers[{PLACE: _CENTRE, SIZE: _HEIGHT, RADIANCE: INNER + colour}[quantity]]
 
 
-def _apart(one: _Followed, colour: int) -> Known:
-    """Return how far beside green's place another colour's is."""
+def _apart(one: _Followed, colour: int, most: float = np.inf) -> Known:
+    """Return how far off green's place another colour's is, not a number where that is more than `most`."""
     if one.middles is None:
         # its colours have one shape
         return Known(np.zeros(one.constellation_deg.size), np.zeros(one.constellation_deg.size))
-    return one.middles.apart(PLACE, colour, _GREEN)
+    apart = one.middles.apart(PLACE, colour, _GREEN)
+    return replace(apart, value=np.where(np.abs(apart.value) > most, np.nan, apart.value))
 
 
 def _row(one: _Followed) -> tuple[str, ...]:
@@ -159,4 +165,4 @@ def _row(one: _Followed) -> tuple[str, ...]:
         _apart(one, _BLUE),
     )  # fmt: skip
     told = (with_deviation(float(known.value[0]), float(known.deviation[0])) for known in cells)
-    return one.ghost.name, f"{one.constellation_deg[0]:.2f}", *told
+    return f"{one.ghost.name}, at {one.constellation_deg[0]:.1f}", *told

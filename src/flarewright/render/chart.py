@@ -22,9 +22,9 @@ _GRID = "#e3e8ed"
 _LEFT, _RIGHT, _TOP, _BOTTOM = 64.0, 14.0, 34.0, 44.0
 # of a legend
 _ROW = 14.0
-# of a curve's band; and how much wider than its curves' a chart's range becomes by bands: times this range, or factor
-_SHADE, _WIDER, _TIMES = 0.16, 0.5, 3.0
-# of digits behind the point more are not read
+# how opaque bands are; by how much they widen a chart at most, parts of its curves' range, or a factor
+_SHADE, _WIDER, _TIMES = 0.16, 0.5, 2.0
+# digits behind the point, at most
 _DIGITS = 6
 
 __all__ = ["COLOURS", "Series", "chart", "number", "with_deviation"]
@@ -71,10 +71,12 @@ def with_deviation(value: float, deviation: float) -> str:
     """Return a number in as many digits as its standard deviation leaves, and this; one that is 0 is not told."""
     if not (np.isfinite(value) and np.isfinite(deviation) and deviation > 0.0):
         return number(value)
-    digits = max(0, 1 - floor(log10(deviation)))
+    # two digits of one that begins with 1 or 2, else one
+    digits = max(0, -floor(log10(deviation / 3.0)))
     if digits > _DIGITS:
-        return f"{number(value)} ± {number(float(f'{deviation:.2g}'))}"
-    return f"{value:.{digits}f} ± {deviation:.{digits}f}"
+        return f"{number(value)} ± {number(float(f'{deviation:.1g}'))}"
+    # no -0
+    return f"{round(value, digits) + 0.0:.{digits}f} ± {deviation:.{digits}f}"
 
 
 def chart(
@@ -153,9 +155,8 @@ def _edges(one: Series, y: Floats) -> Floats:
 
 def _near(edges: Sequence[Floats], values: Sequence[Floats], logarithmic: bool) -> list[Floats]:
     """Return the edges of bands no farther from what curves reach than these may widen a chart."""
-    whole = np.concatenate(
-        [one[np.isfinite(one) & ((one > 0.0) | (not logarithmic))] for one in (*values, np.zeros(0))]
-    )
+    whole = np.concatenate([*values, np.zeros(0)])
+    whole = whole[np.isfinite(whole) & ((whole > 0.0) | (not logarithmic))]
     if whole.size == 0:
         return []
     low, high = float(whole.min()), float(whole.max())

@@ -1,0 +1,125 @@
+"""The report's section about a model's numbers: both kinds of ghosts, bands where doubts are told, nothing hidden."""
+
+import re
+
+import numpy as np
+import pytest
+from test_measure_report import run_of
+from test_middles import CURVES, ghost, told
+from test_replay import planted
+
+from flarewright.measure.compress import compress
+from flarewright.measure.report import write_report
+from flarewright.measure.report_curves import curves_section
+from flarewright.measure.report_numbers import numbers_table
+from flarewright.model.ghost_model import BezierGhost, Curves
+
+COLOURS = {"1": "#1d5fa8", "2": "#c8413b", "3": "#2d8a5f"}
+BY_ABERRATIONS = told()
+BY_BEZIER = (1.5, 0.0, 0.4, 0.5, 0.6, *(0.2,) * 4, *(0.1,) * 4, 0.15, 0.25, 0.1, 0.05, 0.06, 0.04)
+
+
+def model(uncertainty=BY_ABERRATIONS, of_bezier=BY_BEZIER, curves=CURVES):
+    """Return a model with two ghosts by their aberrations and one of Walch's, all of them told with their doubts."""
+    walch = planted().ghosts[1].replace(uncertainty=of_bezier)
+    ghosts = (ghost(uncertainty, curves), walch, ghost(uncertainty, Curves(), shift=2.0).replace(name="3"))
+    return planted().replace(ghosts=ghosts)
+
+
+def charts_of(html):
+    return {re.search(r"<title>(.*?)</title>", one)[1]: one for one in re.findall(r"<svg.*?</svg>", html, re.DOTALL)}
+
+
+def row_of(html, name):
+    """Return the cells of a ghost's row, each a number and its deviation."""
+    cells = re.search(rf"<td>{name}, at [\d.]+</td>(.*?)</tr>", html)[1]
+    return [tuple(float(part) for part in cell.split(" ± ")) for cell in re.findall(r"<td>(.*?)</td>", cells)]
+
+
+def test_both_kinds_of_ghosts_are_drawn_with_a_band_each():
+    charts = charts_of(curves_section(model(), COLOURS))
+    for title, count in (("Place along the light's line", 3), ("Size", 3), ("Brightness of the middle", 3),
+                         ("Red's place", 2), ("Blue's place", 2)):  # fmt: skip
+        assert charts[title.replace("'", "&#x27;")].count("<polygon") == count
+    assert "Bezier ghosts&#x27; extent to the light: ghost 2" in charts
+    assert "Bezier ghosts&#x27; border level: ghost 2" in charts
+
+
+def test_ghosts_without_a_colour_are_in_the_table_alone():
+    html = curves_section(model(), {"1": "#1d5fa8"})
+    charts = charts_of(html)
+    assert all("#c8413b" not in one for one in charts.values())
+    assert not any("Bezier" in title for title in charts)
+    assert len(row_of(html, "2")) == len(row_of(html, "3")) == 7
+
+
+def test_a_bezier_ghosts_row_is_what_its_polynomials_and_their_scatter_say():
+    place, size, red, green, blue, *apart = row_of(curves_section(model(), COLOURS), "2")
+    # midway of 5 to 20 degrees every polynomial is its first coefficient
+    assert place == (30.0, 1.5)
+    assert size == (9.0, 0.4)
+    assert (red, green, blue) == ((0.5, 0.05), (0.4, 0.06), (0.3, 0.04))
+    assert apart == [(0.0,), (0.0,)]
+
+
+def test_a_bezier_ghosts_band_holds_what_scatters_about_its_polynomial():
+    rng, angles = np.random.default_rng(3), np.linspace(5.0, 20.0, 60)
+    z = (angles - 12.5) / 7.5
+    fitted = [compress(angles, 30.0 + 25.0 * z + 8.0 * z**2 + rng.normal(0.0, 2.0, 60), np.ones(60), (5.0, 20.0))]
+    fitted += [compress(angles, np.full(60, 5.0), np.ones(60), (5.0, 20.0))] * 18
+    walch = BezierGhost(name="2", numbers=tuple(one.coefficients for one in fitted), visible_deg=(5.0, 20.0),
+                        uncertainty=tuple(one.deviation for one in fitted))  # fmt: skip
+    place, *_ = row_of(curves_section(planted().replace(ghosts=(walch,)), COLOURS), "2")
+    assert place[0] == pytest.approx(30.0, abs=1.0)
+    assert place[1] == pytest.approx(2.0, rel=0.2)
+
+
+@pytest.mark.parametrize(("uncertainty", "of_bezier"), [((), ()), ((0.0,) * 30, (0.0,) * 19), ((), (0.0,) * 3)])
+def test_without_doubts_told_there_are_no_bands_and_only_numbers(uncertainty, of_bezier):
+    html = curves_section(model(uncertainty, of_bezier, Curves()), COLOURS)
+    assert "<polygon" not in html
+    assert "±" not in html
+    assert not re.search(r"\b(nan|inf)\b", html)
+    assert len(row_of(html, "1")) == 7
+
+
+def test_a_ghost_that_was_never_photographed_is_told_where_the_captures_end():
+    late = ghost(told()).replace(visible_deg=(30.0, 40.0))
+    html = curves_section(planted().replace(ghosts=(late,)), COLOURS)
+    assert "<td>1, at 25.0</td>" in html
+    assert not re.search(r"\b(nan|inf)\b", html)
+    assert curves_section(planted().replace(ghosts=()), {}) == ""
+
+
+def test_every_number_of_a_ghost_is_told_with_its_doubt():
+    one = ghost(told())
+    html = numbers_table(one.replace(blades={"count": 6, "first_deg": 12.5}, fade_deg=(0.5, 1.0)))
+    assert "<td>f, 1</td><td>-60.0 ± 0.6</td>" in html
+    assert "<td>intensity, w</td><td>50 ± 5</td>" in html
+    assert "<td>below, c</td><td>0.200 ± 0.015</td>" in html
+    assert "<td>brightness, 12.50</td><td>1.400 ± 0.020</td>" in html
+    assert "<td>size, 12.50</td><td>1.100 ± 0.010</td>" in html
+    assert "6 blades, a side at 12.5 degrees" in html
+    assert "comes over 0.5 and goes over 1" in html
+    # terms that are 0 in all colours and were not fitted
+    assert "f, uu" not in html
+    assert "<td>centre along the field</td><td>30.0 ± 1.5</td><td>30, 25</td>" in numbers_table(model().ghosts[1])
+
+
+def test_a_colour_far_off_green_leaves_the_others_charts_readable():
+    far = ghost(told(), Curves(), shift=90.0).replace(name="2", visible_deg=(24.0, 25.0))
+    several = [ghost(told(), Curves(), shift=0.5).replace(name=str(k)) for k in range(3, 16)]
+    colours = {one.name: f"#0000{k:02x}" for k, one in enumerate((far, *several))}
+    charts = charts_of(curves_section(planted().replace(ghosts=(far, *several)), colours))
+    assert 'stroke="#000000" stroke-width="1.8"' not in charts["Blue&#x27;s place"]
+    assert 'stroke="#000001" stroke-width="1.8"' in charts["Blue&#x27;s place"]
+
+
+def test_the_section_is_in_the_report_of_a_run(tmp_path):
+    written = run_of(tmp_path, planted())
+    write_report(tmp_path, written, model(), tmp_path / "r.html")
+    text = (tmp_path / "r.html").read_text()
+    assert text.index("<h2>Ghosts</h2>") < text.index("<h2>The model&#x27;s numbers</h2>")
+    assert "How numbers go together it does not tell" in text
+    assert text.count("<details>") == text.count("</details>") == 4
+    assert not re.search(r"\b(nan|inf)\b", re.sub(r"base64,[^\"]*", "", text))
