@@ -109,12 +109,14 @@ def test_a_stage_that_is_refused_leaves_no_journal(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-def test_find_and_fit_stopped_half_way_end_with_the_same_bytes(tmp_path, capsys, monkeypatch):
+def test_stages_stopped_half_way_end_with_the_same_bytes(tmp_path, capsys, monkeypatch):
     folder = tmp_path / "run"
     folder.mkdir()
     write(folder, GHOSTS[1:2])
     made = {}
-    for stage, file in (("find", "found.json"), ("fit", "model.json")):
+    for stage, file in (
+        ("find", "found.json"), ("fit", "model.json"), ("track", "tracks.json"), ("compress", "compact.json")
+    ):  # fmt: skip
         done = 0
         real = journals.Journal.step
 
@@ -143,7 +145,7 @@ def test_find_and_fit_stopped_half_way_end_with_the_same_bytes(tmp_path, capsys,
             assert command(["measure", stage, str(folder), "--every", "3"]) == 130
         lines = (folder / f"{stage}.journal").read_text().splitlines()
         assert len(lines) == 1 + done // 2
-        assert json.loads(lines[0])["journal"] == 8
+        assert json.loads(lines[0])["journal"] == 9
         capsys.readouterr()
         assert command(["measure", stage, str(folder), "--every", "3"]) == 0
         assert f"goes on after {done // 2} steps" in capsys.readouterr().err

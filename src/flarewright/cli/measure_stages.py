@@ -271,13 +271,14 @@ def _track_given(job: _Job) -> dict[str, object]:
     return {"every": job.every, "model": model.model_dump_json()}
 
 
-def _track(job: _Job, made: Path, _steps: Journal) -> None:
+def _track(job: _Job, made: Path, steps: Journal) -> None:
     from ..io.ghost_model_file import write_tracks
     from ..measure.track_stage import track_ghosts
 
     tracks = track_ghosts(
-        job.folder, job.run, _model(job.folder / MODEL), every=job.every, threads=job.threads, tell=job.progress
-    )
+        job.folder, job.run, _model(job.folder / MODEL), every=job.every, threads=job.threads, tell=job.progress,
+        journal=steps,
+    )  # fmt: skip
     write_tracks(made, tracks)
 
 
@@ -288,13 +289,13 @@ def _compress_given(job: _Job) -> dict[str, object]:
     return {**_track_given(job), "tracks": tracks.model_dump_json()}
 
 
-def _compress(job: _Job, made: Path, _steps: Journal) -> None:
+def _compress(job: _Job, made: Path, steps: Journal) -> None:
     from ..io.ghost_model_file import read_tracks, write_ghost_model
     from ..measure.track_stage import compress_ghosts
 
     small = compress_ghosts(
         job.folder, job.run, _model(job.folder / MODEL), read_tracks(job.folder / TRACKS), every=job.every,
-        threads=job.threads, tell=job.progress,
+        threads=job.threads, tell=job.progress, journal=steps,
     )  # fmt: skip
     write_ghost_model(made, small)
 

@@ -20,7 +20,9 @@ import numpy as np
 from .. import __version__
 from ..errors import OutputError
 from ..io.atomic import write_atomically
+from ..model.base import Frozen
 from ..model.ghost_model import Blades
+from ..model.sprite import Sprite
 from .curves import Pose
 from .find import Candidate
 from .fit import Fit
@@ -31,7 +33,8 @@ from .together import Measured
 Made = TypeVar("Made")
 
 # what steps may be made of besides numbers, texts, lists and arrays
-_RECORDS: dict[str, type[Any]] = {one.__name__: one for one in (Candidate, Shape, Fit, Found, Blades, Pose, Measured)}
+_RECORDS: dict[str, type[Any]] = {one.__name__: one for one in (Candidate, Shape, Fit, Found, Pose, Measured)}
+_MODELS: dict[str, type[Frozen]] = {one.__name__: one for one in (Blades, Sprite)}
 
 
 class Journal:
@@ -108,7 +111,7 @@ def journal(path: Path, digest: str) -> Iterator[Journal]:
     OutputError
         When the file cannot be written.
     """
-    head = {"journal": 8, "version": __version__, "digest": digest}
+    head = {"journal": 9, "version": __version__, "digest": digest}
     known = _read(path, head)
     text = "".join(json.dumps(line) + "\n" for line in (head, *known))
 
@@ -154,8 +157,8 @@ def _packed(value: Any) -> Any:
     """Turn a result into JSON that gives every number back to the last bit."""
     if is_dataclass(value) and type(value).__name__ in _RECORDS:
         return {"is": type(value).__name__, **{one.name: _packed(getattr(value, one.name)) for one in fields(value)}}
-    if isinstance(value, Blades):
-        return {"is": "Blades", "count": value.count, "first_deg": value.first_deg}
+    if type(value).__name__ in _MODELS:
+        return {"is": type(value).__name__, "told": value.model_dump(mode="json")}
     if isinstance(value, np.ndarray):
         data = base64.b64encode(np.ascontiguousarray(value).tobytes()).decode()
         return {"array": data, "type": value.dtype.str, "shape": list(value.shape)}
@@ -180,5 +183,7 @@ def _unpacked(value: Any) -> Any:
     if "array" in value:
         array = np.frombuffer(base64.b64decode(value["array"]), np.dtype(value["type"]))
         return array.reshape(value["shape"]).copy()
+    if "told" in value:
+        return _MODELS[value["is"]].model_validate(value["told"])
     record = _RECORDS[value["is"]]
     return record(**{name: _unpacked(one) for name, one in value.items() if name != "is"})

@@ -13,6 +13,7 @@ import numpy as np
 from ..model.ghost_model import GhostModel
 from .detail_fit import with_detail
 from .dimmed import AROUND_LIGHT, light_around, masks_of, off_light
+from .journal import Journal
 from .light_law import light_of_view
 from .moves_fit import with_moves
 from .packed import pack
@@ -29,7 +30,9 @@ from .views import Pixels, View
 NEXT_TO_LIGHT = 24.0 / 720.0
 
 
-def with_rest(model: GhostModel, views: Sequence[View], threads: int | None = None) -> GhostModel:
+def with_rest(
+    model: GhostModel, views: Sequence[View], threads: int | None = None, journal: Journal | None = None
+) -> GhostModel:
     """Return a model with what views show beside its ghosts, star and halo as sprites, in the place of old ones.
 
     Parameters
@@ -38,25 +41,31 @@ def with_rest(model: GhostModel, views: Sequence[View], threads: int | None = No
     views : sequence of View
         As photographed.
     threads : int, optional
+    journal : Journal, optional
+        Of an earlier run that was stopped; the result is the same with and without.
     """
+    steps = journal or Journal()
     with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
         placed = [replace(view, light_px=light_of_view(model, view)) for view in views]
         left = shared_out(partial(_left_by, model), placed, pool=pool)
         specks = specks_of(model, placed)
         # a speck is so much brighter than what is around it that coarse cells would spread its errors over that
         masks = covered(specks, placed, left)
-        spikes = spike_sprites(placed, all_hidden(left, masks, pool), model.star)
+        spikes = steps.step(lambda: spike_sprites(placed, all_hidden(left, masks, pool), model.star))
         left = beside_sprites(left, spikes, placed, pool)
         # coarse pictures overshoot beside the light's image, which finer ones only mend where something is known
         around = shared_out(around_light, placed, all_hidden(left, masks, pool), pool=pool)
-        going = light_sprites(placed, around, model.star is not None, pool)
+        going = steps.step(lambda: light_sprites(placed, around, model.star is not None, pool))
         left = beside_sprites(left, going, placed, pool)
         # next to the light a pixel's error is brighter than all that turns about the axis
         next_to_light = [off_light(view) < NEXT_TO_LIGHT * view.size_px[0] for view in placed]
-        axis = axis_sprite(placed, all_hidden(all_hidden(left, masks, pool), next_to_light, pool), pool)
+        axis = steps.step(
+            lambda: axis_sprite(placed, all_hidden(all_hidden(left, masks, pool), next_to_light, pool), pool)
+        )
         left = beside_sprites(left, (axis,), placed, pool)
-        small = speck_sprites(specks, placed, left, masks_of(placed))
-    moving = with_moves(model.replace(sprites=(*spikes, *going, axis, *small)), threads)
+        small = steps.step(lambda: speck_sprites(specks, placed, left, masks_of(placed)))
+    still = model.replace(sprites=(*spikes, *going, axis, *small))
+    moving = still.replace(sprites=steps.step(lambda: with_moves(still, threads).sprites))
     packed = pack(moving)
     left = [
         each - draw_specks(small, packed, moving, view.constellation_deg, view.frame, view.size_px)

@@ -195,7 +195,7 @@ def fit_ghosts(
         ghost for ghost, left in zip(settled, glow_left(settled, views), strict=True) if not (left or ghost.unwanted)
     ]
     model = _model(run, to_model(wanted, views), dim, views)
-    return with_rest(model, views, threads) if rest else model
+    return with_rest(model, views, threads, journal) if rest else model
 
 
 def _star_of(views: Sequence[View], pool: ThreadPoolExecutor) -> Star | None:

@@ -103,7 +103,7 @@ def compress_ghosts(
     small = compact(model, tracks, dim, threads=threads, tell=tell, journal=journal)
     # they need not be there beside what `with_rest` makes
     del dim
-    return with_rest(small, views, threads)
+    return with_rest(small, views, threads, journal)
 
 
 def _check_size(run: MergedRun, model: GhostModel) -> None:

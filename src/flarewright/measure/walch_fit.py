@@ -111,7 +111,7 @@ def fit_as_walch(
             progress(min(begin + count, len(names)) / len(names), f"ghost {some[-1]}")
     told = "fitted with Walch's primitive and by his gradient descent (2017), for comparison"
     model = cast(GhostModel, bare.replace(ghosts=tuple(found), remarks=(*rough.remarks, told)))
-    return with_rest(model, views, threads)
+    return with_rest(model, views, threads, journal)
 
 
 def _spots(model: GhostModel, view: View) -> tuple[Spot, ...]:
