@@ -7,10 +7,13 @@ import numpy as np
 import pytest
 
 from flarewright.cli.app import run
-from flarewright.cli.predict_flares import model_flare
+from flarewright.cli.predict_measured import Counting, model_flare
+from flarewright.errors import FlarewrightError
 from flarewright.io.ghost_model_file import names_ghost_model, write_ghost_model
-from flarewright.measure.replay import replay
-from flarewright.model.ghost_model import BezierGhost, GhostModel, Halo, Reference
+from flarewright.measure.placing import over_clipping
+from flarewright.measure.replay import light_px, replay
+from flarewright.model.ghost_model import BezierGhost, GhostModel, Halo, Reference, Star
+from flarewright.model.replay_camera import ReplayCamera
 from flarewright.optics.color import luminance_weights
 
 # the captures' light: 1e5 cd/m2 on 1e-4 sr give 10 lx
@@ -34,13 +37,73 @@ def file(tmp_path):
     return path
 
 
-def test_its_flare_is_the_replayed_ghosts_per_lux(file):
+def summed(model, constellation_deg, roll_deg=0.0, around=1.0 / 18.0, finer=8):
+    """Add up a replay without the disc around the light, in fine pixels that are in or out; the mean luminance."""
+    width, height = model.size_px
+    size = width * finer, height * finer
+    layers = {one.name: one.pixels for one in replay(model, constellation_deg, roll_deg=roll_deg, size_px=size)}
+    x, y = light_px(model, constellation_deg, roll_deg)
+    down, right = np.mgrid[: size[1], : size[0]] + 0.5
+    inside = np.hypot(right / finer - x, down / finer - y) < around * width
+    counted = np.where(inside[..., None], layers["ghosts"], layers["beauty"])
+    return float((counted @ luminance_weights("rec709")).mean())
+
+
+def mean_of(model, constellation_deg, roll_deg=0.0, **counting):
+    flare = model_flare(model, "camera.json", 36.0, 0.02, 192, Counting(**counting))
+    return float((flare.picture(constellation_deg, roll_deg) @ luminance_weights("rec709")).mean())
+
+
+def test_its_flare_is_the_replayed_flare_per_lux_without_the_light(file):
     assert names_ghost_model(str(file))
-    flare = model_flare(planted(), "camera.json", 36.0, 0.02, 160)
-    ghosts = next(layer for layer in replay(planted(), 12.0, roll_deg=40.0) if layer.name == "ghosts")
-    np.testing.assert_allclose(flare.picture(12.0, 40.0), ghosts.pixels / 10.0, rtol=1e-5, atol=1e-12)
+    flare = model_flare(planted(), "camera.json", 36.0, 0.02, 192, Counting())
     assert (flare.least_deg, flare.reach_deg) == (1.0, 26.0)
     assert (flare.sensor.width, flare.sensor.height) == (36.0, 20.25)
+    # in the picture, half out of it, out of it
+    for angle in (12.0, 25.5):
+        expected = summed(planted(), angle, 40.0) / 10.0
+        assert mean_of(planted(), angle, 40.0) == pytest.approx(expected, rel=2e-3)
+    ghosts = next(one for one in replay(planted(), 12.0, size_px=(960, 540)) if one.name == "ghosts").pixels
+    alone = float((ghosts @ luminance_weights("rec709")).mean()) / 10.0
+    assert mean_of(planted(), 12.0, ghosts_only=True) == pytest.approx(alone, rel=2e-3)
+    assert mean_of(planted(), 12.0) > 1.2 * alone
+
+
+def test_the_disc_around_the_light_is_as_large_as_asked_for():
+    for around in (0.0, 0.02, 0.2):
+        expected = summed(planted(), 12.0, 40.0, around) / 10.0
+        found = mean_of(planted(), 12.0, 40.0, around_light=around)
+        assert found == pytest.approx(expected, rel=0.01 if around == 0.0 else 2e-3)
+
+
+def test_ghosts_count_over_the_light_too():
+    """A ghost that lies over the light's image is seen there as without the halo."""
+    over = planted().ghosts[0]
+    at = light_px(planted(), 12.0)[0] - planted().axis_px[0]
+    there = planted().replace(ghosts=(over.replace(numbers=((at,), *over.numbers[1:])),))
+    flare = model_flare(there, "camera.json", 36.0, 0.02, 192, Counting())
+    ghosts = model_flare(there, "camera.json", 36.0, 0.02, 192, Counting(ghosts_only=True))
+    x, y = (1.2 * place for place in light_px(there, 12.0))
+    down, right = np.mgrid[:108, :192] + 0.5
+    inside = np.hypot(right - x, down - y) < 192.0 / 18.0 - 1.5
+    assert ghosts.picture(12.0)[inside].min() > 0.0
+    np.testing.assert_array_equal(flare.picture(12.0)[inside], ghosts.picture(12.0)[inside])
+
+
+@pytest.mark.parametrize("width_px", [None, 0.6, 1.0])
+def test_statistics_do_not_jump_as_the_light_moves_by_a_tenth_of_a_pixel(width_px):
+    """Neither at the disc's border nor where narrow spikes along rows and columns pass between pixels' middles."""
+    star = None if width_px is None else Star(
+        spikes=4, first_deg=0.0, width_px=width_px, radius_px=(1.0, 900.0), radiance=((60.0,) * 3, (1.0,) * 3)
+    )  # fmt: skip
+    model = planted().replace(size_px=(720, 405), axis_px=(360.0, 202.5), focal_px=765.0, ghosts=(), star=star)
+    flare = model_flare(model, "camera.json", 36.0, 0.02, 192, Counting())
+    means = []
+    for step in range(11):
+        tangent = 0.1 + 0.1 * step * (720.0 / 192.0) / 765.0
+        light = flare.picture(float(np.degrees(np.arctan(tangent))), 30.0) @ luminance_weights("rec709")
+        means.append(light.mean())
+    assert np.abs(np.diff(means)).max() < 0.002 * np.mean(means)
 
 
 def test_angles_of_many_digits_are_not_asked_for_beyond_the_last(tmp_path):
@@ -58,9 +121,8 @@ def test_curves_of_a_measured_flare(file, tmp_path, capsys):
     assert data["constellation_deg"][-1] == 26.0
     # 5 lx on a camera that was measured with 10
     k = 3
-    layers = replay(planted(), data["constellation_deg"][k], size_px=(192, 108))
-    light = next(one for one in layers if one.name == "ghosts").pixels @ luminance_weights("rec709")
-    assert data["veil_cd_m2"][k] == pytest.approx(light.mean() / 10.0 * 5.0 / 0.02, rel=1e-3)
+    light = summed(planted(), data["constellation_deg"][k])
+    assert data["veil_cd_m2"][k] == pytest.approx(light / 10.0 * 5.0 / 0.02, rel=2e-3)
     assert data["k_ratio"][k] == pytest.approx(101.0 / (101.0 + 2.0 * data["veil_cd_m2"][k]))
 
 
@@ -130,11 +192,74 @@ def test_scene_with_a_measured_camera(file, tmp_path, capsys):
     scene.write_text(SCENE.format(x=10.0 * np.tan(np.radians(14.0))))
     assert run(["predict", str(scene), "--json"]) == 0
     data = json.loads(capsys.readouterr().out)
-    light = next(one for one in replay(planted(), 14.0, size_px=(192, 108)) if one.name == "ghosts")
     lux = 2000.0 / (100.0 * (1.0 + np.tan(np.radians(14.0)) ** 2))
-    veil = (light.pixels @ luminance_weights("rec709")).mean() / 10.0 * lux / 0.02
-    assert data["ranking"][0]["worst_veil_cd_m2"] == pytest.approx(veil, rel=1e-3)
+    veil = summed(planted(), 14.0) / 10.0 * lux / 0.02
+    assert data["ranking"][0]["worst_veil_cd_m2"] == pytest.approx(veil, rel=2e-3)
+    # no white level was known: where the sensor clips nobody can tell
     assert data["ranking"][0]["brightest_stops_from_clipping"] is None
+    assert any("to clipping is not known: the model does not tell" in remark for remark in data["remarks"])
+
+
+def test_a_camera_of_a_scene_says_what_counts(file, tmp_path, capsys):
+    scene, x = tmp_path / "scene.toml", 10.0 * np.tan(np.radians(14.0))
+    lux = 2000.0 / (100.0 * (1.0 + np.tan(np.radians(14.0)) ** 2))
+
+    def told(words):
+        scene.write_text(SCENE.format(x=x).replace("unit_per_cd_m2", f"{words}\nunit_per_cd_m2"))
+        assert run(["predict", str(scene), "--json"]) == 0
+        data = json.loads(capsys.readouterr().out)
+        return data["ranking"][0]["worst_veil_cd_m2"] * 10.0 * 0.02 / lux, " ".join(data["remarks"])
+
+    veil, words = told("around_light = 0.2")
+    assert veil == pytest.approx(summed(planted(), 14.0, around=0.2), rel=2e-3)
+    # atan(0.2 * 160 / 170)
+    assert "only farther than 0.2 of the width from the light's image (11 degrees on the axis)" in words
+    veil, words = told('count = "ghosts"')
+    assert veil == pytest.approx(summed(planted().replace(halo=None), 14.0), rel=2e-3)
+    assert "only ghosts are counted" in words
+    scene.write_text(SCENE.format(x=x).replace("unit_per_cd_m2", "around_light = 0.6\nunit_per_cd_m2"))
+    assert run(["predict", str(scene)]) == 2
+    assert "around_light 0.6 is no part of the picture's width" in capsys.readouterr().err
+
+
+def test_two_cameras_of_one_model_differ_in_settings_and_remarks(tmp_path, capsys):
+    """Equation 8.3 by hand: the captures clip at 4 first, in green, at ISO 100, 0.5 s and f/2."""
+    clipping = CAPTURED.replace(clipping=(8.0, 4.0, 5.0))
+    write_ghost_model(tmp_path / "camera.json", planted(clipping))
+    scene = tmp_path / "scene.toml"
+    first = SCENE.format(x=2.0).replace("aim_m", "iso = 400\nexposure_s = 0.25\naim_m")
+    camera = first[first.index("[[cameras]]") : first.index("[[lights]]")]
+    second = camera.replace('"A"', '"B"').replace("iso = 400", "iso = 100\nf_number = 4.0")
+    scene.write_text(first.replace("[[lights]]", second + "[[lights]]"))
+    assert run(["predict", str(scene), "--json"]) == 0
+    data = json.loads(capsys.readouterr().out)
+    stops = {one["camera"]: one["brightest_stops_from_clipping"] for one in data["ranking"]}
+    peak = max(data["cameras"][0]["lights"][0]["statistics_lx"]["maximum"])
+    assert stops["A"] == pytest.approx(np.log2(peak * (400 / 100) * (0.25 / 0.5) / 4.0))
+    # a quarter of the ISO, and two stops smaller
+    assert stops["B"] == pytest.approx(stops["A"] - 4.0)
+    assert any(one.startswith("B: measured at f/2") for one in data["remarks"])
+    assert not any(one.startswith("A: measured at f/2") for one in data["remarks"])
+    write_ghost_model(tmp_path / "camera.json", planted(clipping.replace(f_number=None)))
+    assert run(["predict", str(scene), "--json"]) == 0
+    data = json.loads(capsys.readouterr().out)
+    unsure = {one["camera"]: one["brightest_stops_from_clipping"] for one in data["ranking"]}
+    assert unsure == {"A": pytest.approx(stops["A"]), "B": None}
+    assert any("B: how near its brightest spot is to clipping is not known: the model does not tell the f_number" in one
+               for one in data["remarks"])  # fmt: skip
+
+
+def test_white_light_clips_in_the_colour_that_is_filled_first():
+    """White of luminance 1 is (0.5, 1, 0.4) in this camera, of which green clips at 2, then red at 1.5, blue at 3."""
+    matrix = ((2.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 2.5))
+    model = planted(CAPTURED.replace(clipping=(1.5, 2.0, 3.0))).replace(to_rec709=matrix)
+    assert over_clipping(model, ReplayCamera()) == pytest.approx(0.5)
+    assert over_clipping(model, ReplayCamera(iso=200.0, exposure_s=0.25, f_number=4.0)) == pytest.approx(0.125)
+    # a red that is held down by 0.2 clips first: 0.5 / 0.2
+    red = model.replace(reference=CAPTURED.replace(clipping=(0.2, 2.0, 3.0)))
+    assert over_clipping(red, ReplayCamera()) == pytest.approx(2.5)
+    with pytest.raises(FlarewrightError, match="does not tell at which radiance the sensor of its captures clips"):
+        over_clipping(planted(), ReplayCamera())
 
 
 def test_a_spectrum_that_makes_no_difference_is_told(file, tmp_path, capsys):
@@ -178,6 +303,11 @@ def test_beyond_what_was_measured_is_told(file, tmp_path, capsys):
         (["--to", "50"], "up to 26"),
         (["--glare"], "--glare has no meaning"),
         (["--check", "3"], "--check has no meaning for a measured flare"),
+        (["--around-light", "-0.1"], "--around-light -0.1 is no part of the picture's width"),
+        (["--around-light", "nan"], "--around-light nan is no part of the picture's width"),
+        # half the diagonal of 16:9
+        (["--around-light", "0.574"], "give a number from 0 to below 0.574, or count ghosts only"),
+        (["--count", "ghosts", "--around-light", "0.1"], "--around-light has no meaning for --count ghosts"),
         (["--quality", "draft"], "--quality has no meaning for a measured flare"),
         (
             ["--sensor", "36x24"],
@@ -191,11 +321,65 @@ def test_bad_flags_for_a_measured_flare(flags, words, file, capsys):
     assert words in told
 
 
+@pytest.mark.parametrize("flags", [["--around-light", "0.1"], ["--count", "all"]])
+def test_what_counts_of_a_lens_is_no_choice(flags, tmp_path, capsys):
+    assert run(["predict", "heliar-tronnier", *flags]) == 2
+    assert f"{flags[0]} has no meaning for a lens" in capsys.readouterr().err
+    (tmp_path / "scene.toml").write_text(SCENE.format(x=2.0))
+    assert run(["predict", str(tmp_path / "scene.toml"), *flags]) == 2
+    assert f"{flags[0]} has no meaning for a scene" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("lines", "words"),
+    [
+        ("around_light = -0.1", "around_light"),
+        ('count = "ghosts"\naround_light = 0.1', "around_light says where more than ghosts counts"),
+        ('count = "halo"', "count"),
+    ],
+)
+def test_mistakes_about_what_counts_are_told_of_a_scene(lines, words, tmp_path, capsys):
+    scene = tmp_path / "scene.toml"
+    scene.write_text(SCENE.format(x=2.0).replace("unit_per_cd_m2", f"{lines}\nunit_per_cd_m2"))
+    assert run(["scene", "check", str(scene)]) == 2
+    assert words in capsys.readouterr().err
+    one = lines.partition("\n")[0].replace("-", "")
+    scene.write_text(SCENE.format(x=2.0).replace('model = "camera.json"', f'lens = "heliar-tronnier"\n{one}')
+                     .replace("unit_per_cd_m2 = 0.02\n", ""))  # fmt: skip
+    assert run(["scene", "check", str(scene)]) == 2
+    assert one.split()[0] in capsys.readouterr().err
+
+
+def test_a_page_tells_what_is_left_out(file, tmp_path, capsys):
+    page = tmp_path / "m.html"
+    for flags, words in (
+        ([], "the light's own image is left out"),
+        (["--count", "ghosts"], "only ghosts are drawn"),
+        (["--around-light", "0"], "the light's own image is in it"),
+    ):
+        assert run(["predict", str(file), "--samples", "8", "-o", str(page), *flags]) == 0
+        text = unescape(page.read_text("utf-8"))
+        assert words in text
+        assert ("image is left out" in text) == (not flags)
+        assert words in " ".join(capsys.readouterr().out.split())
+
+
+def test_what_was_drawn_otherwise_is_not_taken_from_a_cache(file, tmp_path, capsys):
+    kept = ["predict", str(file), "--samples", "8", "--cache", str(tmp_path / "c.npz"), "--json"]
+    means = []
+    for flags in ([], ["--around-light", "0.2"], ["--count", "ghosts"], []):
+        assert run([*kept, *flags]) == 0
+        means.append(json.loads(capsys.readouterr().out)["statistics"]["mean"]["values"][0])
+    assert means[0] == means[3] > means[1] > means[2] > 0.0
+
+
 def test_a_model_that_does_not_know_its_light_cannot_stand_in_a_scene(tmp_path, capsys):
     write_ghost_model(tmp_path / "camera.json", planted(Reference(f_number=2.0)))
     (tmp_path / "scene.toml").write_text(SCENE.format(x=2.0))
     assert run(["predict", str(tmp_path / "scene.toml")]) == 2
-    assert "does not tell luminance_cd_m2 and solid_angle_sr" in capsys.readouterr().err
+    told = capsys.readouterr().err
+    assert "does not tell luminance_cd_m2 and solid_angle_sr" in told
+    assert "write both into the camera.json beside the captures" in told
     # curves in its own unit are told all the same
     assert run(["predict", str(tmp_path / "camera.json"), "--samples", "13", "--json"]) == 0
     assert "values are in its own unit" in capsys.readouterr().err

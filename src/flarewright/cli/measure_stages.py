@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from ..errors import FlarewrightError
+from ..model.capture import OF_LIGHT
 from .common import print_json, progress_bar, tell
 
 if TYPE_CHECKING:
@@ -188,11 +189,31 @@ def run_stages(
                 note(folder, name, digest)
             elif name == "fit" and job.whole:
                 _complete(job, made)
+            if stage.file != TRACKS:
+                _tell_light(run, made)
         facts[name] = {**_facts(made), "file": str(made), "kept": kept}
         if talk:
             words = ", ".join(f"{value} {key}" for key, value in _facts(made).items())
             print(f"{made}: {words}" + (", as before" if kept else ""))
     return facts
+
+
+def _tell_light(run: MergedRun, made: Path) -> None:
+    """Write what is known by now of the light and of clipping into a model, which knows no ghost better for it."""
+    from ..io.ghost_model_file import write_ghost_model
+    from ..measure.stages import reference_of
+
+    model, known = _model(made), reference_of(run)
+    told = known.model_dump(include=OF_LIGHT, exclude_none=True)
+    reference = model.reference.replace(clipping=model.reference.clipping or known.clipping, **told)
+    if reference != model.reference:
+        write_ghost_model(made, model.replace(reference=reference))
+
+
+def _measured(model: GhostModel) -> str:
+    """Return a model as later stages are told of it: how bright the light was is nothing to them."""
+    dark = model.model_copy(update={"reference": model.reference.replace(**dict.fromkeys(OF_LIGHT))})
+    return dark.model_dump_json(exclude={"reference": {"clipping"}})
 
 
 def _corrections(folder: Path, given: Path | None) -> Corrections | None:
@@ -236,7 +257,7 @@ def _find(job: _Job, made: Path, steps: Journal) -> None:
 
 
 def _fit_given(job: _Job) -> dict[str, object]:
-    given = {"every": job.every, "found": _model(job.needed(FOUND, "find")).model_dump_json()}
+    given = {"every": job.every, "found": _measured(_model(job.needed(FOUND, "find")))}
     return given if job.by == "joint" else {**given, "by": job.by}
 
 
@@ -268,7 +289,7 @@ def _complete(job: _Job, made: Path) -> None:
 def _track_given(job: _Job) -> dict[str, object]:
     # ghosts are followed beside halo and star alone
     model = _model(job.needed(MODEL, "fit")).replace(sprites=())
-    return {"every": job.every, "model": model.model_dump_json()}
+    return {"every": job.every, "model": _measured(model)}
 
 
 def _track(job: _Job, made: Path, steps: Journal) -> None:

@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
 from ..errors import ProjectError
 from .common import check_place, console, pair, print_json, progress_bar, remembered, tell, write_text
-from .predict_flares import SHOWN_PX, lens_flares, model_flares
+from .predict_flares import SHOWN_PX, lens_flares
+from .predict_measured import Counting, model_flares
 from .predict_scene import SceneWishes, is_scene, predict_scene
 
 if TYPE_CHECKING:
@@ -58,7 +59,28 @@ def predict(
     ] = None,
     unit_per_cd_m2: Annotated[
         float | None,
-        typer.Option(help="What a scene of 1 cd/m² has in a measured flare's captures.", rich_help_panel=_LENS),
+        typer.Option(
+            help="Of a measured flare: the value that a photographed grey card of 1 cd/m² has in its captures; without "
+            "it there is no veil and no contrast.",
+            rich_help_panel=_LENS,
+        ),
+    ] = None,
+    count: Annotated[
+        Literal["all", "ghosts"] | None,
+        typer.Option(
+            metavar="all|ghosts",
+            help="Of a measured flare: all but what is around the light (the default), or ghosts only.",
+            rich_help_panel=_LENS,
+        ),
+    ] = None,
+    around_light: Annotated[
+        float | None,
+        typer.Option(
+            metavar="PART",
+            help="Of a measured flare: how far around the light's image only ghosts count, part of the picture's "
+            "width (0.0556); 0 counts the light's own image too.",
+            rich_help_panel=_LENS,
+        ),
     ] = None,
     spectrum: Annotated[
         str | None,
@@ -80,7 +102,11 @@ def predict(
     ] = None,
     illuminance: Annotated[
         float | None,
-        typer.Option(help="Of the light on a plane facing it, lx (1e5, the sun).", rich_help_panel=_CURVES),
+        typer.Option(
+            help="Of the light on a plane facing it, lx (1e5, the sun). For a measured flare: of the light to predict, "
+            "whatever was photographed; its model has to tell the luminance and solid angle of that.",
+            rich_help_panel=_CURVES,
+        ),
     ] = None,
     luminance: Annotated[
         str | None,
@@ -144,13 +170,13 @@ def predict(
         "--light-diameter": light_diameter,
     }  # fmt: skip
     curve_flags = {
-        "--sensor": sensor, "--unit-per-cd-m2": unit_per_cd_m2, "--roll": roll, "--to": to, "--bins": bins,
-        "--illuminance": illuminance, "--luminance": luminance, "--tolerance": tolerance, "--samples": samples,
-        "--check": check,
+        "--sensor": sensor, "--roll": roll, "--to": to, "--bins": bins, "--illuminance": illuminance,
+        "--luminance": luminance, "--tolerance": tolerance, "--samples": samples, "--check": check,
     }  # fmt: skip
+    measured_flags = {"--unit-per-cd-m2": unit_per_cd_m2, "--count": count, "--around-light": around_light}
     scene_flags = {"--near": near, "--radius": radius, "--height": height, "--shortest-shot": shortest_shot}
     if is_scene(subject):
-        _refuse({**lens_flags, **curve_flags}, "a scene", "the scene file tells it")
+        _refuse({**lens_flags, **measured_flags, **curve_flags}, "a scene", "the scene file tells it")
         predict_scene(
             Path(subject),
             _scene_wishes(SceneWishes(
@@ -174,12 +200,16 @@ def predict(
                 f"--luminance {luminance} tells nothing without --unit-per-cd-m2: how bright a scene is in a measured "
                 "flare's captures is not known"
             )
-        project, flares = None, model_flares(subject, size, unit_per_cd_m2)
+        if count == "ghosts":
+            _refuse({"--around-light": around_light}, "--count ghosts", "ghosts count everywhere")
+        project, flares = None, model_flares(subject, size, unit_per_cd_m2, Counting(count == "ghosts", around_light))
         if not flares.sampled.per_lux:
-            untold = "it does not tell luminance_cd_m2 and solid_angle_sr of its captures' light"
+            untold = "it does not tell luminance_cd_m2 and solid_angle_sr of its captures' light (docs/measure.md)"
             _refuse({"--illuminance": illuminance}, subject, untold)
     else:
         _refuse({"--unit-per-cd-m2": unit_per_cd_m2}, "a lens", "it follows from the glass")
+        apart = "the light's own image is drawn apart from the flare"
+        _refuse({"--count": count, "--around-light": around_light}, "a lens", apart)
         project = _project(subject, fstop, coating, zoom, focus, size or (36.0, 24.0), spectrum, light_diameter)
         flares = lens_flares(project, quality or "final", threads)
     _curves(flares, wanted, project if glare else None, threads, output, as_json, cache)
@@ -325,7 +355,7 @@ def _print(found: Occurrence) -> None:
     data = occurrence_data(found)
     out = Table(
         title=f"{found.flare.name} · {found.flare.aperture} · {found.frame.width:g}x{found.frame.height:g} mm",
-        caption=f"{found.flare.unit.capitalize()}; the light's own image is left out.",
+        caption=f"{found.flare.unit.capitalize()}; {found.flare.left_out}.",
     )
     out.add_column("estimator")
     for column in ("least", "at degrees", "most", "at degrees"):

@@ -23,7 +23,7 @@ from ..errors import FlarewrightError, OutputError
 from ..io.atomic import write_atomically
 from ..io.merged import read_frame, read_run, write_frame, write_run
 from ..io.photo import open_photo
-from ..model.capture import CameraNoise, Capture, FrameInfo, Matrix3, MergedFrame, MergedRun
+from ..model.capture import OF_LIGHT, CameraNoise, Capture, FrameInfo, Matrix3, MergedFrame, MergedRun
 from .calibrate import Calibration, calibrate
 from .contradiction import refuse_contradiction
 from .drift import without_drift
@@ -227,8 +227,8 @@ def _merge_all(
     balance: tuple[float, float, float], threads: int | None, tell: Progress,
 ) -> list[_Merged]:  # fmt: skip
     common = _digest([
-        _VERSION, known.camera.model_dump(), known.white, known.step, balance, known.size_px, known.block,
-        _array_digest(known.black), _array_digest(known.response),
+        _VERSION, known.camera.model_dump(exclude=OF_LIGHT), known.white, known.step, balance, known.size_px,
+        known.block, _array_digest(known.black), _array_digest(known.response),
     ])  # fmt: skip
     merged: dict[int, _Merged] = {}
     fitting = max(1, int(_WORKING_BYTES / (_PIXEL_BYTES * known.size_px[0] * known.size_px[1])))

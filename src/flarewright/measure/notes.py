@@ -11,8 +11,7 @@ from pydantic import ValidationError
 
 from ..errors import FlarewrightError
 from ..io.atomic import write_atomically
-from ..io.merged import INDEX
-from ..model.capture import MergedRun
+from ..model.capture import OF_LIGHT, MergedRun
 from ..model.corrections import Corrections
 
 NOTES = "stages.json"
@@ -35,10 +34,10 @@ def run_digest(folder: Path, run: MergedRun, settings: Mapping[str, object]) -> 
     Returns
     -------
     str
-        Frames are told apart by size and time, not by their pixels.
+        Frames are told apart by size and time, not by their pixels; how bright the light was changes nothing.
     """
     digest = hashlib.sha256(json.dumps([_VERSION, dict(settings)], sort_keys=True, default=str).encode())
-    digest.update((folder / INDEX).read_bytes())
+    digest.update(f"{run.model_dump_json(indent=1, exclude={'camera': OF_LIGHT})}\n".encode())
     for info in run.frames:
         path = folder / info.file
         stamp = path.stat() if path.is_file() else None

@@ -7,7 +7,7 @@ from math import inf
 import numpy as np
 
 from ..errors import FlarewrightError
-from ..model.ghost_model import Reference
+from ..model.ghost_model import GhostModel, Reference
 from ..model.replay_camera import ReplayCamera, Vector
 from ..optics.constellation import POWERS, brightness_scale, view_axes
 from ..optics.constellation import constellation_and_roll as optics_constellation
@@ -92,3 +92,32 @@ def brightness(reference: Reference, camera: ReplayCamera) -> float:
             f"{told} make the flare {gain:g} times as bright as in the captures; check these settings"
         )
     return gain
+
+
+def over_clipping(model: GhostModel, camera: ReplayCamera) -> float:
+    """Return the signal on the sensor, over the one at which it clips, of light of luminance 1 in a model's unit.
+
+    Parameters
+    ----------
+    model : GhostModel
+    camera : ReplayCamera
+        As `brightness` takes it.
+
+    Returns
+    -------
+    float
+        Of light as white as daylight, in the colour that clips first; of coloured light another colour may.
+
+    Raises
+    ------
+    FlarewrightError
+        When the model does not tell where its sensor clips, and as `brightness`.
+    """
+    clipping = model.reference.clipping
+    if clipping is None:
+        raise FlarewrightError(
+            "the model does not tell at which radiance the sensor of its captures clips (clipping in its reference)"
+        )
+    # the camera's red, green and blue of white of luminance 1
+    white = np.ones(3) if model.to_rec709 is None else np.linalg.pinv(np.array(model.to_rec709)) @ np.ones(3)
+    return brightness(model.reference, camera) * float((white / np.array(clipping)).max())

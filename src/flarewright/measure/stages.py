@@ -287,7 +287,16 @@ def _model(run: MergedRun, ghosts: tuple[AberrationGhost, ...], dim: Dimmed, vie
     return GhostModel(
         size_px=run.size_px, axis_px=run.axis_px, focal_px=focal, distortion=distortion,
         largest_deg=max(abs(angle) for angle in angles), constellation_deg=(min(used), max(used)), ghosts=ghosts,
-        halo=dim.halo, star=dim.star,
-        reference=Reference(iso=run.reference_iso, f_number=run.reference_f_number, exposure_s=1.0),
-        to_rec709=run.to_rec709,
+        halo=dim.halo, star=dim.star, reference=reference_of(run), to_rec709=run.to_rec709,
+    )  # fmt: skip
+
+
+def reference_of(run: MergedRun) -> Reference:
+    """Return the settings of a run's frames: 1 fills the sensor in a second, but for the white balance."""
+    camera = run.camera
+    return Reference(
+        iso=run.reference_iso, f_number=run.reference_f_number, exposure_s=1.0,
+        luminance_cd_m2=camera.luminance_cd_m2, solid_angle_sr=camera.solid_angle_sr,
+        # where nothing is known to clip, 1 is the files' own unit
+        clipping=None if camera.white_level is None else run.white_balance,
     )  # fmt: skip

@@ -20,6 +20,8 @@ Positive = Annotated[float, Field(gt=0.0)]
 Degrees = Annotated[float, Field(ge=-360.0, le=360.0)]
 # a light beside the camera or behind it makes no picture
 Constellation = Annotated[float, Field(gt=-90.0, lt=90.0)]
+# what `CameraNoise` tells of the light, which changes no pixel and no ghost
+OF_LIGHT = {"luminance_cd_m2", "solid_angle_sr"}
 Matrix3 = tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]]
 
 
@@ -67,9 +69,9 @@ class Capture(Frozen):
 
 
 class CameraNoise(Frozen):
-    """How a camera turns light into numbers: `camera.json`.
+    """How a camera turns light into numbers, and the light that it photographed: `camera.json`.
 
-    What is None is read from the files or estimated from the captures.
+    What is None of the camera is read from the files or estimated from the captures.
 
     Attributes
     ----------
@@ -85,6 +87,8 @@ class CameraNoise(Frozen):
         Of the pixels of the file, micrometres.
     electrons_per_unit_error, read_noise_error : float or None
         Their standard errors, when they were estimated.
+    luminance_cd_m2, solid_angle_sr : float or None
+        Of the light, seen from the camera; both or none. Merging does without, a ghost model takes them along.
     """
 
     schema_version: Literal[1] = 1
@@ -96,6 +100,14 @@ class CameraNoise(Frozen):
     pitch_um: Positive | None = None
     electrons_per_unit_error: float | None = Field(None, ge=0.0)
     read_noise_error: float | None = Field(None, ge=0.0)
+    luminance_cd_m2: Positive | None = None
+    solid_angle_sr: Positive | None = None
+
+    @model_validator(mode="after")
+    def _light_is_whole(self) -> CameraNoise:
+        if (self.luminance_cd_m2 is None) != (self.solid_angle_sr is None):
+            raise ValueError("luminance_cd_m2 and solid_angle_sr of the light go together; give both or none")
+        return self
 
     @model_validator(mode="after")
     def _clips_above_black(self) -> CameraNoise:

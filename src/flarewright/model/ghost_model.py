@@ -18,6 +18,7 @@ from .sprite import Sprite
 
 Ten = tuple[float, float, float, float, float, float, float, float, float, float]
 Rgb3 = tuple[float, float, float]
+Above0 = Annotated[float, Field(gt=0.0)]
 AnyGhost = TypeVar("AnyGhost", "AberrationGhost", "BezierGhost")
 Fade = tuple[Annotated[float, Field(ge=0.0)], Annotated[float, Field(ge=0.0)]]
 
@@ -307,6 +308,8 @@ class Reference(Frozen):
         Of the light that was photographed.
     solid_angle_sr : float or None
         Of that light, seen from the camera.
+    clipping : Rgb or None
+        Radiance at which the sensor clips at these settings; None: not known.
     """
 
     f_number: float | None = Field(None, gt=0.0)
@@ -314,6 +317,7 @@ class Reference(Frozen):
     exposure_s: float | None = Field(None, gt=0.0)
     luminance_cd_m2: float | None = Field(None, gt=0.0)
     solid_angle_sr: float | None = Field(None, gt=0.0)
+    clipping: tuple[Above0, Above0, Above0] | None = None
 
 
 Ghost = Annotated[AberrationGhost | BezierGhost, Field(discriminator="kind")]

@@ -49,6 +49,11 @@ class SceneCamera(Frozen):
         A measured flare instead.
     unit_per_cd_m2 : float or None
         Of a measured flare: which value of its captures a scene of 1 cd/m2 has, from a grey card of known luminance.
+    count : {"all", "ghosts"} or None
+        Of a measured flare: what of it counts; None: all.
+    around_light : float or None
+        Of a measured flare: how far around the light's image only ghosts count, part of the picture's width; None: as
+        `measure` leaves it out.
     position_m, aim_m : tuple of float
     up : tuple of float
     f_number : float or None
@@ -67,6 +72,8 @@ class SceneCamera(Frozen):
     lens: str | None = None
     model: str | None = None
     unit_per_cd_m2: Positive | None = None
+    count: Literal["all", "ghosts"] | None = None
+    around_light: float | None = Field(None, ge=0.0)
     position_m: Place3
     aim_m: Place3
     up: Place3 = (0.0, 0.0, 1.0)
@@ -90,6 +97,11 @@ class SceneCamera(Frozen):
             )
         if self.model is None and self.unit_per_cd_m2 is not None:
             raise ValueError("unit_per_cd_m2 is for a measured model; a lens' follows from its glass")
+        for key in ("count", "around_light"):
+            if self.model is None and getattr(self, key) is not None:
+                raise ValueError(f"{key} is for a measured model; a lens' flare has no image of the light in it")
+        if self.count == "ghosts" and self.around_light is not None:
+            raise ValueError('around_light says where more than ghosts counts; leave it or count = "ghosts" out')
         _check_keys(self.keyframes)
         return self
 

@@ -16,7 +16,8 @@ from ..optics.color import luminance_weights
 
 Floats = NDArray[np.float64]
 
-# the direct image of the light is no flare, and the beauty holds it
+# the direct image of the light is no flare, and the beauty holds it; a measured flare's has no layer of its own, so
+# that flare comes without what is around the light
 NO_FLARE = ("beauty", "starburst")
 
 __all__ = ["Flare", "Frame", "luminance"]
@@ -71,6 +72,11 @@ class Flare:
         Whether that is over the light's illuminance; else it is of the light that was photographed, whatever that gave.
     fingerprint : str
         The same for flares that draw the same.
+    left_out : str
+        What of the light is not in it, in words.
+    over_clipping : float or None
+        The signal over the one at which the sensor clips, of light 1 of what it draws on a measured camera at its
+        settings; None: not known. A lens' sensor clips by its ISO (`photometry.exposure_level`).
     remarks : tuple of str
         What a person should know.
     """
@@ -89,6 +95,8 @@ class Flare:
     unit: str = "irradiance on the sensor over the illuminance that the light gives on a plane facing it"
     per_lux: bool = True
     fingerprint: str = ""
+    left_out: str = "the light's own image is left out"
+    over_clipping: float | None = None
     remarks: tuple[str, ...] = ()
 
     def covers(self, constellation_deg: Floats) -> NDArray[np.bool_]:

@@ -44,7 +44,7 @@ def occurrence_page(found: Occurrence) -> str:
     lead = (
         f"{flare.name}, {efl}{flare.aperture}, sensor {found.frame.width:g} x {found.frame.height:g} mm, "
         f"{found.quality} quality, {len(curves.constellation_deg)} constellations. Values are {flare.unit}; "
-        "the light's own direct image is left out."
+        f"{flare.left_out}."
     )
     parts = [section("Flare over the constellation", _charts(found), _extremes(found))]
     if found.pictures:
@@ -93,7 +93,7 @@ def _pictures(found: Occurrence) -> str:
     images = "".join(
         image(pixels, f"{angle:.4g} degrees", 232) for pixels, (angle, _) in zip(shown, found.pictures, strict=True)
     )
-    return images + paragraph(f"All at one exposure, {stops:+.1f} stops; the light's own image is left out.")
+    return images + paragraph(f"All at one exposure, {stops:+.1f} stops; {found.flare.left_out}.")
 
 
 def shown_together(pictures: Sequence[NDArray[np.float32]]) -> tuple[list[NDArray[np.uint8]], float]:

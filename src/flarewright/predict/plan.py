@@ -143,7 +143,8 @@ class Ranked:
     seen_share : float or None
         Part of the time in which less than nine tenths of the contrast are left.
     brightest_stops : float or None
-        Of the brightest spot, at any time, from where the sensor clips; above 0 it clips. None for a measured flare.
+        Of the brightest spot, at any time, from where the sensor clips; above 0 it clips. None where a measured flare
+        does not tell where that is.
     """
 
     camera: int
@@ -178,17 +179,13 @@ def tables_of(
     tuple of tuple of FlareTable
         By camera and light.
     """
-    known: dict[tuple[str, Frame], FlareTable] = {}
+    known: Memory = {} if memory is None else memory
     out = []
     for camera, row in zip(scene.cameras, seen, strict=True):
         tables = []
         for light, sighting in zip(scene.lights, row, strict=True):
             flare, frame = near_or_far(maker, camera, light, sighting)
-            key = flare.fingerprint, frame
-            if key not in known:
-                drawn = {} if memory is None else memory.setdefault(flare.fingerprint, {})
-                known[key] = FlareTable(flare, frame, STEP_DEG, drawn=drawn)
-            tables.append(known[key])
+            tables.append(FlareTable(flare, frame, STEP_DEG, drawn=known.setdefault(flare.fingerprint, {})))
         out.append(tuple(tables))
     return tuple(out)
 
@@ -265,7 +262,7 @@ def plan_scene(scene: Scene, maker: FlareMaker, told: Callable[[str], Progress],
 
 def draw_ahead(tables: Sequence[Sequence[FlareTable]], seen: Sequence[Sequence[Sighting]], progress: Progress) -> None:
     """Draw every picture that the sightings need, so that progress and what is left are known."""
-    wanted: dict[tuple[int, float, float], FlareTable] = {}
+    wanted: dict[tuple[str, float, float], FlareTable] = {}
     for row, line in zip(tables, seen, strict=True):
         for table, sighting in zip(row, line, strict=True):
             for c, roll, lux in zip(
@@ -273,7 +270,7 @@ def draw_ahead(tables: Sequence[Sequence[FlareTable]], seen: Sequence[Sequence[S
             ):
                 if lux > 0.0 and table.flare.least_deg <= c <= table.flare.reach_deg:
                     for node, at_roll, _, _ in table.nodes(float(c), float(roll)):
-                        wanted[id(table), node, at_roll] = table
+                        wanted[table.flare.fingerprint, node, at_roll] = table
     for k, ((_, node, roll), table) in enumerate(wanted.items()):
         table.light(node, roll)
         progress((k + 1) / len(wanted), f"{table.flare.name}, {node:.4g} degrees")
@@ -329,7 +326,7 @@ def ranking(plan: Plan) -> list[Ranked]:
             worst = int(np.nanargmax(veil))
             left = plan.contrast_left(veil)
             peak = float(pair.column("maximum")[pair.known].max())
-            level = exposure_level(peak, camera.iso, camera.exposure_s) if camera.model is None else 0.0
+            level = _level(peak, camera, plan.tables[c][k].flare)
             out.append(
                 Ranked(
                     camera=c,
@@ -345,6 +342,13 @@ def ranking(plan: Plan) -> list[Ranked]:
                 )
             )
     return sorted(out, key=lambda one: (-_or(one.mean_veil_cd_m2, -inf), one.camera, one.light))
+
+
+def _level(peak: float, camera: SceneCamera, flare: Flare) -> float:
+    """Return the signal of a flare's brightest spot over the one at which the sensor clips; 0: not known, or none."""
+    if camera.model is None:
+        return exposure_level(peak, camera.iso, camera.exposure_s)
+    return 0.0 if flare.over_clipping is None else peak * flare.over_clipping
 
 
 def _or(value: float | None, otherwise: float) -> float:
