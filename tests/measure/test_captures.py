@@ -140,11 +140,16 @@ def test_the_camera_file_is_checked(tmp_path):
     path = tmp_path / "camera.json"
     path.write_text('{"black_level": 512, "electrons_per_unit": 2.5, "read_noise": 3}')
     assert read_camera(path).electrons_per_unit == 2.5
+    path.write_text('{"luminance_cd_m2": 2e6, "solid_angle_sr": 1e-5}')
+    assert (read_camera(path).luminance_cd_m2, read_camera(path).solid_angle_sr) == (2e6, 1e-5)
     for text, word in (
         ("{", "not JSON"),
         ('{"gain": 1}', "gain"),
         ('{"electrons_per_unit": -1}', "electrons_per_unit"),
         ('{"black_level": 512, "white_level": 511}', "white_level 511 is not above black_level 512"),
+        ('{"luminance_cd_m2": 2e6}', "luminance_cd_m2 and solid_angle_sr of the light go together; give both or none"),
+        ('{"luminance_cd_m2": 0, "solid_angle_sr": 1e-5}', "luminance_cd_m2"),
+        ('{"luminance_cd_m2": 2e6, "solid_angle_sr": 1e999}', "solid_angle_sr"),
     ):
         path.write_text(text)
         with pytest.raises(FlarewrightError, match=word):

@@ -15,6 +15,7 @@ from flarewright.io.merged import read_frame, read_run
 from flarewright.measure.geometry import Seen, solve_geometry
 from flarewright.measure.light import find_light
 from flarewright.measure.merge_run import MergeSettings, merge_captures
+from flarewright.measure.stages import reference_of
 from flarewright.model.capture import CameraNoise
 
 
@@ -175,6 +176,28 @@ def test_exposures_that_are_not_what_the_list_says_are_told(tmp_path, camera, mi
             listed.write_text(text.replace(",0.125,", ",1.25," if mistake.startswith("ten") else ",0.0625,"))
     with pytest.raises(FlarewrightError, match=words):
         merge_captures(read_captures(listed), tmp_path, tmp_path / "run", camera=camera)
+
+
+def test_the_light_and_clipping_are_told_to_models_and_change_no_frame(tmp_path):
+    captures = read_captures(shoot(tmp_path, {angle: star(light_px(angle)) for angle in ANGLES}))
+    balance = MergeSettings(white_balance=(2.0, 1.0, 1.5))
+    merge_captures(captures, tmp_path, tmp_path / "run", camera=KNOWN, settings=balance)
+    begun = stamps(tmp_path / "run")
+    lit = KNOWN.replace(luminance_cd_m2=2e6, solid_angle_sr=1e-5)
+    run = merge_captures(captures, tmp_path, tmp_path / "run", camera=lit, settings=balance)
+    assert stamps(tmp_path / "run") == begun
+    told = reference_of(run)
+    assert (told.luminance_cd_m2, told.solid_angle_sr) == (2e6, 1e-5)
+    assert told.clipping == (2.0, 1.0, 1.5)
+    # what clipped in every exposure has at least what clips in the shortest
+    frame = read_frame(tmp_path / "run", run.frames[2])
+    assert told.exposure_s is not None
+    for m in range(3):
+        clipped = frame.radiance[..., m][~frame.valid[..., m]] * frame.info.gain
+        least = told.clipping[m] * told.exposure_s / min(one.exposure_s for one in captures)
+        assert clipped.size
+        np.testing.assert_allclose(clipped, least, rtol=0.05)
+    assert reference_of(run.replace(camera=KNOWN.replace(white_level=None))).clipping is None
 
 
 def test_a_light_that_flickers_and_a_shutter_that_lies_are_put_right(tmp_path):

@@ -11,8 +11,10 @@ from flarewright.cli.app import run as command
 from flarewright.cli.measure_stages import STAGES, run_stages
 from flarewright.errors import OutputError
 from flarewright.io.ghost_model_file import read_ghost_model, write_ghost_model
+from flarewright.io.merged import read_run, write_run
 from flarewright.measure import stages
 from flarewright.measure.notes import note
+from flarewright.model.capture import CameraNoise
 from flarewright.model.ghost_model import GhostModel
 
 
@@ -64,6 +66,24 @@ def test_only_what_has_changed_is_done_again(tmp_path, capsys, monkeypatch):
         assert command(["measure", "find", str(tmp_path)]) == 130
     capsys.readouterr()
     assert kept() == fresh
+
+
+def test_a_light_that_is_told_later_is_written_into_what_was_made(tmp_path):
+    write(tmp_path, GHOSTS[1:2])
+    run_stages(tmp_path, STAGES, 2, None, None, False)
+    dark = {name: read_ghost_model(tmp_path / name) for name in ("found.json", "model.json", "compact.json")}
+    run = read_run(tmp_path)
+    write_run(tmp_path, run.replace(camera=CameraNoise(luminance_cd_m2=2e6, solid_angle_sr=1e-5)))
+    facts = run_stages(tmp_path, STAGES, 2, None, None, False)
+    assert [facts[stage]["kept"] for stage in STAGES] == [True] * 4
+    for name, before in dark.items():
+        now = read_ghost_model(tmp_path / name)
+        assert (now.reference.luminance_cd_m2, now.reference.solid_angle_sr) == (2e6, 1e-5)
+        assert now.replace(reference=before.reference) == before
+    # what a person has written into a model stays where the run does not tell it
+    write_run(tmp_path, run)
+    run_stages(tmp_path, STAGES, 2, None, None, False)
+    assert read_ghost_model(tmp_path / "compact.json").reference.luminance_cd_m2 == 2e6
 
 
 def test_what_is_left_beside_ghosts_is_learned_once(tmp_path):
