@@ -61,7 +61,7 @@ step_s = 600.0
 
 [[cameras]]
 name = "east stand"
-lens = "flektogon-35"   # or a lens file; or model = "camera.json", a measured flare, with unit_per_cd_m2
+lens = "flektogon-35"   # or a lens file; or model = "compact.json", a measured flare, with unit_per_cd_m2
 position_m = [60.0, 0.0, 15.0]
 aim_m = [0.0, 0.0, 0.0]
 f_number = 4.0
