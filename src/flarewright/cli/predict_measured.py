@@ -109,6 +109,8 @@ def _refuse_others(path: str) -> None:
         )
 
 
+# every light of a scene asks for the same
+@lru_cache(maxsize=8)
 def model_flare(
     model: GhostModel,
     name: str,
@@ -238,7 +240,7 @@ def model_in_scene(camera: SceneCamera, light: SceneLight, width_px: int) -> tup
     return replace(flare, over_clipping=signal, remarks=(*flare.remarks, *told, *doubt)), flare.sensor
 
 
-# every light asks for it, and the cells of a file's sprites are unpacked once
+# the cells of a file's sprites are unpacked once
 @lru_cache(maxsize=8)
 def _read(path: str, _changed_ns: int) -> GhostModel:
     from ..io.ghost_model_file import read_ghost_model
