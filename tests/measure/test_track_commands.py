@@ -46,6 +46,17 @@ def test_track_and_compress_write_small_files_and_keep_them(folder, capsys):
     assert json.loads(capsys.readouterr().out)["track"]["kept"] is False
 
 
+def test_one_ghost_is_told_as_one(tmp_path, capsys):
+    write(tmp_path, GHOSTS[:1])
+    write_ghost_model(tmp_path / "model.json", model_of(GHOSTS[:1], "a"))
+    assert command(["measure", "track", str(tmp_path), "--every", "2"]) == 0
+    assert "tracks.json: 1 ghost, 1 life\n" in capsys.readouterr().out
+    assert command(["measure", "report", str(tmp_path)]) == 0
+    assert "report.html: 12 frames, 1 ghost\n" in capsys.readouterr().out
+    assert "12 frames of 240 x 160 pixels, the light seen in 12; 1 ghost" in (tmp_path / "report.html").read_text()
+    assert "degrees, 1 ghost in the picture" in (tmp_path / "report.html").read_text()
+
+
 def told(capsys, *words):
     assert command([str(word) for word in words]) == 2
     lines = [line for line in capsys.readouterr().err.splitlines() if "error:" in line]

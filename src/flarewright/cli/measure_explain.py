@@ -55,6 +55,7 @@ def explain(
     from ..design.explain import sentences
     from ..design.search import State
     from ..io.ghost_model_file import read_ghost_model
+    from ..io.sentences import count
     from .design_target import project_of_model
 
     known = read_ghost_model(model)
@@ -80,7 +81,10 @@ def explain(
         raise FlarewrightError("no lens was found that makes an image; search longer, or give --surfaces more")
     one = judge(problem, found)
     names = [f"at {place:.2f} mm" for place in problem.objective.targets[:, 0]]
-    said = [f"{len(names)} of the model's {len(known.ghosts)} ghosts, at {angle:.3g} degrees", *sentences(one, names)]
+    said = [
+        f"{len(names)} of the model's {count(len(known.ghosts), 'ghost')}, at {angle:.3g} degrees",
+        *sentences(one, names),
+    ]
     write_text(output / "explanation.txt", "\n".join(said) + "\n")
     if as_json:
         print_json({
@@ -91,7 +95,7 @@ def explain(
         })  # fmt: skip
         return
     tell(said)
-    print(f"{output}: {len(found)} lenses, the report is report.html")
+    print(f"{output}: {count(len(found), 'lens', 'lenses')}, the report is report.html")
 
 
 def _busiest(model: GhostModel) -> float:

@@ -40,6 +40,7 @@ def replay(
     check_place(output, ".exr")
     from ..io.exr import write_exr
     from ..io.ghost_model_file import read_ghost_model, read_replay_camera
+    from ..io.sentences import count
     from ..measure.placing import brightness, constellation_and_roll
     from ..measure.replay import replay as draw
     from ..model.replay_camera import ReplayCamera
@@ -66,4 +67,4 @@ def replay(
         print_json(facts)
     else:
         place = f"{constellation:.4g} degrees, roll {roll or 0.0:.4g}"
-        print(f"{output}: {len(layers)} layers, {place}, brightness {gain:.4g}")
+        print(f"{output}: {count(len(layers), 'layer')}, {place}, brightness {gain:.4g}")

@@ -31,6 +31,7 @@ def report(
     run = read_run(folder)
     check_place(place, (".html", ".htm"))
     from ..io.ghost_model_file import read_ghost_model, read_tracks
+    from ..io.sentences import count
     from ..measure.report import strange, write_report
     from .measure_stages import COMPACT, MODEL, TRACKS
 
@@ -54,4 +55,5 @@ def report(
         ghosts = None if known is None else len(known.ghosts)
         print_json({"report": str(place), "ghosts": ghosts, "remarks": remarks})
     else:
-        print(f"{place}: {len(run.frames)} frames" + ("" if known is None else f", {len(known.ghosts)} ghosts"))
+        ghosts = "" if known is None else f", {count(len(known.ghosts), 'ghost')}"
+        print(f"{place}: {count(len(run.frames), 'frame')}{ghosts}")

@@ -196,10 +196,13 @@ def summary(run: MergedRun) -> dict[str, Any]:
 
 def words(run: MergedRun, folder: Path) -> str:
     """Say in a few lines what merging found."""
+    from ..io.sentences import count
+
     seen = sum(frame.light_found for frame in run.frames)
     (x, y), (dx, dy) = run.axis_px, run.axis_error_px
     return (
-        f"{folder}: {len(run.frames)} frames of {run.size_px[0]}x{run.size_px[1]} pixels, the light seen in {seen}; "
+        f"{folder}: {count(len(run.frames), 'frame')} of {run.size_px[0]}x{run.size_px[1]} pixels, "
+        f"the light seen in {seen}; "
         f"axis at ({x:.2f} +- {dx:.2f}, {y:.2f} +- {dy:.2f}), {run.px_per_rad:.1f} pixels per radian; "
         f"see {folder / 'merged.png'}"
     )

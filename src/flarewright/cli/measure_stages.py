@@ -28,6 +28,8 @@ COMPRESS_EPILOG = (
 )
 
 FOUND, MODEL, TRACKS, COMPACT = "found.json", "model.json", "tracks.json", "compact.json"
+# what facts are counted in, one of each
+_ONE = {"ghosts": "ghost", "lives": "life", "numbers": "number"}
 # in their order; later stages need the earlier ones
 STAGES = ("find", "fit", "track", "compress")
 
@@ -160,6 +162,7 @@ def run_stages(
         When the run cannot be read, or an earlier stage is missing.
     """
     from ..io.merged import read_run
+    from ..io.sentences import count
     from ..measure.journal import journal
     from ..measure.notes import is_current, note, note_corrections, run_digest
 
@@ -182,7 +185,7 @@ def run_stages(
             if not kept:
                 with journal(folder / f"{name}.journal", digest) as steps:
                     if steps.remembered:
-                        told(f"{name} goes on after {steps.remembered} steps that an earlier run had done")
+                        told(f"{name} goes on after {count(steps.remembered, 'step')} that an earlier run had done")
                     stage.make(job, made, steps)
                 if name == "find":
                     note_corrections(folder, told_of)
@@ -193,7 +196,7 @@ def run_stages(
                 _tell_light(run, made)
         facts[name] = {**_facts(made), "file": str(made), "kept": kept}
         if talk:
-            words = ", ".join(f"{value} {key}" for key, value in _facts(made).items())
+            words = ", ".join(count(value, _ONE[key], key) for key, value in _facts(made).items())
             print(f"{made}: {words}" + (", as before" if kept else ""))
     return facts
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..io.sentences import count
 from .candidate import Outcome
 from .identify import Identification, identify
 from .problem import Problem
@@ -97,7 +98,7 @@ def sentences(one: Explanation, names: Sequence[str]) -> list[str]:
         Of the targets.
     """
     missing = [name for name, yes in zip(names, one.explained, strict=True) if not yes]
-    said = [f"the best lens explains {sum(one.explained)} of {len(one.explained)} measured ghosts"
+    said = [f"the best lens explains {sum(one.explained)} of {count(len(one.explained), 'measured ghost')}"
             + (f" (not {', '.join(missing)})" if missing else "")
             + (f", and has {one.extra} more that were not measured" if one.extra else "")]  # fmt: skip
     known = one.known

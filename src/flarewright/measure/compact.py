@@ -11,6 +11,7 @@ from math import ceil, floor, isfinite, log10
 
 import numpy as np
 
+from ..io.sentences import count
 from ..kernels.measure_pupil import DISC_NUMBERS, FIRST_DISC, FIRST_G
 from ..model.ghost_model import AberrationGhost, Channel, Curve, Curves, GhostModel
 from ..model.ghost_tracks import GhostTrack, Tracks
@@ -81,7 +82,7 @@ def compact(
     kept = [ghost for ghost in model.ghosts if isinstance(ghost, AberrationGhost) and ghost.name in lived]
     spans = [span_of(ghost, lived[ghost.name]) for ghost in kept]
     found = [_found(ghost, span, views) for ghost, span in zip(kept, spans, strict=True)]
-    tell(0.0, f"{len(kept)} ghosts")
+    tell(0.0, count(len(kept), "ghost"))
     with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
         steps = journal or Journal()
         found = _fewer(found, kept, views, pool, steps, lambda part, words: tell(0.7 * part, words))
@@ -139,7 +140,8 @@ def _fewer(
             exchange(old.shapes[m], new.shapes[m], old, views, rest[m], pool)
         out[k] = new
         fit = new.fits[1]
-        tell((done + 1) / len(out), f"ghost {kept[k].name}: {0 if fit is None else fit.free.size} numbers a colour")
+        numbers = count(0 if fit is None else fit.free.size, "number")
+        tell((done + 1) / len(out), f"ghost {kept[k].name}: {numbers} a colour")
     return out
 
 

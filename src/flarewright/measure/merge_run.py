@@ -23,6 +23,7 @@ from ..errors import FlarewrightError, OutputError
 from ..io.atomic import write_atomically
 from ..io.merged import read_frame, read_run, write_frame, write_run
 from ..io.photo import open_photo
+from ..io.sentences import count
 from ..model.capture import OF_LIGHT, CameraNoise, Capture, FrameInfo, Matrix3, MergedFrame, MergedRun
 from .calibrate import Calibration, calibrate
 from .contradiction import refuse_contradiction
@@ -173,8 +174,8 @@ def _folder(output: Path, frames: int, size_px: tuple[int, int]) -> Path:
     needed = max(missing, 0) * size_px[0] * size_px[1] * 6 * 4
     if needed > free:
         raise OutputError(
-            f"{output} has {free / 1e9:.2g} GB left, and {missing} frames may need {needed / 1e9:.2g} GB: free some "
-            "space, choose another folder, or average pixels with --block 2"
+            f"{output} has {free / 1e9:.2g} GB left, and {count(missing, 'frame')} may need {needed / 1e9:.2g} GB: "
+            "free some space, choose another folder, or average pixels with --block 2"
         )
     return output
 

@@ -11,6 +11,7 @@ from math import log
 import numpy as np
 from numpy.typing import NDArray
 
+from ..io.sentences import count
 from ..kernels.measure_pupil import BELOW, FIRST_G, FIRST_I
 from ..model.ghost_model import Blades
 from .evenly import evenly
@@ -242,7 +243,7 @@ class _Fallen:
         self._first = max(self._first, score)
         if self._first > self._least:
             self._part = max(self._part, 1.0 - log(score / self._least) / log(self._first / self._least))
-        self._progress(self._part, f"{found} ghosts, votes {score:.1f} of at least {self._least:g}")
+        self._progress(self._part, f"{count(found, 'ghost')}, votes {score:.1f} of at least {self._least:g}")
 
 
 def _candidates(

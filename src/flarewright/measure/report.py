@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ..errors import FlarewrightError
 from ..io.atomic import write_atomically
+from ..io.sentences import count
 from ..model.capture import MergedRun
 from ..model.ghost_model import GhostModel
 from ..model.ghost_tracks import Tracks
@@ -69,8 +70,9 @@ def write_report(
     if not run.frames:
         raise FlarewrightError(f"{folder} holds a run without frames: merge again with flarewright measure merge")
     seen = sum(frame.light_found for frame in run.frames)
-    lead = f"{len(run.frames)} frames of {run.size_px[0]} x {run.size_px[1]} pixels, the light seen in {seen}; " + (
-        "no ghosts were looked for yet" if model is None else f"{len(model.ghosts)} ghosts"
+    lead = (
+        f"{count(len(run.frames), 'frame')} of {run.size_px[0]} x {run.size_px[1]} pixels, the light seen in {seen}; "
+        + ("no ghosts were looked for yet" if model is None else count(len(model.ghosts), "ghost"))
     )
     chosen = evenly(run.frames, _FRAMES)
     sections = [remark_list(remarks), _captures(folder, run), _geometry(run)]

@@ -11,6 +11,7 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
+from ..io.sentences import count
 from ..model.capture import FrameInfo, MergedFrame, MergedRun
 from ..model.ghost_model import GhostModel
 from ..model.layer import Layer
@@ -170,7 +171,8 @@ def _outlined(frame: MergedFrame, ghosts: GhostModel, place: tuple[float, float]
         # a dark rim, for it may stand on light
         names += [Text(at[0] + i, at[1] + j, name, _NAME_PX, "#101418", "middle") for i in (-1, 1) for j in (-1, 1)]
         names.append(Text(*at, name, _NAME_PX, colour, "middle"))
-    words = Text(6.0, height + 15.0, f"{frame.constellation_deg:.2f} degrees, {len(taken)} ghosts in the picture", 11.0)
+    told = f"{frame.constellation_deg:.2f} degrees, {count(len(taken), 'ghost')} in the picture"
+    words = Text(6.0, height + 15.0, told, 11.0)
     return Figure(width, height + 22, f"Ghosts at {frame.constellation_deg:.2f} degrees",
                   (Picture(0.0, 0.0, width, height, pixels), *names, words))  # fmt: skip
 

@@ -10,6 +10,7 @@ from functools import partial
 
 import numpy as np
 
+from ..io.sentences import count
 from ..kernels.measure_pupil import FIRST_DISC, FIRST_I
 from ..model.ghost_model import AberrationGhost, Blades
 from .find import rims_of
@@ -102,7 +103,8 @@ def settle(
             progress((turn + (done + 1) / len(ghosts)) / how.rounds, f"ghost {done + 1} of {len(ghosts)}")
         before = len(ghosts)
         ghosts = lit(ghosts, views, pool=pool)
-        tell(f"round {turn + 1}: {len(ghosts)} of {before} ghosts are needed")
+        needed = "is needed" if len(ghosts) == 1 else "are needed"
+        tell(f"round {turn + 1}: {len(ghosts)} of {count(before, 'ghost')} {needed}")
     return [ghosts[k] for k in by_light(ghosts)]
 
 

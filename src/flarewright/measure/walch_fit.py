@@ -15,6 +15,7 @@ from typing import cast
 
 import numpy as np
 
+from ..io.sentences import count
 from ..kernels.measure_bezier import BORDER, INNER, NUMBERS
 from ..model.capture import MergedRun
 from ..model.ghost_model import BezierGhost, GhostModel
@@ -89,15 +90,15 @@ def fit_as_walch(
     whole = [draw(bare, view.constellation_deg, view.roll_deg, view.size_px) for view in seen]
     spots = [{spot.name: spot for spot in _spots(bare, view)} for view in seen]
     steps, found = journal or Journal(), []
-    count = threads or os.cpu_count() or 1
+    at_once = threads or os.cpu_count() or 1
     names = [ghost.name for ghost in rough.ghosts]
 
     def follow(name: str) -> list[Floats]:
         return list(_followed(name, bare, seen, whole, spots, rounds))
 
-    with ThreadPoolExecutor(count) as pool:
-        for begin in range(0, len(names), count):
-            some = names[begin : begin + count]
+    with ThreadPoolExecutor(at_once) as pool:
+        for begin in range(0, len(names), at_once):
+            some = names[begin : begin + at_once]
 
             def look(some: Sequence[str] = some) -> list[list[Floats]]:
                 return list(pool.map(follow, some))
@@ -107,8 +108,8 @@ def fit_as_walch(
                     tell(f"ghost {name}: too few pictures show it, left out")
                     continue
                 found.append(_compressed(name, angles, numbers))
-                tell(f"ghost {name}: {len(angles)} pictures")
-            progress(min(begin + count, len(names)) / len(names), f"ghost {some[-1]}")
+                tell(f"ghost {name}: {count(len(angles), 'picture')}")
+            progress(min(begin + at_once, len(names)) / len(names), f"ghost {some[-1]}")
     told = "fitted with Walch's primitive and by his gradient descent (2017), for comparison"
     model = cast(GhostModel, bare.replace(ghosts=tuple(found), remarks=(*rough.remarks, told)))
     return with_rest(model, views, threads, journal)
