@@ -57,9 +57,10 @@ def test_a_ghost_that_was_fitted_for_two_is_taken_apart(side):
     one = fitted(shape(side * 68.0, 15.0, 1.0), shown)
     assert nearest(small, [one], shown) < 0.5
     told: list[str] = []
-    two = taken_apart([one], shown, tell=told.append)
+    two = taken_apart([one], shown, factor=2.0, tell=told.append)
     assert len(two) == 2
-    assert len(told) == 1
+    # told as in pictures twice as wide
+    assert told == [f"a ghost at speed {2.0 * one.shapes[1].numbers[0]:.0f} px was fitted for two"]
     assert nearest(small, two, shown) > 0.8
     assert nearest(large, two, shown) > 0.8
     # the first is the one that was there, with what it knew of its other colours

@@ -106,8 +106,11 @@ def test_a_core_and_its_body_become_one_ghost():
     body, core = shape(-50.0, 29.0, 0.4), shape(-49.0, 8.0, 0.4)
     pieces = lit([found(body), found(core)], shown, needed=0.0)
     assert len(pieces) == 2
-    one = joined(pieces, shown)
+    told: list[str] = []
+    one = joined(pieces, shown, factor=2.0, tell=told.append)
     assert len(one) == 1
+    # told as in pictures twice as wide
+    assert told == ["a ghost at speed -98 px is a part of one of size 58 px"]
     assert misfit(lit(one, shown), shown) < 0.5 * misfit(pieces, shown)
 
 

@@ -1,6 +1,7 @@
 """Find and fit as stages of a run's folder, from the command line too."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -70,6 +71,18 @@ def test_a_ghost_that_goes_along_with_the_light_is_found(tmp_path):
         found, true = draw(model, float(angle), 0.0, SIZE)[..., 1], render(planted, view)
         drawn, there = (light > 0.5 * np.median(light[light > 1e-3]) for light in (found, true))
         assert np.count_nonzero(drawn & there) > 0.93 * np.count_nonzero(drawn | there)
+
+
+def test_a_search_in_halved_pictures_tells_of_the_captures_pixels(tmp_path, monkeypatch):
+    write(tmp_path, GHOSTS[1:2])
+    monkeypatch.setattr(stages, "SEARCH_WIDTH", SIZE[0] // 2)
+    told: list[str] = []
+    found = find_ghosts(tmp_path, read_run(tmp_path), most=1, tell=told.append)
+    speed, size = (float(re.search(f"^ghost 1: .*{word} (-?[0-9.]+) px", told[0])[1]) for word in ("speed", "size"))
+    # as planted, and as the file has it
+    assert speed == pytest.approx(55.0, abs=2.0)
+    assert size == pytest.approx(14.0, abs=1.5)
+    assert found.ghosts[0].green.f[0] == pytest.approx(speed, abs=2.0)
 
 
 def test_a_fit_joins_what_was_found_in_pieces(tmp_path):

@@ -53,6 +53,7 @@ def taken_apart(
     views: Sequence[View],
     *,
     iris: Blades | None = None,
+    factor: float = 1.0,
     pool: ThreadPoolExecutor | None = None,
     tell: Callable[[str], None] = lambda _: None,
     journal: Journal | None = None,
@@ -66,6 +67,8 @@ def taken_apart(
         Glow taken off; what shall not count has infinite variance.
     iris : Blades, optional
         Rims that the other may have, beside a round one.
+    factor : float
+        Pixels of the captures in one of these views: what is told is in the captures'.
     pool : executor, optional
     tell : callable
         Gets a line for each.
@@ -93,7 +96,7 @@ def taken_apart(
         exchange(old.shapes[lead], out[k].shapes[lead], old, views, rests[lead], pool)
         lay_over(other.shapes[lead], other, views, rests[lead], -1.0, pool)
         others.append(other)
-        tell(f"a ghost at speed {old.shapes[1].numbers[0]:.0f} px was fitted for two")
+        tell(f"a ghost at speed {factor * old.shapes[1].numbers[0]:.0f} px was fitted for two")
     return [*out, *others]
 
 

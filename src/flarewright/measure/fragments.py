@@ -35,6 +35,7 @@ def joined(
     ghosts: Sequence[Found],
     views: Sequence[View],
     *,
+    factor: float = 1.0,
     pool: ThreadPoolExecutor | None = None,
     tell: Callable[[str], None] = lambda _: None,
 ) -> list[Found]:
@@ -45,6 +46,8 @@ def joined(
     ghosts : sequence of Found
     views : sequence of View
         Glow taken off; what shall not count has infinite variance.
+    factor : float
+        Pixels of the captures in one of these views: what is told is in the captures'.
     pool : executor, optional
     tell : callable
         Gets a line for each pair that became one.
@@ -72,8 +75,8 @@ def joined(
                 continue
             out = [each for each in out if each is not ghost and each is not other] + [one]
             rest = rest_of(out, views, 1, pool)
-            size = abs(other.shapes[1].numbers[FIRST_G])
-            tell(f"a ghost at speed {ghost.shapes[1].numbers[0]:.0f} px is a part of one of size {size:.0f} px")
+            size, speed = abs(other.shapes[1].numbers[FIRST_G]), ghost.shapes[1].numbers[0]
+            tell(f"a ghost at speed {factor * speed:.0f} px is a part of one of size {factor * size:.0f} px")
             break
     return out
 

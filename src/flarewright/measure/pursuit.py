@@ -98,6 +98,7 @@ def pursue(
     first: Sequence[Candidate] = (),
     rest: Sequence[Pixels] | None = None,
     iris: Blades | None = None,
+    factor: float = 1.0,
     pool: ThreadPoolExecutor | None = None,
     tell: Callable[[str], None] = lambda _: None,
     progress: Callable[[float, str], None] = lambda _part, _words: None,
@@ -118,6 +119,8 @@ def pursue(
         What views show beside ghosts that are known already and stay as they are; None: none is.
     iris : Blades, optional
         Rims that ghosts may have, beside round ones.
+    factor : float
+        Pixels of the captures in one of these views: what is told is in the captures'.
     pool : executor, optional
     tell : callable
         Gets a line for each ghost.
@@ -173,7 +176,7 @@ def pursue(
                     continue
                 found.append(ghost)
                 low = [one for one in low if one is not trial]
-                tell(f"ghost {len(found)}: {_described(ghost, trial)}")
+                tell(f"ghost {len(found)}: {_described(ghost, trial, factor)}")
                 left = left_beside(left, [ghost], shown, 1, pool)
                 # those tried beside it did not know of it: they are tried again
                 queue = [one for one in queue if one.score >= _NEARLY * trials[0].score and not _stale(one, trial)]
@@ -193,8 +196,8 @@ def pursue(
     return respanned(found, shown, [left], [0] * len(found), pool)[0] if len(found) > asked_at else found
 
 
-def _described(ghost: Found, trial: Candidate) -> str:
-    numbers = ghost.shapes[1].numbers
+def _described(ghost: Found, trial: Candidate, factor: float) -> str:
+    numbers = factor * ghost.shapes[1].numbers
     rim = "round" if trial.blades is None else f"{trial.blades.count} blades"
     return (
         f"speed {numbers[0]:.0f} px, size {abs(numbers[FIRST_G]):.1f} px, {rim}, votes {trial.score:.1f}, views "

@@ -93,17 +93,19 @@ def find_ghosts(
         times, small = _for_search(dimmed)
         seen = _mixed_for_search(searched, dimmed, shares(dimmed), pool)
         iris = iris_of(dim.star)
-        pointed = [candidate(each, views, run, looked=len(seen), factor=2.0**times) for each in known.add]
+        factor = 2.0**times
+        pointed = [candidate(each, views, run, looked=len(seen), factor=factor) for each in known.add]
         measured = [all_known(view.variance) for view in small]
         found = pursue(
-            seen, measured, most=most, first=pointed, iris=iris, pool=pool, tell=tell, progress=progress,
-            journal=journal,
+            seen, measured, most=most, first=pointed, iris=iris, factor=factor, pool=pool, tell=tell,
+            progress=progress, journal=journal,
         )  # fmt: skip
-        found = joined(lit(found, seen, pool=pool), seen, pool=pool, tell=tell)
+        found = joined(lit(found, seen, pool=pool), seen, factor=factor, pool=pool, tell=tell)
         found = lit(begun_anew(found, seen, pool=pool, journal=journal), small, pool=pool)
-        found = lit(taken_apart(found, small, iris=iris, pool=pool, tell=tell, journal=journal), small, pool=pool)
+        found = taken_apart(found, small, iris=iris, factor=factor, pool=pool, tell=tell, journal=journal)
+        found = lit(found, small, pool=pool)
     tell_pointed(known, pointed, found, tell)
-    whole = [_sized(ghost, 2.0**times) for ghost in found]
+    whole = [_sized(ghost, factor) for ghost in found]
     ghosts = to_model(whole, searched)
     glow = [ghost.name for ghost, left in zip(ghosts, glow_left(whole, searched), strict=True) if left]
     for name in glow:
@@ -229,8 +231,8 @@ def _more(
     ghosts = [_among(_sized(ghost, 0.5**times), numbers) for ghost in known]
     left = np.stack([rest_of(ghosts, small, m, pool) for m in range(CHANNELS)], axis=-1)
     found = pursue(
-        seen, measured, most=max(most, 0), rest=[mixture(each, share) for each in left], iris=iris, pool=pool,
-        tell=tell, progress=progress, journal=journal,
+        seen, measured, most=max(most, 0), rest=[mixture(each, share) for each in left], iris=iris,
+        factor=2.0**times, pool=pool, tell=tell, progress=progress, journal=journal,
     )  # fmt: skip
     return [replace(_sized(ghost, 2.0**times), first=numbers[ghost.first], last=numbers[ghost.last]) for ghost in found]
 
@@ -244,7 +246,8 @@ def _among(ghost: Found, numbers: Sequence[int]) -> Found:
 def _whole(ghosts: Sequence[Found], views: Sequence[View], pool: ThreadPoolExecutor, tell: Tell) -> list[Found]:
     """Join ghosts that are one, at the search's resolution; a fit shows better than a search what belongs together."""
     times, small = _for_search(views)
-    found = joined([_sized(ghost, 0.5**times) for ghost in ghosts], small, pool=pool, tell=tell)
+    smaller = [_sized(ghost, 0.5**times) for ghost in ghosts]
+    found = joined(smaller, small, factor=2.0**times, pool=pool, tell=tell)
     return [_sized(ghost, 2.0**times) for ghost in found]
 
 
