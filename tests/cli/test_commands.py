@@ -271,6 +271,33 @@ def test_what_stops_a_render_is_one_sentence_and_leaves_nothing(capsys, monkeypa
     assert list(folder.iterdir()) == []
 
 
+@pytest.mark.parametrize(
+    ("words", "goes_on"),
+    [
+        ("measure run list.csv -o run", True),
+        ("measure merge list.csv -o run", True),
+        ("measure find run", True),
+        ("measure fit run --by walch", True),
+        ("measure track run", False),
+        ("measure compress run", False),
+        ("measure replay model.json --constellation 3 -o a.exr", False),
+        ("predict heliar-tronnier -o page.html", True),
+        ("predict heliar-tronnier -o page.html --glare", False),
+        ("predict heliar-tronnier --cache=kept.npz --glare", True),
+        ("predict heliar-tronnier", False),
+        ("render heliar-tronnier --light 1,1 -o a.exr", False),
+    ],
+)
+def test_ctrl_c_tells_of_commands_that_go_on(capsys, monkeypatch, words, goes_on):
+    def stopped(**_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("flarewright.cli.app.app", stopped)
+    assert run(words.split()) == 130
+    more = ", and the same command goes on where it was" if goes_on else ""
+    assert capsys.readouterr().err == f"flarewright: interrupted; nothing was left half-written{more}\n"
+
+
 def test_a_real_draft_render(capsys, folder):
     summary = call_json(
         capsys, "render", "heliar-tronnier", "--light", "8,4", "--quality", "draft", "--wavelengths", "3", "--size",

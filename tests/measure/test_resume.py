@@ -143,10 +143,11 @@ def test_stages_stopped_half_way_end_with_the_same_bytes(tmp_path, capsys, monke
         with monkeypatch.context() as patch:
             patch.setattr(journals.Journal, "step", stopping)
             assert command(["measure", stage, str(folder), "--every", "3"]) == 130
+        said = "flarewright: interrupted; nothing was left half-written, and the same command goes on where it was\n"
+        assert capsys.readouterr().err.endswith(said)
         lines = (folder / f"{stage}.journal").read_text().splitlines()
         assert len(lines) == 1 + done // 2
         assert json.loads(lines[0])["journal"] == 9
-        capsys.readouterr()
         assert command(["measure", stage, str(folder), "--every", "3"]) == 0
         assert f"goes on after {done // 2} steps" in capsys.readouterr().err
         assert (folder / file).read_bytes() == made[stage]

@@ -123,7 +123,7 @@ def test_an_interrupted_prediction_goes_on_beside_its_output(tmp_path, capsys, m
     assert run(arguments) == 130
     assert not page.exists()
     assert (tmp_path / "h.partial.npz").is_file()
-    capsys.readouterr()
+    assert "the same command goes on where it was" in capsys.readouterr().err
     drawn = 0
     monkeypatch.setattr(table, "luminance", lambda picture: counted(picture, -1))
     assert run([*arguments, "--json"]) == 0

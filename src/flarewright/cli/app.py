@@ -208,7 +208,8 @@ def _call(words: list[str]) -> int:
             raise
         code = 130
     if code == 130:
-        print("flarewright: interrupted; nothing was left half-written", file=sys.stderr)
+        more = ", and the same command goes on where it was" if _goes_on(words) else ""
+        print(f"flarewright: interrupted; nothing was left half-written{more}", file=sys.stderr)
     return code if isinstance(code, int) else 0
 
 
@@ -228,6 +229,18 @@ def _keeping_interrupts(swallowed: list[object]) -> Iterator[None]:
         yield
     finally:
         sys.unraisablehook = hook
+
+
+def _goes_on(words: Sequence[str]) -> bool:
+    """Tell whether a command that was stopped goes on where it was when it is given again."""
+    match list(words[:2]):
+        case ["measure", "run" | "merge" | "find" | "fit"]:
+            return True
+        case ["predict", *_]:
+            flags = {word.split("=")[0] for word in words}
+            # what was drawn is kept beside the page until all is drawn; veiling glare comes after that
+            return "--cache" in flags or (bool({"-o", "--output"} & flags) and "--glare" not in flags)
+    return False
 
 
 def _smaller(words: Sequence[str]) -> str:
