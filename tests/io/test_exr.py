@@ -98,6 +98,21 @@ def test_one_layer_makes_an_ordinary_single_part_file(tmp_path):
     assert data[5] & 0x10 == 0  # bit 12 of the version field: multi-part
 
 
+@pytest.mark.parametrize("count", [1, 2])
+def test_a_full_disk_is_told_of_the_wanted_file(tmp_path, layers, count):
+    resource = pytest.importorskip("resource", reason="only POSIX limits how long files may become")
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (2000, before[1]))
+    try:
+        with pytest.raises(OutputError) as told:
+            write_exr(tmp_path / "a.exr", layers[:count], SIZE, pixel_type="float", metadata={})
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    where = tmp_path / "a.exr"
+    assert str(told.value) == f"cannot write {where}: file too large; check the free space and the permissions"
+    assert not list(tmp_path.iterdir())
+
+
 def test_what_cannot_be_written_or_read_is_one_sentence(tmp_path, layers):
     with pytest.raises(OutputError, match="does not exist"):
         write_exr(tmp_path / "no" / "a.exr", layers, SIZE, pixel_type="half", metadata={})

@@ -144,8 +144,11 @@ def write_exr(
         try:
             OpenEXR.File(parts).write(str(temporary))
         except RuntimeError as error:
-            # The library has no exception of its own; what it cannot do with a valid header is reach the file.
-            raise OSError(str(error).rstrip(".")) from error
+            # The library has no exception of its own; what it cannot do with a valid header is reach the file. It says
+            # so of the temporary name, behind which it gives the reason.
+            told = str(error).rstrip(".")
+            reason = told.partition(f'"{temporary}". ')[2]
+            raise OSError(reason or told.replace(str(temporary), str(path))) from error
 
     write_atomically(Path(path), write)
     if not clipped:
