@@ -36,6 +36,11 @@ def test_merge_tells_what_it_found_and_run_takes_it_up(listed, tmp_path, capsys)
     assert told["stages"] == ["merge"]
     assert told["merge"]["frames"] == told["merge"]["light_found"] == len(ANGLES)
     assert told["merge"]["px_per_rad"] == pytest.approx(400.0, rel=0.01)
+    # how the horizon tilts is told where the light is off the axis, and at which angles
+    frames = {frame.constellation_deg: frame.horizon_deg for frame in read_run(folder).frames}
+    assert len(told["merge"]["horizon_deg"]) == len(ANGLES) - sum(abs(angle) <= 1.0 for angle in frames) > 2
+    for angle, tilt in zip(told["merge"]["horizon_constellation_deg"], told["merge"]["horizon_deg"], strict=True):
+        assert frames[angle] == tilt
     assert (folder / "merged.png").stat().st_size > 1000
     before = (folder / "frames" / "frame-003.exr").stat().st_mtime_ns
     assert run(["measure", "run", str(listed), "-o", str(folder), "--stages", "merge"]) == 0

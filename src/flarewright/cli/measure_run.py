@@ -187,6 +187,7 @@ def summary(run: MergedRun) -> dict[str, Any]:
         "axis_error_px": list(run.axis_error_px),
         "px_per_rad": run.px_per_rad,
         "horizon_deg": [frame.horizon_deg for frame in off_axis],
+        "horizon_constellation_deg": [frame.constellation_deg for frame in off_axis],
         "largest_angle_correction_deg": max(abs(f.constellation_deg - f.nominal_deg) for f in run.frames),
         "clipped_share": max(frame.clipped_share for frame in run.frames),
         "camera": run.camera.model_dump(exclude={"schema_version"}),
