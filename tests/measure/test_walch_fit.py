@@ -39,6 +39,16 @@ def test_his_way_follows_a_ghost_from_picture_to_picture(tmp_path, capsys):
     assert any("Walch" in remark for remark in his.remarks)
     errors = [missed(his, planted, float(angle)) for angle in ANGLES[1:9]]
     assert max(errors) < 0.3
+    # `run` takes the same way, and refuses to go on with what cannot be tracked before it does anything
+    words = ["measure", "run", str(tmp_path), "-o", str(tmp_path), "--every", "3", "--by", "walch"]
+    for stages, remedy in ((), "--stages merge,find,fit"), (("--stages", "find"), "drop --by"):
+        assert command([*words, *stages]) == 2
+        told = capsys.readouterr()
+        assert told.out == ""
+        assert told.err.count("\n") == 1
+        assert remedy in told.err
+    assert command([*words, "--stages", "find,fit", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["fit"]["kept"]
     # asked again nothing is done; it has its numbers over the constellation already; the other way is another model
     assert fitted("--by", "walch")[0]["kept"]
     assert command(["measure", "track", str(tmp_path)]) == 2

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -9,7 +10,7 @@ import typer
 
 from ..errors import FlarewrightError
 from .common import print_json, progress_bar, tell
-from .measure_stages import CorrectionsFile, Every
+from .measure_stages import By, CorrectionsFile, Every
 
 if TYPE_CHECKING:
     from ..measure.merge_run import MergeSettings
@@ -82,6 +83,7 @@ def run(
     upright: Upright = False,
     every: Every = 1,
     corrections: CorrectionsFile = None,
+    by: By = "joint",
     threads: Threads = None,
     as_json: Json = False,
 ) -> None:
@@ -90,6 +92,7 @@ def run(
     _check_there(captures)
     if corrections is not None and "find" not in chosen:
         raise FlarewrightError("--corrections are for the stage find, which --stages leaves out: add it, or drop them")
+    _check_way(by, chosen)
     settings = _settings(block, white_balance, upright)
     facts: dict[str, Any] = {"folder": str(output), "stages": chosen}
     if "merge" in chosen:
@@ -102,7 +105,7 @@ def run(
     if later:
         from .measure_stages import run_stages
 
-        facts.update(run_stages(output, later, every, corrections, threads, not as_json))
+        facts.update(run_stages(output, later, every, corrections, threads, not as_json, by))
     if as_json:
         print_json(facts)
 
@@ -159,6 +162,20 @@ def _merge(
         )
         write_overview(output, merged)
     return merged
+
+
+def _check_way(by: str, chosen: Sequence[str]) -> None:
+    """Refuse a way to fit that leads to no model, or to one that the chosen stages cannot go on with."""
+    if by == "joint":
+        return
+    if "fit" not in chosen:
+        raise FlarewrightError(f"--by {by} is for the stage fit, which --stages leaves out: add it, or drop --by")
+    fitting = [stage for stage in chosen if stage not in ("track", "compress")]
+    if fitting != list(chosen):
+        raise FlarewrightError(
+            f"--by {by} writes ghosts that have their numbers over the constellation already, so they are not tracked "
+            f"or compressed: choose --stages {','.join(fitting)}"
+        )
 
 
 def _check_there(captures: Path) -> None:
