@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from camera_raw import write_dng
 
+from flarewright.cli.app import run
 from flarewright.errors import FlarewrightError
 from flarewright.io.captures import AngleRule, parse_rule, read_camera, read_captures
 
@@ -98,7 +99,7 @@ def test_what_is_no_rule_is_told(text):
         (HEAD + "0.npy,0,1,100\n9.npy,1,1,100,8\n", "9.npy does not exist"),
         (HEAD + "0.npy,0,-1,100,8\n", "line 2: exposure_s"),
         (HEAD + "0.npy,0,1,100,8\n0.npy,1,1,100,8\n", "listed twice"),
-        (HEAD + "0.npy,0,,100,8\n", "does not tell its exposure_s"),
+        (HEAD + "0.npy,0,,100,8\n", "0.npy in line 2 does not tell its exposure_s"),
         (HEAD + "0.npy,,1,100,8\n", "constellation_deg is missing"),
         (HEAD + "0.npy,0,1,100,8\n1.npy,2,1,100,8\n2.npy,1,1,100,8\n", "out of order: 1 deg follows 2 deg"),
         (HEAD + "0.npy,0,1,100,8\n1.npy,0,2,100,8\n2.npy,1,1,100,8\n", "1 deg lacks the exposure of 2 s"),
@@ -123,7 +124,26 @@ def test_mistakes_are_told_with_their_place(folder, text, word):
 def test_one_mistake_is_told_once(folder):
     with pytest.raises(FlarewrightError) as told:
         listed(folder, "file,constellation_deg\n0.npy,\n9.npy,0\n1.npy,1\n")
-    assert len(told.value.problems) == 3
+    assert [line.partition(";")[0] for line in told.value.problems] == [
+        f"line 3: {folder / '9.npy'} does not exist: check the path and the spelling",
+        "2 of 3 photographs do not tell their exposure_s, the first is 0.npy in line 2",
+    ]
+
+
+def test_a_folder_whose_files_tell_no_exposure_is_one_sentence(folder, capsys):
+    count = len(list(folder.glob("*.npy")))
+    assert run(["measure", "merge", str(folder), "--angles", "0+1", "-o", str(folder / "run")]) == 2
+    assert capsys.readouterr().err == (
+        f"flarewright: error: {folder}: {count} of {count} photographs do not tell their exposure_s, the first is "
+        "0.npy; list them in a captures.csv with file and exposure_s\n"
+    )
+    for path in folder.glob("*.npy"):
+        path.rename(path.with_suffix(".dng"))
+    assert run(["measure", "merge", str(folder), "--angles", "0+1", "-o", str(folder / "run")]) == 2
+    # damaged ones are told one by one, each named once
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) == count + 1
+    assert all(line.count(".dng") == 1 for line in lines)
 
 
 def test_an_f_number_may_be_unknown_or_rounded(folder):

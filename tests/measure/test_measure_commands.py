@@ -101,7 +101,7 @@ def test_pictures_without_light_and_a_list_without_exposures_are_told(listed, tm
     command = ("measure", "merge", listed, "-o", tmp_path / "run")
     text = listed.read_text()
     listed.write_text(text.replace("exposure_s", "focal_mm"))
-    assert "does not tell its exposure_s" in refused(capsys, *command)
+    assert "12 of 12 photographs do not tell their exposure_s" in refused(capsys, *command)
     listed.write_text(text)
     rng = np.random.default_rng(3)
     for path in tmp_path.glob("*.npy"):

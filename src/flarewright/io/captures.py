@@ -99,11 +99,14 @@ def read_captures(path: Path, rule: AngleRule | None = None) -> tuple[Capture, .
     rows = _folder_rows(path, rule) if path.is_dir() else _csv_rows(path)
     problems: list[str] = []
     filled = [_with_exif(row, folder, where, problems) for where, row in rows]
+    problems += _untold(
+        rows, filled, "list them in a captures.csv with file and exposure_s" if path.is_dir() else "give it in the list"
+    )
     if not problems and rule is not None:
         filled = _with_angles(filled, rule, path)
     found = []
     for (where, _), row in zip(rows, filled, strict=True):
-        if row is None:
+        if row is None or "exposure_s" not in row:
             continue
         try:
             found.append(Capture.model_validate(row))
@@ -201,8 +204,10 @@ def _with_exif(row: dict[str, Any], folder: Path, where: str, problems: list[str
     if not row.get("file"):
         problems.append(f"{where}: file is missing")
         return None
+    # in a folder a row is called as its file, which what is told names already
+    place = "" if where == row["file"] else f"{where}: "
     if not file.is_file():
-        problems.append(f"{where}: {file} does not exist: check the path and the spelling")
+        problems.append(f"{place}{file} does not exist: check the path and the spelling")
         return None
     told = {"exposure_s", "iso", "f_number"} <= row.keys()
     if told and "focal_mm" in row:
@@ -213,13 +218,27 @@ def _with_exif(row: dict[str, Any], folder: Path, where: str, problems: list[str
         if told:
             # merging tells of a damaged photograph
             return row
-        problems.append(f"{where}: {error}")
+        problems.append(f"{place}{error}")
         return None
-    full = {**facts, **row}
-    if "exposure_s" not in full:
-        problems.append(f"{where}: {row['file']} does not tell its exposure_s; give it in the list")
-        return None
-    return full
+    return {**facts, **row}
+
+
+def _untold(
+    rows: Sequence[tuple[str, dict[str, Any]]], filled: Sequence[dict[str, Any] | None], remedy: str
+) -> list[str]:
+    """Say in one sentence of which photographs neither the list nor they themselves tell the exposure."""
+    where = [
+        (place, str(row["file"]))
+        for (place, _), row in zip(rows, filled, strict=True)
+        if row is not None and "exposure_s" not in row
+    ]
+    if not where:
+        return []
+    place, file = where[0]
+    first = file if place == file else f"{file} in {place}"
+    if len(where) == 1:
+        return [f"{first} does not tell its exposure_s; {remedy}"]
+    return [f"{len(where)} of {len(rows)} photographs do not tell their exposure_s, the first is {first}; {remedy}"]
 
 
 def _with_angles(rows: Sequence[dict[str, Any] | None], rule: AngleRule, path: Path) -> list[dict[str, Any] | None]:
