@@ -234,7 +234,7 @@ def _keeping_interrupts(swallowed: list[object]) -> Iterator[None]:
 def _goes_on(words: Sequence[str]) -> bool:
     """Tell whether a command that was stopped goes on where it was when it is given again."""
     match list(words[:2]):
-        case ["measure", "run" | "merge" | "find" | "fit"]:
+        case ["measure", "run" | "merge" | "find" | "fit" | "track" | "compress"]:
             return True
         case ["predict", *_]:
             flags = {word.split("=")[0] for word in words}

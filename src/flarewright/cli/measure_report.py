@@ -55,5 +55,5 @@ def report(
         ghosts = None if known is None else len(known.ghosts)
         print_json({"report": str(place), "ghosts": ghosts, "remarks": remarks})
     else:
-        ghosts = "" if known is None else f", {count(len(known.ghosts), 'ghost')}"
-        print(f"{place}: {count(len(run.frames), 'frame')}{ghosts}")
+        counted = "" if known is None else f", {count(len(known.ghosts), 'ghost')}"
+        print(f"{place}: {count(len(run.frames), 'frame')}{counted}")

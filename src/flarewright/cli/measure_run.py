@@ -10,7 +10,7 @@ import typer
 
 from ..errors import FlarewrightError
 from .common import print_json, progress_bar, tell
-from .measure_stages import By, CorrectionsFile, Every
+from .measure_stages import By, CorrectionsFile, Every, NoResidual
 
 if TYPE_CHECKING:
     from ..measure.merge_run import MergeSettings
@@ -84,6 +84,7 @@ def run(
     every: Every = 1,
     corrections: CorrectionsFile = None,
     by: By = "joint",
+    no_residual: NoResidual = False,
     threads: Threads = None,
     as_json: Json = False,
 ) -> None:
@@ -92,6 +93,10 @@ def run(
     _check_there(captures)
     if corrections is not None and "find" not in chosen:
         raise FlarewrightError("--corrections are for the stage find, which --stages leaves out: add it, or drop them")
+    if no_residual and not {"fit", "compress"} & set(chosen):
+        raise FlarewrightError(
+            "--no-residual is for the stages fit and compress, which --stages leaves out: add one, or drop it"
+        )
     _check_way(by, chosen)
     settings = _settings(block, white_balance, upright)
     facts: dict[str, Any] = {"folder": str(output), "stages": chosen}
@@ -105,7 +110,7 @@ def run(
     if later:
         from .measure_stages import run_stages
 
-        facts.update(run_stages(output, later, every, corrections, threads, not as_json, by))
+        facts.update(run_stages(output, later, every, corrections, threads, not as_json, by, not no_residual))
     if as_json:
         print_json(facts)
 

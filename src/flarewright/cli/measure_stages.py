@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -50,6 +49,14 @@ By = Annotated[
         "picture (2017), for comparison; slower by far, and what it writes is not tracked or compressed again.",
     ),
 ]
+NoResidual = Annotated[
+    bool,
+    typer.Option(
+        "--no-residual",
+        help="Leave out what ghosts, star and halo do not explain: a file of some 100 kB, not 20 MB, and a replay "
+        "without the layer residual.",
+    ),
+]
 Threads = Annotated[int | None, typer.Option(min=1, help="All cores when left out.")]
 TrackThreads = Annotated[
     int | None, typer.Option(min=1, help="Two at most, forward and backward; so many when left out.")
@@ -68,9 +75,16 @@ def find(
     _one("find", folder, every, corrections, threads, as_json)
 
 
-def fit(folder: Folder, every: Every = 1, by: By = "joint", threads: Threads = None, as_json: Json = False) -> None:
+def fit(
+    folder: Folder,
+    every: Every = 1,
+    by: By = "joint",
+    no_residual: NoResidual = False,
+    threads: Threads = None,
+    as_json: Json = False,
+) -> None:
     """Fit the ghosts of DIR/found.json to all merged frames at once, and write DIR/model.json; goes on when stopped."""
-    _one("fit", folder, every, None, threads, as_json, by)
+    _one("fit", folder, every, None, threads, as_json, by, not no_residual)
 
 
 def track(folder: Folder, every: Every = 1, threads: TrackThreads = None, as_json: Json = False) -> None:
@@ -78,9 +92,15 @@ def track(folder: Folder, every: Every = 1, threads: TrackThreads = None, as_jso
     _one("track", folder, every, None, threads, as_json)
 
 
-def compress(folder: Folder, every: Every = 1, threads: Threads = None, as_json: Json = False) -> None:
+def compress(
+    folder: Folder,
+    every: Every = 1,
+    no_residual: NoResidual = False,
+    threads: Threads = None,
+    as_json: Json = False,
+) -> None:
     """Leave out of DIR/model.json what foretells nothing, add what the tracks tell, and write DIR/compact.json."""
-    _one("compress", folder, every, None, threads, as_json)
+    _one("compress", folder, every, None, threads, as_json, residual=not no_residual)
 
 
 def _one(
@@ -91,21 +111,27 @@ def _one(
     threads: int | None,
     as_json: bool,
     by: str = "joint",
+    residual: bool = True,
 ) -> None:
-    facts = run_stages(folder, [stage], every, corrections, threads, not as_json, by)
+    facts = run_stages(folder, [stage], every, corrections, threads, not as_json, by, residual)
     if as_json:
         print_json(facts)
 
 
 @dataclass(frozen=True)
 class _Job:
-    """What every stage is told; with `whole` a fit shall also tell what is left beside the ghosts."""
+    """What every stage is told.
+
+    A model shall also tell what is left beside the ghosts when that is wanted (`residual`), but it is learned only by
+    a stage that is told the `whole`.
+    """
 
     folder: Path
     run: MergedRun
     every: int
     corrections: Corrections | None
     by: str
+    residual: bool
     whole: bool
     threads: int | None
     told: Callable[[str], None]
@@ -146,6 +172,7 @@ def run_stages(
     threads: int | None,
     talk: bool,
     by: str = "joint",
+    residual: bool = True,
 ) -> dict[str, Any]:
     """Run stages in a run's folder; one is not repeated while what it is made from is the same.
 
@@ -179,7 +206,8 @@ def run_stages(
         made = folder / stage.file
         with progress_bar() as begin:
             # what is left is learned anew for the small model: once is enough
-            job = _Job(folder, run, every, told_of, by, "compress" not in stages, threads, told, begin(name))
+            whole = residual and (name == "compress" or "compress" not in stages)
+            job = _Job(folder, run, every, told_of, by, residual, whole, threads, told, begin(name))
             digest = run_digest(folder, run, stage.given(job))
             kept = is_current(folder, name, digest, made)
             if not kept:
@@ -190,8 +218,8 @@ def run_stages(
                 if name == "find":
                     note_corrections(folder, told_of)
                 note(folder, name, digest)
-            elif name == "fit" and job.whole:
-                _complete(job, made)
+            elif name in ("fit", "compress"):
+                _as_wanted(job, made)
             if stage.file != TRACKS:
                 _tell_light(run, made)
         facts[name] = {**_facts(made), "file": str(made), "kept": kept}
@@ -270,22 +298,24 @@ def _fit(job: _Job, made: Path, steps: Journal) -> None:
     from ..measure.walch_fit import fit_as_walch
 
     rough = _model(job.folder / FOUND)
-    way = partial(fit_ghosts, rest=job.whole) if job.by == "joint" else fit_as_walch
+    way = fit_ghosts if job.by == "joint" else fit_as_walch
     model = way(
-        job.folder, job.run, rough, every=job.every, threads=job.threads, tell=job.told, progress=job.progress,
-        journal=steps,
+        job.folder, job.run, rough, every=job.every, rest=job.whole, threads=job.threads, tell=job.told,
+        progress=job.progress, journal=steps,
     )  # fmt: skip
     write_ghost_model(made, model)
 
 
-def _complete(job: _Job, made: Path) -> None:
-    """Learn what is left beside a model's ghosts when that was left to the small model."""
+def _as_wanted(job: _Job, made: Path) -> None:
+    """Learn what is left beside a kept model's ghosts when it lacks that, or drop it when it is not wanted."""
     from ..io.ghost_model_file import write_ghost_model
     from ..measure.reading import read_views
     from ..measure.rest_fit import with_rest
 
     model = _model(made)
-    if not model.sprites:
+    if model.sprites and not job.residual:
+        write_ghost_model(made, model.replace(sprites=()))
+    elif job.whole and not model.sprites:
         write_ghost_model(made, with_rest(model, read_views(job.folder, job.run, job.every), job.threads))
 
 
@@ -319,7 +349,7 @@ def _compress(job: _Job, made: Path, steps: Journal) -> None:
 
     small = compress_ghosts(
         job.folder, job.run, _model(job.folder / MODEL), read_tracks(job.folder / TRACKS), every=job.every,
-        threads=job.threads, tell=job.progress, journal=steps,
+        rest=job.whole, threads=job.threads, tell=job.progress, journal=steps,
     )  # fmt: skip
     write_ghost_model(made, small)
 

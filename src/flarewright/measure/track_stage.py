@@ -81,11 +81,32 @@ def compress_ghosts(
     tracks: Tracks,
     *,
     every: int = 1,
+    rest: bool = True,
     threads: int | None = None,
     tell: Tell = lambda _part, _words: None,
     journal: Journal | None = None,
 ) -> GhostModel:
     """Make a model small, judged by the frames of a run; see `compact.compact`.
+
+    Parameters
+    ----------
+    folder : Path
+    run : MergedRun
+    model : GhostModel
+        From `fit_ghosts`.
+    tracks : Tracks
+        Of its ghosts, from `track_ghosts`.
+    every : int
+        As for `track_ghosts`.
+    rest : bool
+        Also learn what is left beside the ghosts; without, the model has no sprites.
+    threads : int, optional
+    tell : callable
+        Gets the finished part and words.
+
+    Returns
+    -------
+    GhostModel
 
     Raises
     ------
@@ -103,7 +124,10 @@ def compress_ghosts(
     small = compact(model, tracks, dim, threads=threads, tell=tell, journal=journal)
     # they need not be there beside what `with_rest` makes
     del dim
-    return with_rest(small, views, threads, journal)
+    if rest:
+        return with_rest(small, views, threads, journal)
+    out: GhostModel = small.replace(sprites=())
+    return out
 
 
 def _check_size(run: MergedRun, model: GhostModel) -> None:

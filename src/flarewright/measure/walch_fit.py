@@ -53,6 +53,7 @@ def fit_as_walch(
     *,
     every: int = 1,
     rounds: int = 60,
+    rest: bool = True,
     threads: int | None = None,
     tell: Tell = lambda _: None,
     progress: Progress = lambda _part, _words: None,
@@ -70,6 +71,8 @@ def fit_as_walch(
         As for `find_ghosts`.
     rounds : int
         Of `walch.descend`, for each picture.
+    rest : bool
+        Also learn what is left beside the ghosts.
     threads : int, optional
     tell, progress, journal
         As for `find_ghosts`.
@@ -77,7 +80,7 @@ def fit_as_walch(
     Returns
     -------
     GhostModel
-        Of Bezier ghosts, with halo, star and what is left as any other. A ghost that too few pictures show is left out.
+        Of Bezier ghosts, with halo and star as any other. A ghost that too few pictures show is left out.
 
     Raises
     ------
@@ -112,7 +115,7 @@ def fit_as_walch(
             progress(min(begin + at_once, len(names)) / len(names), f"ghost {some[-1]}")
     told = "fitted with Walch's primitive and by his gradient descent (2017), for comparison"
     model = cast(GhostModel, bare.replace(ghosts=tuple(found), remarks=(*rough.remarks, told)))
-    return with_rest(model, views, threads, journal)
+    return with_rest(model, views, threads, journal) if rest else model
 
 
 def _spots(model: GhostModel, view: View) -> tuple[Spot, ...]:

@@ -1,0 +1,73 @@
+"""A model without what is left beside its ghosts: one small file that replays, is reported and predicts."""
+
+import json
+
+import numpy as np
+import pytest
+from planted_run import GHOSTS, views
+from test_compact import model_of
+from test_stages import ANGLES, write
+
+from flarewright.cli.app import run as command
+from flarewright.io.exr import read_exr
+from flarewright.io.ghost_model_file import read_ghost_model, write_ghost_model
+from flarewright.measure.fit import render
+
+PLANTED = GHOSTS[:2]
+# bytes: some 4 kB a ghost, and what is left of six small pictures of nothing but noise
+SMALL, LARGE = 12_000, 30_000
+
+
+@pytest.fixture
+def folder(tmp_path):
+    write(tmp_path, PLANTED)
+    write_ghost_model(tmp_path / "found.json", model_of(PLANTED, "ab"))
+    return tmp_path
+
+
+def test_the_file_is_small_and_every_command_takes_it(folder, capsys):
+    def made(*words):
+        assert command([*words, "--every", "2", "--json"]) == 0
+        facts = json.loads(capsys.readouterr().out)
+        return [facts[stage]["kept"] for stage in ("fit", "track", "compress") if stage in facts]
+
+    def size(name):
+        return (folder / name).stat().st_size
+
+    fit = ["measure", "fit", str(folder)]
+    whole = ["measure", "run", str(folder), "-o", str(folder), "--stages", "fit,track,compress"]
+    assert made(*whole, "--no-residual") == [False] * 3
+    assert size("model.json") < SMALL
+    assert size("compact.json") < SMALL
+    small = {name: (folder / name).read_bytes() for name in ("model.json", "compact.json")}
+    # it draws the ghosts that were planted, and nothing that it calls residual
+    angle, out = float(ANGLES[5]), folder / "o.exr"
+    model = str(folder / "compact.json")
+    assert command(["measure", "replay", model, "--constellation", repr(angle), "-o", str(out)]) == 0
+    layers = {layer.name: layer.pixels for layer in read_exr(out).layers}
+    assert "residual" not in layers
+    view = views((), angles=[angle])[0]
+    truth = sum(render(ghost, view) for ghost in PLANTED)
+    assert np.sqrt(((layers["beauty"][..., 1] - truth) ** 2).mean()) < 0.02 * np.sqrt((truth**2).mean())
+    assert command(["measure", "report", str(folder)]) == 0
+    page = (folder / "report.html").read_text()
+    assert all(f"<h2>{title}</h2>" in page for title in ("Replay", "Ghosts", "Tracks"))
+    capsys.readouterr()
+    assert command(["predict", model, "--samples", "12", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert max(told["statistics"]["mean"]["values"]) > 0.0
+    # asked for, what is left is learned for what is kept, and dropped again
+    assert made(*fit) == [True]
+    assert made("measure", "compress", str(folder)) == [True]
+    assert min(size("model.json"), size("compact.json")) > LARGE
+    assert read_ghost_model(folder / "compact.json").sprites
+    assert made(*whole, "--no-residual") == [True] * 3
+    for name, data in small.items():
+        assert (folder / name).read_bytes() == data
+    assert made("measure", "compress", str(folder), "--no-residual") == [True]
+    assert made(*fit, "--no-residual") == [True]
+
+
+def test_a_run_without_stages_that_learn_it_is_refused(folder, capsys):
+    assert command(["measure", "run", str(folder), "-o", str(folder), "--stages", "track", "--no-residual"]) == 2
+    assert "--no-residual is for the stages fit and compress" in capsys.readouterr().err
