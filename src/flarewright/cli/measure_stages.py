@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from ..errors import FlarewrightError
-from ..model.capture import OF_LIGHT
 from .common import print_json, progress_bar, tell
 
 if TYPE_CHECKING:
@@ -233,6 +232,7 @@ def _tell_light(run: MergedRun, made: Path) -> None:
     """Write what is known by now of the light and of clipping into a model, which knows no ghost better for it."""
     from ..io.ghost_model_file import write_ghost_model
     from ..measure.stages import reference_of
+    from ..model.capture import OF_LIGHT
 
     model, known = _model(made), reference_of(run)
     told = known.model_dump(include=OF_LIGHT, exclude_none=True)
@@ -243,6 +243,8 @@ def _tell_light(run: MergedRun, made: Path) -> None:
 
 def _measured(model: GhostModel) -> str:
     """Return a model as later stages are told of it: how bright the light was is nothing to them."""
+    from ..model.capture import OF_LIGHT
+
     dark = model.model_copy(update={"reference": model.reference.replace(**dict.fromkeys(OF_LIGHT))})
     return dark.model_dump_json(exclude={"reference": {"clipping"}})
 
