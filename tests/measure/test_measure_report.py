@@ -18,7 +18,7 @@ from flarewright.io.merged import write_frame, write_run
 from flarewright.measure.replay import replay
 from flarewright.measure.report import write_report
 from flarewright.measure.report_frames import outlines_section, replays_section
-from flarewright.model.capture import FrameInfo, MergedFrame, MergedRun
+from flarewright.model.capture import CameraNoise, FrameInfo, MergedFrame, MergedRun
 from flarewright.model.ghost_model import Halo
 
 
@@ -48,13 +48,18 @@ def test_a_replay_is_laid_on_its_frame_at_both_sides_and_any_roll(tmp_path, caps
         infos.append(info)
         variance = np.full((height, width, 3), spread**2, np.float32)
         write_frame(tmp_path, MergedFrame(info, noisy.astype(np.float32), variance))
+    light = CameraNoise(luminance_cd_m2=2e4, solid_angle_sr=1e-3)
     write_run(
-        tmp_path, MergedRun(size_px=(width, height), frames=tuple(infos), axis_px=model.axis_px, px_per_rad=170.0)
-    )
+        tmp_path,
+        MergedRun(
+            size_px=(width, height), frames=tuple(infos), axis_px=model.axis_px, px_per_rad=170.0, camera=light
+        ),
+    )  # fmt: skip
     write_ghost_model(tmp_path / "model.json", model)
     assert run(["measure", "report", str(tmp_path), "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["ghosts"] == 2
     text = (tmp_path / "report.html").read_text()
+    assert "20000 cd/m², 0.001 sr: 20 lx" in text
     decibels = [float(found) for found in re.findall(r"replayed, (-?[\d.]+) dB<", text)]
     assert len(decibels) == 4
     # what is left is the noise of the frames, which a misplaced ghost would drown

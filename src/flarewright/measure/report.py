@@ -129,6 +129,7 @@ def _captures(folder: Path, run: MergedRun) -> str:
         ("exposures of a frame", ", ".join(f"{value:.4g} s" for value in run.frames[0].exposures_s)),
         ("their light over what they say", _ratios(folder, run)),
         ("drift of the light, frame by frame", _drift(run)),
+        ("luminance and solid angle of the light", _light(run)),
         ("ISO, f-number", f"{run.reference_iso:g}, {_known(run.reference_f_number)}"),
         ("black and white level", f"{_known(camera.black_level)}, {_known(camera.white_level)}"),
         ("electrons per unit", _with_error(camera.electrons_per_unit, camera.electrons_per_unit_error)),
@@ -166,6 +167,13 @@ def _drift(run: MergedRun) -> str:
         return "none is taken out"
     error = max(info.gain_error for info in run.frames)
     return f"{min(gains):.4f} to {max(gains):.4f}, each ± {error:.2g} at most"
+
+
+def _light(run: MergedRun) -> str:
+    luminance, angle = run.camera.luminance_cd_m2, run.camera.solid_angle_sr
+    if luminance is None or angle is None:
+        return "not told"
+    return f"{number(luminance)} cd/m², {number(angle)} sr: {number(luminance * angle)} lx"
 
 
 def _known(value: float | None) -> str:
