@@ -12,6 +12,7 @@ from flarewright.cli.app import run as command
 from flarewright.io.exr import read_exr
 from flarewright.io.ghost_model_file import read_ghost_model, write_ghost_model
 from flarewright.measure.fit import render
+from flarewright.measure.journal import Journal
 
 PLANTED = GHOSTS[:2]
 # bytes: some 4 kB a ghost, and what is left of six small pictures of nothing but noise
@@ -25,7 +26,7 @@ def folder(tmp_path):
     return tmp_path
 
 
-def test_the_file_is_small_and_every_command_takes_it(folder, capsys):
+def test_the_file_is_small_and_every_command_takes_it(folder, capsys, monkeypatch):
     def made(*words):
         assert command([*words, "--every", "2", "--json"]) == 0
         facts = json.loads(capsys.readouterr().out)
@@ -57,11 +58,26 @@ def test_the_file_is_small_and_every_command_takes_it(folder, capsys):
     told = json.loads(capsys.readouterr().out)
     assert max(told["statistics"]["mean"]["values"]) > 0.0
     # asked for, what is left is learned for what is kept, and dropped again
-    assert made(*fit) == [True]
-    assert made("measure", "compress", str(folder)) == [True]
+    assert made(*fit) == [False]
+    with monkeypatch.context() as patch:
+        done = 0
+
+        def stopping(self, make, real=Journal.step):
+            nonlocal done
+            done += 1
+            if done == 3:
+                raise KeyboardInterrupt
+            return real(self, make)
+
+        patch.setattr(Journal, "step", stopping)
+        assert command(["measure", "compress", str(folder), "--every", "2"]) == 130
+    capsys.readouterr()
+    assert (folder / "compress.journal").read_text().count("\n") == 3
+    assert made("measure", "compress", str(folder)) == [False]
+    assert not (folder / "compress.journal").exists()
     assert min(size("model.json"), size("compact.json")) > LARGE
     assert read_ghost_model(folder / "compact.json").sprites
-    assert made(*whole, "--no-residual") == [True] * 3
+    assert made(*whole, "--no-residual") == [False, True, False]
     for name, data in small.items():
         assert (folder / name).read_bytes() == data
     assert made("measure", "compress", str(folder), "--no-residual") == [True]

@@ -68,6 +68,12 @@ def test_a_journal_of_something_else_or_cut_short_is_not_believed(tmp_path):
     (tmp_path / "j").write_text(text[:-3])
     assert interrupted(tmp_path / "j", "a", []) == 2
     assert interrupted(tmp_path / "j", "b", []) == 0
+    # a line that is JSON and no step is where it ends
+    assert interrupted(tmp_path / "j", "b", [1.0, 2.0, 3.0]) == 0
+    lines = (tmp_path / "j").read_text().splitlines(keepends=True)
+    for damaged in ('{"is": "Nothing"}\n', '{"array": 3}\n', '{"is": "Blades", "told": {"count": 0}}\n'):
+        (tmp_path / "j").write_text("".join([*lines[:2], damaged, *lines[3:]]))
+        assert interrupted(tmp_path / "j", "b", []) == 1
     (tmp_path / "j").write_bytes(b"\xff\xfe")
     assert interrupted(tmp_path / "j", "b", []) == 0
     with pytest.raises(TypeError, match="cannot hold"), journal(tmp_path / "k", "b") as steps:

@@ -70,9 +70,10 @@ def test_mistakes_are_told_in_a_sentence(folder, tmp_path_factory, capsys):
     model = read_ghost_model(folder / "model.json")
     tracks = (folder / "tracks.json").read_text()
     (folder / "tracks.json").write_text(tracks.replace('"name": "a"', '"name": "c"'))
-    assert "of other ghosts than the model's" in told(capsys, "measure", "compress", folder)
+    assert "of other ghosts than the model's" in told(capsys, "measure", "compress", folder, "--every", "3")
+    assert "from other frames or with another --every" in told(capsys, "measure", "compress", folder)
     (folder / "tracks.json").write_text(tracks.replace('"state": "seen"', '"state": "guessed"'))
-    assert "state" in told(capsys, "measure", "compress", folder)
+    assert "state" in told(capsys, "measure", "compress", folder, "--every", "3")
     (folder / "tracks.json").write_text("{")
     assert "is not valid JSON" in told(capsys, "measure", "compress", folder)
     write_ghost_model(folder / "model.json", model.replace(size_px=(99, 98)))
@@ -91,3 +92,27 @@ def test_a_file_of_another_version_is_told(folder, capsys):
     data = json.loads((folder / "model.json").read_text())
     (folder / "model.json").write_text(json.dumps({**data, "schema_version": 7}))
     assert "schema_version" in told(capsys, "measure", "track", folder)
+
+
+def test_what_is_of_an_earlier_model_is_neither_compressed_nor_reported(folder, capsys):
+    for stage in ("track", "compress"):
+        assert command(["measure", stage, str(folder), "--every", "3"]) == 0
+    # another model whose ghosts have the same names
+    model = read_ghost_model(folder / "model.json")
+    swapped = [ghost.replace(name={"a": "b", "b": "a"}[ghost.name]) for ghost in model.ghosts]
+    write_ghost_model(folder / "model.json", model.replace(ghosts=tuple(swapped)))
+    assert "tracks.json was made from another model.json" in told(capsys, "measure", "compress", folder, "--every", "3")
+    write_ghost_model(folder / "found.json", model)
+    assert command(["measure", "fit", str(folder), "--every", "3", "--no-residual"]) == 0
+    capsys.readouterr()
+    assert command(["measure", "report", str(folder), "--json"]) == 0
+    remarks = json.loads(capsys.readouterr().out)["remarks"]
+    for name in ("compact.json", "tracks.json"):
+        assert any(f"{name} was made before model.json was made anew" in remark for remark in remarks)
+    assert "<h2>Tracks</h2>" not in (folder / "report.html").read_text()
+    stages = ["--stages", "fit,track,compress", "--every", "3", "--no-residual"]
+    assert command(["measure", "run", str(folder), "-o", str(folder), *stages]) == 0
+    capsys.readouterr()
+    assert command(["measure", "report", str(folder), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["remarks"] == []
+    assert "<h2>Tracks</h2>" in (folder / "report.html").read_text()

@@ -3,13 +3,18 @@
 import json
 
 import numpy as np
+import pytest
 from planted_run import GHOSTS, views
 from test_stages import ANGLES, write
 
 from flarewright.cli.app import run as command
 from flarewright.io.ghost_model_file import read_ghost_model
 from flarewright.measure.fit import render
+from flarewright.measure.journal import Journal
+from flarewright.measure.numbers import bezier_numbers, with_bounded_controls
 from flarewright.measure.replay import draw
+from flarewright.measure.walch import circle
+from flarewright.measure.walch_fit import _compressed
 
 
 def missed(model, ghosts, angle):
@@ -18,6 +23,45 @@ def missed(model, ghosts, angle):
     truth = sum(render(ghost, view) for ghost in ghosts)
     error = draw(model, angle, 0.0, view.size_px)[..., 1] - truth
     return float(np.sqrt((error**2).sum() / (truth**2).sum()))
+
+
+def test_both_sides_of_the_axis_share_their_polynomials():
+    angles = np.array([-12.0, -9.0, -6.0, -3.0, -1.0, 1.0, 3.0, 6.0, 9.0, 12.0])
+    numbers = np.tile(circle(0.0, 20.0, np.ones(3), np.ones(3)), (angles.size, 1))
+    # pictures are turned so that the light is on the right
+    numbers[:, 0] = 4.0 * np.abs(angles) + 3.0
+    ghost = _compressed("1", angles, numbers)
+    for angle in (*angles, 0.0, 7.5, -7.5):
+        assert bezier_numbers(ghost, float(angle))[0] == pytest.approx(4.0 * abs(angle) + 3.0, abs=1e-6)
+    one_sided = _compressed("1", angles[:4], numbers[:4])
+    assert bezier_numbers(one_sided, -10.0)[0] == pytest.approx(43.0, abs=1e-6)
+    assert len(ghost.numbers[0]) == len(one_sided.numbers[0]) == 2
+
+
+def test_control_points_bend_no_border_sharper_than_is_drawn():
+    wild = circle(0.0, 20.0, np.ones(3), np.ones(3))
+    wild[5:9] = 90.0, -4.0, 25.0, 31.0
+    assert with_bounded_controls(wild)[5:9].tolist() == [30.0, 0.0, 25.0, 30.0]
+    tame = with_bounded_controls(circle(0.0, 20.0, np.ones(3), np.ones(3)))
+    assert tame.tolist() == circle(0.0, 20.0, np.ones(3), np.ones(3)).tolist()
+
+
+def test_a_stopped_fit_goes_on_with_other_threads(tmp_path, capsys, monkeypatch):
+    write(tmp_path, GHOSTS[:2])
+    assert command(["measure", "find", str(tmp_path), "--every", "4"]) == 0
+    words = ["measure", "fit", str(tmp_path), "--by", "walch", "--every", "4", "--no-residual"]
+    real = Journal.step
+
+    def stopping(self, make):
+        real(self, make)
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Journal, "step", stopping)
+        assert command([*words, "--threads", "2"]) == 130
+    assert command([*words, "--threads", "1"]) == 0
+    assert len(read_ghost_model(tmp_path / "model.json").ghosts) == 2
+    capsys.readouterr()
 
 
 def test_his_way_follows_a_ghost_from_picture_to_picture(tmp_path, capsys):

@@ -52,7 +52,7 @@ NoResidual = Annotated[
     bool,
     typer.Option(
         "--no-residual",
-        help="Leave out what ghosts, star and halo do not explain: a file of some 100 kB, not 20 MB, and a replay "
+        help="Leave out what ghosts, star and halo do not explain: a file of some 150 kB, not 20 MB, and a replay "
         "without the layer residual.",
     ),
 ]
@@ -190,7 +190,7 @@ def run_stages(
     from ..io.merged import read_run
     from ..io.sentences import count
     from ..measure.journal import journal
-    from ..measure.notes import is_current, note, note_corrections, run_digest
+    from ..measure.notes import is_current, note, note_corrections, note_outdated, outdated, run_digest
 
     run = read_run(folder)
     told_of = _corrections(folder, corrections) if "find" in stages else None
@@ -217,8 +217,12 @@ def run_stages(
                 if name == "find":
                     note_corrections(folder, told_of)
                 note(folder, name, digest)
-            elif name in ("fit", "compress"):
-                _as_wanted(job, made)
+                later = {
+                    other for other in STAGES[STAGES.index(name) + 1 :] if (folder / _STAGES[other].file).is_file()
+                }
+            else:
+                kept, later = _as_wanted(job, name, digest, made), set()
+            note_outdated(folder, (outdated(folder) | later) - {name})
             if stage.file != TRACKS:
                 _tell_light(run, made)
         facts[name] = {**_facts(made), "file": str(made), "kept": kept}
@@ -308,17 +312,31 @@ def _fit(job: _Job, made: Path, steps: Journal) -> None:
     write_ghost_model(made, model)
 
 
-def _as_wanted(job: _Job, made: Path) -> None:
-    """Learn what is left beside a kept model's ghosts when it lacks that, or drop it when it is not wanted."""
+def _as_wanted(job: _Job, name: str, digest: str, made: Path) -> bool:
+    """Learn what is left beside a kept model's ghosts when it lacks that, or drop it when it is not wanted.
+
+    Returns
+    -------
+    bool
+        Whether the file is as it was.
+    """
     from ..io.ghost_model_file import write_ghost_model
+    from ..measure.journal import journal
     from ..measure.reading import read_views
     from ..measure.rest_fit import with_rest
 
+    if name not in ("fit", "compress"):
+        return True
     model = _model(made)
     if model.sprites and not job.residual:
         write_ghost_model(made, model.replace(sprites=()))
     elif job.whole and not model.sprites:
-        write_ghost_model(made, with_rest(model, read_views(job.folder, job.run, job.every), job.threads))
+        with journal(job.folder / f"{name}.journal", f"{digest}, what is left") as steps:
+            views = read_views(job.folder, job.run, job.every)
+            write_ghost_model(made, with_rest(model, views, job.threads, steps))
+    else:
+        return True
+    return False
 
 
 def _track_given(job: _Job) -> dict[str, object]:
@@ -340,9 +358,15 @@ def _track(job: _Job, made: Path, steps: Journal) -> None:
 
 def _compress_given(job: _Job) -> dict[str, object]:
     from ..io.ghost_model_file import read_tracks
+    from ..measure.notes import noted_other, run_digest
 
-    tracks = read_tracks(job.needed(TRACKS, "track"))
-    return {**_track_given(job), "tracks": tracks.model_dump_json()}
+    tracks, given = read_tracks(job.needed(TRACKS, "track")), _track_given(job)
+    if noted_other(job.folder, "track", run_digest(job.folder, job.run, given)):
+        raise FlarewrightError(
+            f"{job.folder / TRACKS} was made from another {MODEL}, from other frames or with another --every: run "
+            f"flarewright measure track {job.folder} again, or measure run, which does what is needed"
+        )
+    return {**given, "tracks": tracks.model_dump_json()}
 
 
 def _compress(job: _Job, made: Path, steps: Journal) -> None:

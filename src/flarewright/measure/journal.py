@@ -142,14 +142,18 @@ def _read(path: Path, head: dict[str, Any]) -> list[Any]:
         lines = path.read_text("utf-8").splitlines(keepends=True)
     except (OSError, UnicodeDecodeError):
         return []
-    found = []
+    found: list[Any] = []
     for line in lines:
         if not line.endswith("\n"):
             break
         try:
-            found.append(json.loads(line))
-        except ValueError:
+            one = json.loads(line)
+            # the first is no step
+            if found:
+                _unpacked(one)
+        except (ValueError, KeyError, TypeError):
             break
+        found.append(one)
     return found[1:] if found and found[0] == head else []
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 
 from pydantic import ValidationError
@@ -15,7 +15,7 @@ from ..model.capture import OF_LIGHT, MergedRun
 from ..model.corrections import Corrections
 
 NOTES = "stages.json"
-_CORRECTIONS = "corrections"
+_CORRECTIONS, _OUTDATED = "corrections", "outdated"
 # raise when the same frames give other ghosts
 _VERSION = 1
 
@@ -64,6 +64,22 @@ def note(folder: Path, stage: str, digest: str) -> None:
         temporary.write_text(text, "utf-8")
 
     write_atomically(folder / NOTES, write)
+
+
+def noted_other(folder: Path, stage: str, digest: str) -> bool:
+    """Tell whether it is noted that a stage's file was made from something else than a digest's."""
+    return _noted(folder).get(stage, digest) != digest
+
+
+def note_outdated(folder: Path, stages: Collection[str]) -> None:
+    """Note whose files were made before what they are made from was made anew; raises as `note`."""
+    if set(stages) != outdated(folder):
+        note(folder, _OUTDATED, ",".join(sorted(stages)))
+
+
+def outdated(folder: Path) -> set[str]:
+    """Return the stages whose files are noted to be of an earlier model."""
+    return set(filter(None, _noted(folder).get(_OUTDATED, "").split(",")))
 
 
 def note_corrections(folder: Path, corrections: Corrections | None) -> None:

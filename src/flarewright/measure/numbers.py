@@ -28,6 +28,8 @@ Floats = NDArray[np.float64]
 # of lateral colour's numbers these are written where the others are not needed
 _FEW_LATERAL = 2
 NUMBERS = BELOW + BELOW_NUMBERS
+# farthest control points of a Bezier ghost, times its extent and height; a circle's are at 0.55
+MOST_CONTROL = 1.5
 
 
 def channel_numbers(channel: Channel, blades: Blades | None) -> Floats:
@@ -109,16 +111,41 @@ def _written(numbers: Floats, least: int) -> int:
     return few if numbers[LATERAL:few].any() else least
 
 
+def away_from_axis(span_deg: tuple[float, float]) -> tuple[float, float]:
+    """Return between which angles from the axis a range of constellations lies; it may reach over the axis."""
+    low, high = span_deg
+    return max(low, -high, 0.0), max(abs(low), abs(high))
+
+
 def bezier_numbers(ghost: BezierGhost, constellation_deg: float) -> Floats:
-    """Return a Bezier ghost's 19 numbers at a constellation."""
-    low, high = ghost.visible_deg
+    """Return a Bezier ghost's 19 numbers at a constellation: on both sides of the axis the same."""
+    low, high = away_from_axis(ghost.visible_deg)
     half = 0.5 * (high - low) or 1.0
-    z = (constellation_deg - 0.5 * (low + high)) / half
+    z = (abs(constellation_deg) - 0.5 * (low + high)) / half
     numbers = [float(np.polynomial.polynomial.polyval(z, coefficients)) for coefficients in ghost.numbers]
     # what a polynomial may not bring below 0: height, falloffs, exponents, levels
     for k in (2, *range(9, 19)):
         numbers[k] = max(numbers[k], 0.0)
-    return np.array(numbers)
+    return with_bounded_controls(np.array(numbers))
+
+
+def with_bounded_controls(numbers: Floats) -> Floats:
+    """Return a Bezier ghost's numbers with control points that bend its border no sharper than a drawing can follow.
+
+    Parameters
+    ----------
+    numbers : ndarray, shape (19,)
+
+    Returns
+    -------
+    ndarray, shape (19,)
+        Control points at most `MOST_CONTROL` times as far along as the extent and across as the height, none behind.
+    """
+    out = numbers.copy()
+    _, height, left, right = numbers[1:5]
+    for at, side in ((5, left), (6, height), (7, right), (8, height)):
+        out[at] = min(max(out[at], 0.0), MOST_CONTROL * max(side, 0.0))
+    return out
 
 
 def ten_terms(u: Floats, v: Floats, w: Floats) -> Floats:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..kernels.measure_bezier import BORDER, INNER, NUMBERS, bezier_window, draw_bezier, draw_beziers
-from .numbers import Floats
+from .numbers import Floats, with_bounded_controls
 
 # how much the edges' part of the cost counts
 EDGES = 4.0
@@ -115,7 +115,7 @@ def descend(
         trial = numbers.copy()
         trial[at : at + 3 if at >= BORDER else at + 1] += by
         trial[2:5], trial[9:] = np.maximum(trial[2:5], 0.5), np.maximum(trial[9:], 1e-6)
-        return trial
+        return with_bounded_controls(trial)
 
     here = look(numbers)
     for _ in range(rounds):
@@ -187,6 +187,7 @@ def fit_bezier(
         step = np.linalg.solve(matrix + damping * np.diag(np.diag(matrix)), side)
         trial = numbers + step
         trial[2:5], trial[9:13] = np.maximum(trial[2:5], 0.5), np.maximum(trial[9:13], 0.05)
+        trial = with_bounded_controls(trial)
         there, new_matrix, new_side = look(trial)
         if there < here:
             gained, numbers, here, matrix, side = here - there, trial, there, new_matrix, new_side

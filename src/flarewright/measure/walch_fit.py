@@ -22,7 +22,7 @@ from ..model.ghost_model import BezierGhost, GhostModel
 from .compress import compress
 from .dimmed import beside
 from .journal import Journal
-from .numbers import Floats
+from .numbers import Floats, away_from_axis
 from .reading import read_views
 from .replay import draw
 from .rest_fit import with_rest
@@ -40,6 +40,8 @@ _WIDE = 96
 _AROUND, _ROOM = 0.25, 8
 # part of the window that must have been measured
 _MEASURED = 0.7
+# ghosts that are one step of a journal, however many threads there are
+_AT_ONCE = 8
 # pictures without which a ghost has no life, and the radius of the smallest, pixels
 _FEWEST, _SMALLEST = 3, 0.5
 # so many numbers are lengths, the first ones
@@ -93,15 +95,14 @@ def fit_as_walch(
     whole = [draw(bare, view.constellation_deg, view.roll_deg, view.size_px) for view in seen]
     spots = [{spot.name: spot for spot in _spots(bare, view)} for view in seen]
     steps, found = journal or Journal(), []
-    at_once = threads or os.cpu_count() or 1
     names = [ghost.name for ghost in rough.ghosts]
 
     def follow(name: str) -> list[Floats]:
         return list(_followed(name, bare, seen, whole, spots, rounds))
 
-    with ThreadPoolExecutor(at_once) as pool:
-        for begin in range(0, len(names), at_once):
-            some = names[begin : begin + at_once]
+    with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
+        for begin in range(0, len(names), _AT_ONCE):
+            some = names[begin : begin + _AT_ONCE]
 
             def look(some: Sequence[str] = some) -> list[list[Floats]]:
                 return list(pool.map(follow, some))
@@ -112,7 +113,7 @@ def fit_as_walch(
                     continue
                 found.append(_compressed(name, angles, numbers))
                 tell(f"ghost {name}: {count(len(angles), 'picture')}")
-            progress(min(begin + at_once, len(names)) / len(names), f"ghost {some[-1]}")
+            progress(min(begin + _AT_ONCE, len(names)) / len(names), f"ghost {some[-1]}")
     told = "fitted with Walch's primitive and by his gradient descent (2017), for comparison"
     model = cast(GhostModel, bare.replace(ghosts=tuple(found), remarks=(*rough.remarks, told)))
     return with_rest(model, views, threads, journal) if rest else model
@@ -186,9 +187,10 @@ def _coloured(numbers: Floats, wanted: Floats, green: Floats) -> Floats:
 
 
 def _compressed(name: str, constellation_deg: Floats, numbers: Floats) -> BezierGhost:
-    """Turn each number into a polynomial over the constellation."""
+    """Turn each number into a polynomial over the constellation, which both sides of the axis share."""
     span = float(constellation_deg.min()), float(constellation_deg.max())
-    curves = [compress(constellation_deg, values, np.ones(values.size), span) for values in numbers.T]
+    away, ends = np.abs(constellation_deg), away_from_axis(span)
+    curves = [compress(away, values, np.ones(values.size), ends) for values in numbers.T]
     return BezierGhost(
         name=name, numbers=tuple(curve.coefficients for curve in curves), visible_deg=span,
         uncertainty=tuple(curve.deviation for curve in curves),
