@@ -162,6 +162,8 @@ def test_the_camera_file_is_checked(tmp_path):
     assert read_camera(path).electrons_per_unit == 2.5
     path.write_text('{"luminance_cd_m2": 2e6, "solid_angle_sr": 1e-5}')
     assert (read_camera(path).luminance_cd_m2, read_camera(path).solid_angle_sr) == (2e6, 1e-5)
+    path.write_text('{"luminance_cd_m2": 2e6, "solid_angle_sr": 6.283}')
+    assert read_camera(path).solid_angle_sr == 6.283
     for text, word in (
         ("{", "not JSON"),
         ('{"gain": 1}', "gain"),
@@ -170,6 +172,7 @@ def test_the_camera_file_is_checked(tmp_path):
         ('{"luminance_cd_m2": 2e6}', "luminance_cd_m2 and solid_angle_sr of the light go together; give both or none"),
         ('{"luminance_cd_m2": 0, "solid_angle_sr": 1e-5}', "luminance_cd_m2"),
         ('{"luminance_cd_m2": 2e6, "solid_angle_sr": 1e999}', "solid_angle_sr"),
+        ('{"luminance_cd_m2": 2e6, "solid_angle_sr": 6.284}', "solid_angle_sr: 6.284 is more than a light in front"),
     ):
         path.write_text(text)
         with pytest.raises(FlarewrightError, match=word):

@@ -6,12 +6,12 @@ Pixels: x to the right, y down, the top left corner of the picture is (0, 0), th
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import cos, radians, sin
+from math import cos, pi, radians, sin
 from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, StrictBool, model_validator
+from pydantic import Field, StrictBool, field_validator, model_validator
 
 from .base import Frozen
 
@@ -88,7 +88,8 @@ class CameraNoise(Frozen):
     electrons_per_unit_error, read_noise_error : float or None
         Their standard errors, when they were estimated.
     luminance_cd_m2, solid_angle_sr : float or None
-        Of the light, seen from the camera; both or none. Merging does without, a ghost model takes them along.
+        Of the light, seen from the camera, which has at most half of the sphere before it; both or none. Merging does
+        without, a ghost model takes them along.
     """
 
     schema_version: Literal[1] = 1
@@ -102,6 +103,16 @@ class CameraNoise(Frozen):
     read_noise_error: float | None = Field(None, ge=0.0)
     luminance_cd_m2: Positive | None = None
     solid_angle_sr: Positive | None = None
+
+    @field_validator("solid_angle_sr")
+    @classmethod
+    def _light_is_in_front(cls, solid_angle_sr: float | None) -> float | None:
+        if solid_angle_sr is not None and solid_angle_sr > 2.0 * pi:
+            raise ValueError(
+                f"{solid_angle_sr:g} is more than a light in front of the camera can have, half of the sphere; give at "
+                "most 2 pi, 6.28"
+            )
+        return solid_angle_sr
 
     @model_validator(mode="after")
     def _light_is_whole(self) -> CameraNoise:
