@@ -373,6 +373,22 @@ def test_what_was_drawn_otherwise_is_not_taken_from_a_cache(file, tmp_path, caps
     assert means[0] == means[3] > means[1] > means[2] > 0.0
 
 
+def test_a_model_with_nothing_in_it_says_so_instead_of_what_counts(tmp_path, capsys):
+    path = tmp_path / "camera.json"
+    lit = planted().halo
+    for change, flags, words in (
+        ({"halo": None}, [], "there is nothing in the model: it has no ghosts, halo, star or sprites"),
+        ({"halo": None}, ["--count", "ghosts"], "there is nothing in the model"),
+        ({"halo": lit}, ["--count", "ghosts"], "nothing is counted: only ghosts were asked for"),
+        ({"halo": lit}, [], None),
+    ):
+        write_ghost_model(path, planted().replace(ghosts=(), **change))
+        assert run(["predict", str(path), "--samples", "5", *flags]) == 0
+        told = capsys.readouterr().err
+        assert ("are counted" in told) == (words is None)
+        assert words is None or words in told
+
+
 def test_a_model_that_does_not_know_its_light_cannot_stand_in_a_scene(tmp_path, capsys):
     write_ghost_model(tmp_path / "camera.json", planted(Reference(f_number=2.0)))
     (tmp_path / "scene.toml").write_text(SCENE.format(x=2.0))

@@ -148,6 +148,10 @@ def model_flare(
     around = counting.around(model)
     drawn: GhostModel = model.replace(halo=None, star=None, sprites=()) if counting.ghosts_only else model
     left_out, counts = _what_counts(model, around, counting)
+    if not (drawn.ghosts or drawn.halo or drawn.star or drawn.sprites):
+        counts = "there is nothing in the model: it has no ghosts, halo, star or sprites"
+        if drawn != model:
+            counts = "nothing is counted: only ghosts were asked for, and the model has none"
     remarks = [counts]
     reference = model.reference
     light_lx, unit = 1.0, "radiance in the captures' unit, with the light that was photographed"
