@@ -222,6 +222,25 @@ def test_a_camera_of_a_scene_says_what_counts(file, tmp_path, capsys):
     assert "around_light 0.6 is no part of the picture's width" in capsys.readouterr().err
 
 
+def test_a_sensor_of_other_proportions_than_the_captures_is_refused_where_it_is_told(file, tmp_path, capsys):
+    scene = tmp_path / "scene.toml"
+
+    def sum_of(lines):
+        scene.write_text(SCENE.format(x=2.0).replace("unit_per_cd_m2", f"{lines}\nunit_per_cd_m2"))
+        assert run(["predict", str(scene), "--json"]) == 0
+        return json.loads(capsys.readouterr().out)["cameras"][0]["lights"][0]["statistics_lx"]["sum_mm2"][0]
+
+    # 36 mm wide where nothing is told, and as high as the captures
+    assert sum_of("sensor_mm = [36, 20.25]") == sum_of("")
+    assert sum_of("sensor_mm = [18, 10.1]") == pytest.approx(0.25 * sum_of(""))
+    scene.write_text(SCENE.format(x=2.0).replace("unit_per_cd_m2", "sensor_mm = [36, 24]\nunit_per_cd_m2"))
+    assert run(["predict", str(scene)]) == 2
+    assert (
+        "camera A: sensor_mm = [36, 24] has other proportions than the captures, which have 160 x 90 pixels; give "
+        "sensor_mm = [36, 20.25]"
+    ) in capsys.readouterr().err
+
+
 def test_two_cameras_of_one_model_differ_in_settings_and_remarks(tmp_path, capsys):
     """Equation 8.3 by hand: the captures clip at 4 first, in green, at ISO 100, 0.5 s and f/2."""
     clipping = CAPTURED.replace(clipping=(8.0, 4.0, 5.0))

@@ -68,7 +68,8 @@ def scene_flare(
     threads : int or None
     """
     if camera.model is not None:
-        from .predict_measured import SIDE_PX, model_in_scene
+        from .predict_measured import SIDE_PX
+        from .predict_measured_scene import model_in_scene
 
         return model_in_scene(camera, light, SHOWN_PX if shown else SIDE_PX)
     from ..predict.lens_flare import lens_flare, square_flare, statistics_quality

@@ -4,24 +4,25 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..errors import FlarewrightError, ProjectError
+from ..errors import ProjectError
 from .predict_flares import SHOWN_PX
 
 if TYPE_CHECKING:
     from ..model import Layer
     from ..model.ghost_model import GhostModel
-    from ..model.scene import SceneCamera, SceneLight
-    from ..predict.flare import Flare, Frame
+    from ..predict.flare import Flare
     from ..predict.occurrence import Flares
 
 # pixels across a measured flare that is drawn for statistics
 SIDE_PX = 192
+# of a sensor that nobody told
+WIDTH_MM = 36.0
 # a sensor whose proportions differ by a larger part is not that of the captures
 _OTHER_SHAPE = 0.03
 
@@ -87,16 +88,41 @@ def model_flares(
 
     _refuse_others(path)
     model = read_ghost_model(path)
-    (wide, high), (width, height) = model.size_px, sensor_mm or (36.0, 36.0 * model.size_px[1] / model.size_px[0])
-    if abs(height * wide / (width * high) - 1.0) > _OTHER_SHAPE:
-        raise ProjectError(
-            f"--sensor {width:g}x{height:g} has other proportions than the captures, which have {wide} x {high} "
-            f"pixels; give --sensor {width:g}x{width * high / wide:.4g}"
-        )
+    width = sensor_width(model, sensor_mm, lambda width, height: f"--sensor {width:g}x{height:g}")
     sampled, shown = (
         model_flare(model, Path(path).name, width, unit_per_cd_m2, side, counting) for side in (SIDE_PX, SHOWN_PX)
     )
     return Flares(sampled, sampled.sensor, "measured", None, shown)
+
+
+def sensor_width(
+    model: GhostModel, sensor_mm: tuple[float, float] | None, written: Callable[[float, float], str]
+) -> float:
+    """Return how wide a measured camera's sensor is, mm.
+
+    Parameters
+    ----------
+    model : GhostModel
+    sensor_mm : tuple of float or None
+        As a person told it; None: 36 mm wide.
+    written : callable
+        Writes a width and a height as a person tells them.
+
+    Raises
+    ------
+    ProjectError
+        When it has other proportions than the captures.
+    """
+    if sensor_mm is None:
+        return WIDTH_MM
+    (wide, high), (width, height) = model.size_px, sensor_mm
+    if abs(height * wide / (width * high) - 1.0) > _OTHER_SHAPE:
+        fitting = float(f"{width * high / wide:.4g}")
+        raise ProjectError(
+            f"{written(width, height)} has other proportions than the captures, which have {wide} x {high} pixels; "
+            f"give {written(width, fitting)}"
+        )
+    return width
 
 
 def _refuse_others(path: str) -> None:
@@ -203,62 +229,3 @@ def _what_counts(model: GhostModel, around: float, counting: Counting) -> tuple[
         f"ghosts are counted everywhere, star, halo and what is left beside them only farther than {around:.3g} of the "
         f"width from the light's image ({degrees:.2g} degrees on the axis): nearer they hold the light's own image"
     )
-
-
-def model_in_scene(camera: SceneCamera, light: SceneLight, width_px: int) -> tuple[Flare, Frame]:
-    """Return the flare of a camera of a scene that was measured, and the camera's frame.
-
-    Parameters
-    ----------
-    camera : SceneCamera
-        With a model.
-    light : SceneLight
-    width_px : int
-
-    Raises
-    ------
-    FlarewrightError
-        When the model cannot be read or does not tell the light of its captures, or nothing counts.
-    """
-    assert camera.model is not None
-    model = _read(camera.model, Path(camera.model).stat().st_mtime_ns if Path(camera.model).is_file() else 0)
-    reference = model.reference
-    if reference.luminance_cd_m2 is None or reference.solid_angle_sr is None:
-        raise ProjectError(
-            f"{camera.name}: the model {camera.model} does not tell luminance_cd_m2 and solid_angle_sr of the light in "
-            "its captures; write both into the camera.json beside the captures and give flarewright measure run again, "
-            "which keeps what it has measured, or else into the model's reference"
-        )
-    counting = Counting(camera.count == "ghosts", camera.around_light, "around_light")
-    name = Path(camera.model).name
-    flare = model_flare(model, name, camera.sensor_mm[0], camera.unit_per_cd_m2, width_px, counting)
-    told: list[str] = []
-    if camera.f_number is not None and reference.f_number not in (None, camera.f_number):
-        told.append(
-            f"measured at f/{reference.f_number:g}: at f/{camera.f_number:g} flare and scene change together, but "
-            "ghosts of another opening differ"
-        )
-    if light.spectrum != type(light).model_fields["spectrum"].default:
-        told.append(f"measured in its captures' light: the spectrum of {light.name} makes no difference")
-    signal, doubt = _over_clipping(model, camera)
-    return replace(flare, over_clipping=signal, remarks=(*flare.remarks, *told, *doubt)), flare.sensor
-
-
-# the cells of a file's sprites are unpacked once
-@lru_cache(maxsize=8)
-def _read(path: str, _changed_ns: int) -> GhostModel:
-    from ..io.ghost_model_file import read_ghost_model
-
-    return read_ghost_model(path)
-
-
-def _over_clipping(model: GhostModel, camera: SceneCamera) -> tuple[float | None, list[str]]:
-    """Return the signal of light 1 over clipping at a scene camera's settings, or None and why it is not known."""
-    from ..measure.placing import over_clipping
-    from ..model.replay_camera import ReplayCamera
-
-    shot = ReplayCamera(f_number=camera.f_number, iso=camera.iso, exposure_s=camera.exposure_s)
-    try:
-        return over_clipping(model, shot), []
-    except FlarewrightError as error:
-        return None, [f"how near its brightest spot is to clipping is not known: {error}"]

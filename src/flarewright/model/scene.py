@@ -63,6 +63,7 @@ class SceneCamera(Frozen):
         Distance of the plane in focus; None: infinity.
     coating : CoatingChoice
     sensor_mm : tuple of float
+        Of a measured flare: in its captures' proportions; not told: 36 mm wide.
     iso, exposure_s : float
     keyframes : tuple of CameraKey
         Rising in time, straight lines between; the camera's own place is that at 0 unless a keyframe is.
