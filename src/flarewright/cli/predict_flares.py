@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from ..errors import ProjectError
+
 if TYPE_CHECKING:
     from ..model import Project
     from ..model.scene import SceneCamera, SceneLight
@@ -84,7 +86,16 @@ def scene_flare(
 
 
 def camera_project(camera: SceneCamera, light: SceneLight, diameter_deg: float) -> Project:
-    """Return the project of a camera of a scene and one light on its axis."""
+    """Return the project of a camera of a scene and one light on its axis.
+
+    Raises
+    ------
+    ProjectError
+        When there is no such sensor.
+    """
+    from pydantic import ValidationError
+
+    from ..io.project_file import explain
     from ..model import Project
 
     width, height = camera.sensor_mm
@@ -92,8 +103,11 @@ def camera_project(camera: SceneCamera, light: SceneLight, diameter_deg: float) 
         "lens": camera.lens, "f_number": camera.f_number, "zoom": camera.zoom, "coating": camera.coating,
         "lights": ({"field_deg": (0.0, 0.0), "spectrum": light.spectrum, "diameter_deg": diameter_deg},),
         "camera": {
-            "size_px": (SHOWN_PX, max(1, round(SHOWN_PX * height / width))), "sensor_mm": (width, height),
-            "focus_distance": None if camera.focus_m is None else 1e3 * camera.focus_m,
+            "size_px": (SHOWN_PX, max(1, min(round(SHOWN_PX * height / width), 10 * SHOWN_PX))),
+            "sensor_mm": (width, height), "focus_distance": None if camera.focus_m is None else 1e3 * camera.focus_m,
         },
     }  # fmt: skip
-    return Project.model_validate(fields)
+    try:
+        return Project.model_validate(fields)
+    except ValidationError as error:
+        raise ProjectError(explain(error, fields)[0].removeprefix("camera.")) from None

@@ -86,7 +86,7 @@ def model_flares(
     from ..io.ghost_model_file import read_ghost_model
     from ..predict.occurrence import Flares
 
-    _refuse_others(path)
+    refuse_others(path, "predict takes a lens, a scene (.toml), or")
     model = read_ghost_model(path)
     width = sensor_width(model, sensor_mm, lambda width, height: f"--sensor {width:g}x{height:g}")
     sampled, shown = (
@@ -125,13 +125,27 @@ def sensor_width(
     return width
 
 
-def _refuse_others(path: str) -> None:
-    """Refuse JSON that is plainly no ghost model, of whose keys a list would be no help."""
-    text = Path(path).read_text("utf-8", errors="ignore")
+def refuse_others(path: str, takes: str) -> None:
+    """Refuse JSON that is plainly no ghost model, of whose keys a list would be no help.
+
+    Parameters
+    ----------
+    path : str
+        What cannot be read is left to the reader.
+    takes : str
+        Goes before what a ghost model is called.
+
+    Raises
+    ------
+    ProjectError
+    """
+    try:
+        text = Path(path).read_text("utf-8", errors="ignore")
+    except OSError:
+        return
     if not all(f'"{key}"' in text for key in ("axis_px", "focal_px", "largest_deg")):
         raise ProjectError(
-            f"{path} is no ghost model: predict takes a lens, a scene (.toml), or the model.json or compact.json that "
-            "flarewright measure run writes"
+            f"{path} is no ghost model: {takes} the model.json or compact.json that flarewright measure run writes"
         )
 
 

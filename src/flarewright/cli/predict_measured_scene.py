@@ -2,18 +2,50 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..errors import FlarewrightError, ProjectError
-from .predict_measured import Counting, model_flare, sensor_width
+from .predict_measured import Counting, model_flare, refuse_others, sensor_width
 
 if TYPE_CHECKING:
     from ..model.ghost_model import GhostModel
     from ..model.scene import SceneCamera, SceneLight
     from ..predict.flare import Flare, Frame
+
+
+def model_mistakes(camera: SceneCamera) -> dict[str, FlarewrightError]:
+    """Find everything that keeps a measured camera from being predicted.
+
+    Parameters
+    ----------
+    camera : SceneCamera
+        With a model.
+
+    Returns
+    -------
+    dict of str to FlarewrightError
+        By the key of the camera.
+    """
+    checks: dict[str, Callable[[GhostModel], object]] = {
+        "model": lambda model: _know_light(camera, model),
+        "around_light": _counting(camera).around,
+        "sensor_mm": lambda model: _sensor_width(camera, model),
+    }
+    try:
+        model = _model(camera)
+    except FlarewrightError as error:
+        return {"model": error}
+    found = {}
+    for key, check in checks.items():
+        try:
+            check(model)
+        except FlarewrightError as error:
+            found[key] = error
+    return found
 
 
 def model_in_scene(camera: SceneCamera, light: SceneLight, width_px: int) -> tuple[Flare, Frame]:
@@ -29,21 +61,14 @@ def model_in_scene(camera: SceneCamera, light: SceneLight, width_px: int) -> tup
     Raises
     ------
     FlarewrightError
-        When the model cannot be read or does not tell the light of its captures, the sensor has other proportions than
-        these, or nothing counts.
+        The first of `model_mistakes`.
     """
-    assert camera.model is not None
-    model = _read(camera.model, Path(camera.model).stat().st_mtime_ns if Path(camera.model).is_file() else 0)
-    reference = model.reference
-    if reference.luminance_cd_m2 is None or reference.solid_angle_sr is None:
-        raise ProjectError(
-            f"{camera.name}: the model {camera.model} does not tell luminance_cd_m2 and solid_angle_sr of the light in "
-            "its captures; write both into the camera.json beside the captures and give flarewright measure run again, "
-            "which keeps what it has measured, or else into the model's reference"
-        )
-    counting = Counting(camera.count == "ghosts", camera.around_light, "around_light")
-    name = Path(camera.model).name
-    flare = model_flare(model, name, _sensor_width(camera, model), camera.unit_per_cd_m2, width_px, counting)
+    for mistake in model_mistakes(camera).values():
+        raise mistake
+    model = _model(camera)
+    name, reference = Path(camera.model or "").name, model.reference
+    width_mm = _sensor_width(camera, model)
+    flare = model_flare(model, name, width_mm, camera.unit_per_cd_m2, width_px, _counting(camera))
     told: list[str] = []
     if camera.f_number is not None and reference.f_number not in (None, camera.f_number):
         told.append(
@@ -56,10 +81,30 @@ def model_in_scene(camera: SceneCamera, light: SceneLight, width_px: int) -> tup
     return replace(flare, over_clipping=signal, remarks=(*flare.remarks, *told, *doubt)), flare.sensor
 
 
+def _counting(camera: SceneCamera) -> Counting:
+    return Counting(camera.count == "ghosts", camera.around_light, "around_light")
+
+
+def _know_light(camera: SceneCamera, model: GhostModel) -> None:
+    """Refuse a model that does not tell the light of its captures."""
+    if model.reference.luminance_cd_m2 is None or model.reference.solid_angle_sr is None:
+        raise ProjectError(
+            f"the model {camera.model} does not tell luminance_cd_m2 and solid_angle_sr of the light in its captures; "
+            "write both into the camera.json beside the captures and give flarewright measure run again, which keeps "
+            "what it has measured, or else into the model's reference"
+        )
+
+
 def _sensor_width(camera: SceneCamera, model: GhostModel) -> float:
     # the sensor of a camera that tells none is a lens'
     told = camera.sensor_mm if "sensor_mm" in camera.model_fields_set else None
     return sensor_width(model, told, lambda width, height: f"sensor_mm = [{width:g}, {height:g}]")
+
+
+def _model(camera: SceneCamera) -> GhostModel:
+    assert camera.model is not None
+    path = Path(camera.model)
+    return _read(camera.model, path.stat().st_mtime_ns if path.is_file() else 0)
 
 
 # the cells of a file's sprites are unpacked once
@@ -67,6 +112,7 @@ def _sensor_width(camera: SceneCamera, model: GhostModel) -> float:
 def _read(path: str, _changed_ns: int) -> GhostModel:
     from ..io.ghost_model_file import read_ghost_model
 
+    refuse_others(path, "a camera's model is")
     return read_ghost_model(path)
 
 

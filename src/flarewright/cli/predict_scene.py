@@ -116,8 +116,7 @@ def _named(camera: Any, light: Any, diameter_deg: float, distance_m: float | Non
     try:
         return scene_flare(camera, light, diameter_deg, distance_m, **how)
     except FlarewrightError as error:
-        words = str(error)
-        raise ProjectError(words if words.startswith(camera.name) else f"camera {camera.name}: {words}") from None
+        raise ProjectError(f"camera {camera.name}: {error}") from None
 
 
 def _compile(scene: Scene, threads: int | None) -> None:

@@ -28,7 +28,7 @@ def check(
 
     with refused_as_json(file, as_json), naming(file):
         project = read_project(file)
-        found = _measured(project) if is_measured(project) else _of_lens(_settled(file, project))
+        found = _measured(project) if is_measured(project) else _of_lens(read_everything(file, project))
     if as_json:
         print_json({"file": str(file), "usable": True, **found})
         return
@@ -59,8 +59,25 @@ def _of_lens(settled: Settled) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _settled(file: Path, project: Project) -> Settled:
-    """Read everything that a project's render reads; all that is wrong with it is one error."""
+def read_everything(file: Path, project: Project) -> Settled:
+    """Read everything that a project's render reads.
+
+    Parameters
+    ----------
+    file : path
+        Where the project stands, for messages.
+    project : Project
+        With a lens.
+
+    Returns
+    -------
+    Settled
+
+    Raises
+    ------
+    FlarewrightError
+        All that is wrong with it, as one error.
+    """
     from ..io.mask_image import read_mask
     from ..io.project_file import ProjectFileError
     from ..io.sentences import summary

@@ -22,7 +22,7 @@ LEAST_FRONT = 2.0
 # pixels across what is drawn for statistics; a flare is smooth but for its brightest spots
 SIDE_PX = 192
 
-__all__ = ["lens_flare", "luminous", "square_flare", "statistics_quality"]
+__all__ = ["largest_constellation", "lens_flare", "luminous", "square_flare", "statistics_quality"]
 
 
 def statistics_quality(mode: str) -> Quality:
@@ -95,14 +95,27 @@ def lens_flare(project: Project, *, threads: int | None = None) -> Flare:
         efl=settled.order.efl,
         scene_scale=float(summary["scene_irradiance_per_radiance"]),
         turns_by_deg=_turns_by(settled),
-        reach_deg=_reach(light.distance, settled.order.efl),
+        reach_deg=largest_constellation(light.distance, settled.order.efl),
         fingerprint=hashlib.sha256(prepared.model_dump_json().encode()).hexdigest(),
         remarks=settled.remarks,
     )
 
 
-def _reach(distance: float | None, efl: float) -> float:
-    """Return the largest constellation: a near light must stay in front of the lens."""
+def largest_constellation(distance: float | None, efl: float) -> float:
+    """Return the largest constellation, degrees: a near light must stay in front of the lens.
+
+    Parameters
+    ----------
+    distance : float or None
+        Of the light from the camera, mm; None: far away.
+    efl : float
+        Focal length, mm.
+
+    Raises
+    ------
+    LensError
+        When the light stands in or right at the lens.
+    """
     if distance is None:
         return REACH_DEG
     front = LEAST_FRONT * abs(efl)
