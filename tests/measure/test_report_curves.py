@@ -103,7 +103,7 @@ def test_every_number_of_a_ghost_is_told_with_its_doubt():
     assert "comes over 0.5 and goes over 1" in html
     # terms that are 0 in all colours and were not fitted
     assert "f, uu" not in html
-    assert "<td>centre along the field</td><td>30.0 ± 1.5</td><td>30, 25</td>" in numbers_table(model().ghosts[1])
+    assert "<td>centre, to the light</td><td>30.0 ± 1.5</td><td>30, 25</td>" in numbers_table(model().ghosts[1])
 
 
 def test_a_colour_far_off_green_leaves_the_others_charts_readable():

@@ -9,6 +9,8 @@ import numpy as np
 from .numbers import Floats
 
 MOST = 6
+# values that count a smaller part than this because they lie off their neighbours witness nothing
+_WITNESS = 0.01
 
 
 @dataclass(frozen=True)
@@ -20,7 +22,8 @@ class Curve:
     coefficients : tuple of float
         Lowest order first, of z = (constellation - middle) / half range.
     deviation : float
-        Root mean square error of foretelling values left out.
+        Root mean square error of foretelling values left out; 0: not known, for no more values than coefficients
+        count.
     """
 
     coefficients: tuple[float, ...]
@@ -59,8 +62,11 @@ def compress(constellation_deg: Floats, values: Floats, error: Floats, span_deg:
     off = np.empty(values.size)
     off[order] = np.abs(values[order] - np.median(around, axis=1))
     usual = 1.4826 * float(np.median(off[weight > 0.0])) + 1e-12
-    best, coefficients = _best_order(z, values, weight / (1.0 + (off / (4.0 * usual)) ** 4))
-    return Curve(tuple(map(float, coefficients)), best)
+    trust = 1.0 / (1.0 + (off / (4.0 * usual)) ** 4)
+    best, coefficients = _best_order(z, values, weight * trust)
+    witnesses = np.count_nonzero((weight > 0.0) & (trust > _WITNESS))
+    # a curve that goes through all that counts leaves nothing by which to judge it
+    return Curve(tuple(map(float, coefficients)), best if witnesses > len(coefficients) else 0.0)
 
 
 def _best_order(z: Floats, values: Floats, weight: Floats) -> tuple[float, Floats]:

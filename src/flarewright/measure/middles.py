@@ -41,8 +41,9 @@ class Middles:
     Attributes
     ----------
     values : ndarray, shape (3, 3, K)
-        Of red, green and blue place, size and radiance: pixels from the axis, at negative constellations as far to the
-        other side; pixels for a radius of the pupil, at right angles to the light's line; radiance.
+        Of red, green and blue place, size and radiance: pixels from the axis, to where the light is at positive
+        constellations; pixels for a radius of the pupil, at right angles to the light's line, below 0 where the ghost
+        is turned over; radiance.
     changes : ndarray, shape (P, 3, 3, K)
         By how much these change, to first order, with one standard deviation of each of the model's P numbers.
     """
@@ -62,6 +63,11 @@ class Middles:
 
 def _known(value: Floats, changes: Floats) -> Known:
     return Known(value, np.sqrt(np.square(changes).sum(axis=0)))
+
+
+def side_of(constellation_deg: Floats) -> Floats:
+    """Return on which side the light is, -1 or 1; times this, a place told towards the light is that in reports."""
+    return np.where(constellation_deg < 0.0, -1.0, 1.0)
 
 
 def middles_of(ghost: AberrationGhost, constellation_deg: Floats, largest_deg: float) -> Middles:
@@ -114,7 +120,7 @@ def _look(numbers: Floats, poses: Sequence[Pose], fields: Floats) -> Floats:
     """Return place, size and radiance of one colour, shape (3, K)."""
     sigma, out = np.abs(fields), np.zeros((3, fields.size))
     fill_middles(np.stack([posed(numbers, *each) for each in zip(sigma.tolist(), poses, strict=True)]), sigma, out)
-    out[PLACE] *= np.sign(fields)
+    out[PLACE] *= side_of(fields)
     return out
 
 

@@ -30,7 +30,8 @@ class Paths:
     names : tuple of str
     constellation_deg : ndarray, shape (T,)
     place_px : ndarray, shape (G, T)
-        Middle of the light inside the picture, from the axis towards the light; NaN outside.
+        Middle of the light inside the picture, from the axis to where the light is at positive constellations; NaN
+        outside.
     light : ndarray, shape (G, T)
         Radiance times pixels inside the picture; NaN outside.
     """
@@ -46,7 +47,7 @@ class Paths:
 
 
 def paths_of(model: GhostModel) -> Paths:
-    """Follow every ghost of a model, drawn small and alone, with the light on the right of the axis.
+    """Follow every ghost of a model, drawn small and alone, positive constellations on the right of the axis.
 
     Parameters
     ----------

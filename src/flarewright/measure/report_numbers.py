@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from ..kernels.measure_bezier import BORDER
 from ..kernels.measure_pupil import BELOW, DISC_NUMBERS, FIRST_DISC, FIRST_G, FIRST_I, LATERAL, MOST_DISCS, SOFT
 from ..model.ghost_model import AberrationGhost, BezierGhost, Curves
 from ..render.chart import number, with_deviation
@@ -16,7 +17,7 @@ _TERMS = ("1", "u", "v", "w", "uu", "uv", "vv", "uw", "vw", "ww")
 _DISC = ("centre by s", "centre by s w", "radius")
 _LATERAL = ("f'", "g'", 'f"', 'g"', "f' by w", "g' by w")
 _BEZIER = (
-    "centre along the field", "centre across it", "height", "extent away from the light", "extent to it",
+    "centre, to the light", "centre, across", "height", "extent away from the light", "extent to it",
     "control away, along", "control away, across", "control to it, along", "control to it, across", "falloff outside",
     "falloff inside", "exponent outside", "exponent inside", "border level, red", "border level, green",
     "border level, blue", "inner level, red", "inner level, green", "inner level, blue",
@@ -66,10 +67,11 @@ def _channel_rows(ghost: AberrationGhost) -> Iterator[tuple[str, ...]]:
     deviations = np.array([channel_deviation(one) for one in channels])
     for at, label in _labels().items():
         if values[:, at].any() or deviations[:, at].any():
-            yield (
-                label,
-                *(with_deviation(float(a), float(d)) for a, d in zip(values[:, at], deviations[:, at], strict=True)),
-            )
+            # terms of one polynomial stand for each other
+            first = at - at % FIRST_G if at < FIRST_DISC else at
+            most = float(np.abs(values[:, first : first + FIRST_G if at < FIRST_DISC else at + 1]).max())
+            told = zip(values[:, at].tolist(), deviations[:, at].tolist(), strict=True)
+            yield label, *(with_deviation(value, deviation, most) for value, deviation in told)
 
 
 def _curve_rows(curves: Curves, visible_deg: tuple[float, float]) -> Iterator[tuple[str, str]]:
@@ -84,5 +86,7 @@ def _curve_rows(curves: Curves, visible_deg: tuple[float, float]) -> Iterator[tu
 def _bezier_rows(ghost: BezierGhost) -> Iterator[tuple[str, ...]]:
     midway = bezier_numbers(ghost, 0.5 * sum(ghost.visible_deg))
     told = [*ghost.uncertainty, *[0.0] * (midway.size - len(ghost.uncertainty))]
-    for label, value, deviation, row in zip(_BEZIER, midway.tolist(), told, ghost.numbers, strict=True):
-        yield label, with_deviation(value, deviation), ", ".join(number(each) for each in row)
+    # pixels and exponents, then levels
+    matters = [1.0] * BORDER + [float(midway[BORDER:].max())] * (midway.size - BORDER)
+    for label, value, deviation, least, row in zip(_BEZIER, midway.tolist(), told, matters, ghost.numbers, strict=True):
+        yield label, with_deviation(value, deviation, least), ", ".join(number(each) for each in row)

@@ -26,6 +26,8 @@ _ROW = 14.0
 _SHADE, _WIDER, _TIMES = 0.16, 0.5, 2.0
 # digits behind the point, at most
 _DIGITS = 6
+# a deviation that is a smaller part of what matters is rounding, and no doubt
+_ROUNDING = 1e-5
 
 __all__ = ["COLOURS", "Series", "chart", "number", "with_deviation"]
 
@@ -67,9 +69,17 @@ def number(value: float) -> str:
     return f"{float(digits):g}e{int(power)}"
 
 
-def with_deviation(value: float, deviation: float) -> str:
-    """Return a number in as many digits as its standard deviation leaves, and this; one that is 0 is not told."""
-    if not (np.isfinite(value) and np.isfinite(deviation) and deviation > 0.0):
+def with_deviation(value: float, deviation: float, matters: float = 0.0) -> str:
+    """Return a number in as many digits as its standard deviation leaves, and this.
+
+    Parameters
+    ----------
+    value, deviation : float
+        A deviation that is 0, or below 1e-5 of what the number is, is not told.
+    matters : float
+        How large a number counts where this one is smaller: a deviation below 1e-5 of that is not told, either.
+    """
+    if not (np.isfinite(value) and np.isfinite(deviation) and deviation > _ROUNDING * max(abs(value), matters)):
         return number(value)
     # two digits of one that begins with 1 or 2, else one
     digits = max(0, -floor(log10(deviation / 3.0)))
