@@ -9,10 +9,11 @@ from test_middles import CURVES, ghost, told
 from test_replay import planted
 
 from flarewright.measure.compress import compress
+from flarewright.measure.replay import replay
 from flarewright.measure.report import write_report
 from flarewright.measure.report_curves import curves_section
 from flarewright.measure.report_numbers import numbers_table
-from flarewright.model.ghost_model import BezierGhost, Curves
+from flarewright.model.ghost_model import AberrationGhost, BezierGhost, Curves
 
 COLOURS = {"1": "#1d5fa8", "2": "#c8413b", "3": "#2d8a5f"}
 BY_ABERRATIONS = told()
@@ -32,7 +33,7 @@ def charts_of(html):
 
 def row_of(html, name):
     """Return the cells of a ghost's row, each a number and its deviation."""
-    cells = re.search(rf"<td>{name}, at [\d.]+</td>(.*?)</tr>", html)[1]
+    cells = re.search(rf"<td>{name}, at [-\d.]+</td>(.*?)</tr>", html)[1]
     return [tuple(float(part) for part in cell.split(" ± ")) for cell in re.findall(r"<td>(.*?)</td>", cells)]
 
 
@@ -107,12 +108,118 @@ def test_every_number_of_a_ghost_is_told_with_its_doubt():
 
 
 def test_a_colour_far_off_green_leaves_the_others_charts_readable():
-    far = ghost(told(), Curves(), shift=90.0).replace(name="2", visible_deg=(24.0, 25.0))
-    several = [ghost(told(), Curves(), shift=0.5).replace(name=str(k)) for k in range(3, 16)]
+    # all colours are in the picture
+    far = ghost(told(), Curves(), shift=10.0).replace(name="2", visible_deg=(24.0, 25.0))
+    several = [ghost(told(), Curves(), shift=0.1).replace(name=str(k)) for k in range(3, 16)]
     colours = {one.name: f"#0000{k:02x}" for k, one in enumerate((far, *several))}
     charts = charts_of(curves_section(planted().replace(ghosts=(far, *several)), colours))
     assert 'stroke="#000000" stroke-width="1.8"' not in charts["Blue&#x27;s place"]
     assert 'stroke="#000001" stroke-width="1.8"' in charts["Blue&#x27;s place"]
+
+
+def lines_of(svg, colour):
+    """Return the points of a ghost's curve, a piece each, shape (N, 2)."""
+    found = re.findall(rf'<polyline points="([^"]+)" fill="none" stroke="{colour}" stroke-width="1.8"', svg)
+    return [np.array([[float(part) for part in spot.split(",")] for spot in one.split()]) for one in found]
+
+
+def of_numbers(name, **groups):
+    """Return a ghost whose colours are alike, of its polynomials' first and fourth numbers: 1 and w."""
+    channel = ghost().red.replace(below=(0.0, 0.0), **{
+        group: (first, 0.0, 0.0, by_w, *(0.0,) * 6) for group, (first, by_w) in groups.items()
+    })  # fmt: skip
+    return AberrationGhost(name=name, red=channel, green=channel, blue=channel, visible_deg=(0.0, 25.0))
+
+
+def test_a_place_out_of_the_picture_leaves_the_others_charts_readable():
+    # of two ghosts alone half of all places are far off; the picture's corners are at 92 pixels
+    far, leaves = of_numbers("1", f=(-1400.0, 0.0)), of_numbers("2", f=(100.0, 0.0))
+    charts = charts_of(curves_section(planted().replace(ghosts=(far, leaves)), COLOURS))
+    s = np.tan(np.radians(np.linspace(0.0, 25.0, 41))) / np.tan(np.radians(25.0))
+    for title in ("Place along the light&#x27;s line", "Red&#x27;s place", "Blue&#x27;s place"):
+        assert sum(map(len, lines_of(charts[title], COLOURS["1"]))) == (1400.0 * s <= 92.2).sum() <= 3
+        (line,) = lines_of(charts[title], COLOURS["2"])
+        assert len(line) == (100.0 * s <= 92.2).sum() < 41
+    (line,) = lines_of(charts["Place along the light&#x27;s line"], COLOURS["2"])
+    assert np.ptp(line[:, 1]) > 80.0
+    alone = of_numbers("1", f=(-1400.0, 0.0)).replace(visible_deg=(20.0, 25.0))
+    html = curves_section(planted().replace(ghosts=(alone,)), COLOURS)
+    assert row_of(html, "1")[0][0] == pytest.approx(
+        -1400.0 * np.tan(np.radians(22.5)) / np.tan(np.radians(25.0)), abs=1
+    )
+    assert not lines_of(charts_of(html)["Place along the light&#x27;s line: ghost 1"], COLOURS["1"])
+
+
+def test_a_middle_that_is_dark_is_a_gap_in_its_curve_and_none_runs_along_the_bottom():
+    # dark beyond w = 0.6, folded, and fainter than a chart can tell
+    ghosts = (of_numbers("1", intensity=(900.0, -1500.0)), of_numbers("2", g=(0.0, 0.0)),
+              of_numbers("3", intensity=(0.08, 0.0)))  # fmt: skip
+    svg = charts_of(curves_section(planted().replace(ghosts=ghosts), COLOURS))["Brightness of the middle"]
+    (line,) = lines_of(svg, COLOURS["1"])
+    w = (np.tan(np.radians(np.linspace(0.0, 25.0, 41))) / np.tan(np.radians(25.0))) ** 2
+    assert len(line) == (w < 0.6).sum() < 35
+    assert not lines_of(svg, COLOURS["2"])
+    assert not lines_of(svg, COLOURS["3"])
+    # the axes' corner
+    bottom = max(float(y) for y in re.findall(r'<polyline points="[^"]+,([\d.]+)" fill="none" stroke="#e3e8ed"', svg))
+    assert line[:, 1].max() < bottom
+
+
+def test_it_is_said_that_a_size_below_0_is_a_ghost_turned_over():
+    html = curves_section(planted().replace(ghosts=(of_numbers("1", g=(-8.0, 0.0)),)), COLOURS)
+    assert row_of(html, "1")[1] == (-8.0,)
+    assert "A size below 0 is a ghost turned over" in html
+    assert "below 0 turned over" in charts_of(html)["Size: ghost 1"]
+
+
+def test_a_model_of_bezier_ghosts_alone_says_nothing_of_pupils_and_colours():
+    walch, mesh = model().ghosts[1], model().ghosts[0]
+    html = curves_section(planted().replace(ghosts=(walch,)), COLOURS)
+    assert "pupil" not in html
+    assert "turned over" not in html
+    assert "off green" not in html
+    assert len(row_of(html, "2")) == 5
+    assert "Bezier" not in curves_section(planted().replace(ghosts=(mesh,)), COLOURS)
+    both = curves_section(model(), COLOURS)
+    assert "middle of its pupil" in both
+    assert "Of a Bezier ghost" in both
+
+
+@pytest.mark.parametrize("angle", [-12.0, 12.0])
+def test_places_of_both_kinds_are_on_the_side_on_which_replays_draw_them(angle):
+    # measured on both sides, each ghost there on one
+    life = (angle - 3.0, angle + 3.0)
+    walch = planted().ghosts[1].replace(numbers=((30.0,), *planted().ghosts[1].numbers[1:]), visible_deg=life)
+    both = planted().replace(ghosts=(ghost().replace(visible_deg=life, curves=Curves()), walch), halo=None, star=None,
+                             constellation_deg=(-25.0, 25.0))  # fmt: skip
+    html = curves_section(both, COLOURS)
+    for name in ("1", "2"):
+        light = next(one for one in replay(both, angle, single=True) if one.name == f"ghost.{name}")
+        columns = light.pixels[..., 1].sum(axis=0, dtype=float)
+        middle = columns @ (light.window[0] + np.arange(columns.size) + 0.5) / columns.sum() - both.axis_px[0]
+        assert row_of(html, name)[0][0] == pytest.approx(middle, abs=3.0)
+        assert abs(middle) > 20.0
+
+
+def test_a_bezier_ghosts_curve_crosses_the_axis_with_the_light():
+    walch = planted().ghosts[1].replace(numbers=((30.0,), *planted().ghosts[1].numbers[1:]), visible_deg=(-20.0, 20.0))
+    both = planted().replace(ghosts=(walch,), constellation_deg=(-25.0, 25.0))
+    charts = charts_of(curves_section(both, COLOURS))
+    (line,) = lines_of(charts["Place along the light&#x27;s line: ghost 2"], COLOURS["2"])
+    assert (line[:20, 1] == line[:20, 1].max()).all()
+    assert (line[20:, 1] == line[20:, 1].min()).all()
+    assert np.ptp(line[:, 1]) > 100.0
+
+
+def test_the_deviation_of_a_colour_without_light_is_not_told():
+    deviation = [0.0] * 30
+    deviation[20:24] = 9.0, 0.0, 0.0, 5.0
+    one = ghost(tuple(deviation), Curves())
+    dead = one.green.replace(intensity=(0.0,) * 10, uncertainty=tuple(1e-12 * each for each in deviation))
+    one = one.replace(green=dead)
+    cells = row_of(curves_section(planted().replace(ghosts=(one,)), COLOURS), "1")
+    assert [len(cell) for cell in cells[2:5]] == [2, 1, 2]
+    assert "<td>intensity, 1</td><td>900 ± 9</td><td>0</td><td>500 ± 9</td>" in numbers_table(one)
 
 
 def test_the_section_is_in_the_report_of_a_run(tmp_path):

@@ -110,3 +110,15 @@ def test_what_lies_below_an_area_shows_through():
 )  # fmt: skip
 def test_a_number_has_the_digits_that_its_deviation_leaves(value, deviation, words):
     assert with_deviation(value, deviation) == words
+
+
+@pytest.mark.parametrize(
+    ("value", "deviation", "matters", "words"),
+    [
+        (76.6, 3e-14, 0.0, "76.6"), (9.397593, 2e-5, 0.0, "9.398"), (-1.214, 6e-13, 1.0, "-1.214"),
+        (0.0, 2e-15, 0.071, "0"), (0.0, 2e-15, np.inf, "0"), (0.0, 2e-15, 1e-12, "0 ± 2e-15"),
+        (9.3976, 2e-4, 1.0, "9.39760 ± 0.00020"), (0.0, 0.5, 1.0, "0.0 ± 0.5"),
+    ],
+)  # fmt: skip
+def test_a_deviation_that_is_rounding_beside_what_matters_is_not_told(value, deviation, matters, words):
+    assert with_deviation(value, deviation, matters) == words

@@ -172,11 +172,10 @@ def _near(ghosts: Sequence[_Followed], colour: int, corner_px: float) -> list[Kn
         np.maximum(np.abs(_one(one, PLACE).value), np.abs(_one(one, PLACE, colour).value)) <= corner_px
         for one in ghosts
     ]
-    off = np.abs(
-        np.concatenate([np.zeros(0), *(known.value[there] for known, there in zip(told, inside, strict=True))])
-    )
+    both = list(zip(told, inside, strict=True))
+    off = np.abs(np.concatenate([np.zeros(0), *(known.value[there] for known, there in both)]))
     most = _OFF * float(np.quantile(off, _USUAL)) if off.size else 0.0
-    return [_where(known, there & (np.abs(known.value) <= most)) for known, there in zip(told, inside, strict=True)]
+    return [_where(known, there & (np.abs(known.value) <= most)) for known, there in both]
 
 
 def _lit(ghosts: Sequence[_Followed]) -> list[Known]:

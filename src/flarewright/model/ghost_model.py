@@ -196,7 +196,7 @@ class BezierGhost(Frozen):
         right, falloff outside and inside, exponents outside and inside, border level and inner level of red, green
         and blue. Pixels and radiance.
     uncertainty : tuple of float
-        Standard deviation of each number about its polynomial, or empty.
+        Standard deviation of each number about its polynomial, 0 where it is not known, or empty.
     visible_deg : tuple of float
         Constellations at which it appears and disappears.
     fade_deg : tuple of float
