@@ -105,11 +105,14 @@ def _points(frame, left, row, count, across, x, y):
 
 @inner
 def _lit(numbers, found, faded, count, row):
-    """Add the light of pixels whose distances are known."""
+    """Add the light of pixels whose distances are known; `row` holds three colours after each other."""
+    red, green, blue = numbers[BORDER], numbers[BORDER + 1], numbers[BORDER + 2]
+    inner_red, inner_green, inner_blue = numbers[INNER], numbers[INNER + 1], numbers[INNER + 2]
     for m in range(count):
         border, inside = 1.0 - faded[m], faded[m] if found[DISTANCE + m] >= 0.0 else 0.0
-        for n in range(3):
-            row[m, n] += border * numbers[BORDER + n] + inside * numbers[INNER + n]
+        row[3 * m] += border * red + inside * inner_red
+        row[3 * m + 1] += border * green + inside * inner_green
+        row[3 * m + 2] += border * blue + inside * inner_blue
 
 
 @inner
@@ -118,10 +121,11 @@ def _spared(found, reaches, scale):
 
     A step of a pixel changes the distance by a pixel at most.
     """
-    least = 1e300
+    rows = np.int64(1 << 40)
+    # whole numbers, for the compiler vectorises only their minimum
     for m in range(LANES):
-        least = min(least, abs(found[DISTANCE + m]) - reaches[m])
-    return max(int(scale * least), 0)
+        rows = min(rows, np.int64(scale * (abs(found[DISTANCE + m]) - reaches[m])))
+    return max(rows, 0)
 
 
 @compiled
@@ -152,13 +156,13 @@ def draw_beziers(numbers, frame, left, top, pixels):
         for r in range(y0, y0 + high):
             for start in range(0, wide, LANES):
                 count, block = min(LANES, wide - start), start // LANES
-                row = pixels[r, x0 + start : x0 + start + count]
+                row = pixels[r, x0 + start : x0 + start + count].reshape(3 * count)
                 if spared[block] > 0:
                     spared[block] -= 1
                     if not outside[block]:
                         for m in range(count):
                             for n in range(3):
-                                row[m, n] += ghost[INNER + n]
+                                row[3 * m + n] += ghost[INNER + n]
                     continue
                 _points(moved, x0 + start, r, count, ghost[1], x, y)
                 distances(curves, places, apart, x, y, work, found)
@@ -193,7 +197,7 @@ def draw_bezier(numbers, frame, left, top, pixels, changes):
             distances(curves, places, apart, x, y, work, found)
             _fade(numbers, found, room)
             part, reaches, powers, faded, _ = room
-            _lit(numbers, found, faded, count, pixels[r, start : start + count])
+            _lit(numbers, found, faded, count, pixels[r, start : start + count].reshape(3 * count))
             for m in range(count):
                 distance, side, t = found[DISTANCE + m], found[SIDE + m], found[FOOT + m]
                 out = distance < 0.0

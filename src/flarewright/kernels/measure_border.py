@@ -16,8 +16,9 @@ LANES = 32
 
 # parts of a curve whose ends are compared first
 _PARTS = 12
-# steps from the nearest of them: until none goes farther, and at most, which halve such a part to less
-_ENOUGH, _STEPS = 1e-6, 24
+# steps from the nearest of them: until none goes farther, where Newton's next goes its square, and at most, which halve
+# such a part to less
+_ENOUGH, _STEPS = 1e-4, 24
 
 # lanes of one curve's work: a point above the horizon, the square of its distance to the nearest place and where that
 # is; where the foot is, and between which bounds; the square of the distance to it, and which side of the curve it is
