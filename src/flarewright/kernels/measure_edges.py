@@ -189,19 +189,22 @@ def sum_along_rows(plane):
 
 
 @compiled
-def sum_into(planes, pixels):
-    """Add the pictures of three planes of differences along rows to a picture; light below 0 is dropped.
+def sum_into(planes, first, last, pixels):
+    """Add the pictures of planes of differences along rows to some rows of a picture; light below 0 is dropped.
 
     Parameters
     ----------
-    planes : ndarray, shape (3, H, W + 1), float64
+    planes : ndarray, shape (4, H, W + 1), float64
+        Red, green, blue, and more green.
+    first, last : int
+        Rows from the first to before the last.
     pixels : ndarray, shape (H, W, 3), float64
     """
-    for row in range(pixels.shape[0]):
+    for row in range(first, min(last, pixels.shape[0])):
         red, green, blue = 0.0, 0.0, 0.0
         for c in range(pixels.shape[1]):
             red += planes[0, row, c]
-            green += planes[1, row, c]
+            green += planes[1, row, c] + planes[3, row, c]
             blue += planes[2, row, c]
             pixels[row, c, 0] = max(pixels[row, c, 0] + red, 0.0)
             pixels[row, c, 1] = max(pixels[row, c, 1] + green, 0.0)

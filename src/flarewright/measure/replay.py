@@ -18,7 +18,6 @@ from ..kernels.measure_ghosts import draw_ghosts
 from ..model.ghost_model import AberrationGhost, BezierGhost, GhostModel
 from ..model.layer import Layer
 from ..render.compose import beauty
-from .found import CHANNELS
 from .glow import halo_at, offsets, star_at
 from .held import held
 from .numbers import bezier_numbers, field, fit_in, frame_in, visible
@@ -33,10 +32,13 @@ Floats = NDArray[np.float64]
 BEYOND_DEG = 1.0
 # of all of a ghost's light, in one pixel: less is none
 _ROUNDING = 1e-12
-# Bezier ghosts are drawn in so many rows at a time: the same pixels, however many threads there are
+# colours are drawn apart, green in halves, for two cores to have as much to do: plane, colour, the first ghost, and how
+# many it is to the next
+_PIECES = ((0, 0, 0, 1), (2, 2, 0, 1), (1, 1, 0, 2), (3, 1, 1, 2))
+# other work is done in so many rows at a time: the same pixels, however many threads there are
 _ROWS = 30
 # it is kept: what a thread has had of memory it need not ask for again
-_POOL = ThreadPoolExecutor(CHANNELS)
+_POOL = ThreadPoolExecutor(len(_PIECES))
 
 
 def light_px(model: GhostModel, constellation_deg: float, roll_deg: float = 0.0) -> tuple[float, float]:
@@ -242,13 +244,15 @@ def draw_packed(
     if meshes:
         there = _there(model, meshes, constellation_deg)
         numbers = posed_numbers(meshes, numbers, constellation_deg, sigma)
-        planes = np.zeros((3, height, width + 1))
-        # colours know nothing of each other, and neither kernel nor interpreter holds one up for another
-        shared_out(
-            lambda m: draw_ghosts(numbers[m], counts[m], there, sigma, placed, planes[m]), range(CHANNELS),
-            pool=pool,
-        )  # fmt: skip
-        sum_into(planes, pixels)
+        planes = np.zeros((len(_PIECES), height, width + 1))
+
+        def draw_piece(plane: int, channel: int, first: int, step: int) -> None:
+            some = (np.ascontiguousarray(each[first::step]) for each in (numbers[channel], counts[channel], there))
+            draw_ghosts(*some, sigma, placed, planes[plane])
+
+        # pieces know nothing of each other, and neither kernel nor interpreter holds one up for another
+        shared_out(draw_piece, *zip(*_PIECES, strict=True), pool=pool)
+        shared_out(lambda top: sum_into(planes, top, top + _ROWS, pixels), range(0, height, _ROWS), pool=pool)
     there = _there(model, curves, constellation_deg)
     shown = [_curved(ghost, part, constellation_deg) for ghost, part in zip(curves, there, strict=True) if part > 0.0]
     if shown:
