@@ -208,7 +208,7 @@ def run_stages(
             whole = residual and (name == "compress" or "compress" not in stages)
             job = _Job(folder, run, every, told_of, by, residual, whole, threads, told, begin(name))
             digest = run_digest(folder, run, stage.given(job))
-            kept = is_current(folder, name, digest, made)
+            kept = as_it_was = is_current(folder, name, digest, made)
             if not kept:
                 with journal(folder / f"{name}.journal", digest) as steps:
                     if steps.remembered:
@@ -221,14 +221,14 @@ def run_stages(
                     other for other in STAGES[STAGES.index(name) + 1 :] if (folder / _STAGES[other].file).is_file()
                 }
             else:
-                kept, later = _as_wanted(job, name, digest, made), set()
+                as_it_was, later = _as_wanted(job, name, digest, made), set()
             note_outdated(folder, (outdated(folder) | later) - {name})
             if stage.file != TRACKS:
                 _tell_light(run, made)
         facts[name] = {**_facts(made), "file": str(made), "kept": kept}
         if talk:
             words = ", ".join(count(value, _ONE[key], key) for key, value in _facts(made).items())
-            print(f"{made}: {words}" + (", as before" if kept else ""))
+            print(f"{made}: {words}" + (", as before" if as_it_was else ", ghosts as before" if kept else ""))
     return facts
 
 
