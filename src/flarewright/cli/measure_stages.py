@@ -189,8 +189,6 @@ def run_stages(
     """
     from ..io.merged import read_run
     from ..io.sentences import count
-    from ..measure.journal import journal
-    from ..measure.notes import is_current, note, note_corrections, note_outdated, outdated, run_digest
 
     run = read_run(folder)
     told_of = _corrections(folder, corrections) if "find" in stages else None
@@ -201,35 +199,42 @@ def run_stages(
             tell([line])
 
     for name in (one for one in STAGES if one in stages):
-        stage = _STAGES[name]
-        made = folder / stage.file
+        made = folder / _STAGES[name].file
         with progress_bar() as begin:
             # what is left is learned anew for the small model: once is enough
             whole = residual and (name == "compress" or "compress" not in stages)
             job = _Job(folder, run, every, told_of, by, residual, whole, threads, told, begin(name))
-            digest = run_digest(folder, run, stage.given(job))
-            kept = as_it_was = is_current(folder, name, digest, made)
-            if not kept:
-                with journal(folder / f"{name}.journal", digest) as steps:
-                    if steps.remembered:
-                        told(f"{name} goes on after {count(steps.remembered, 'step')} that an earlier run had done")
-                    stage.make(job, made, steps)
-                if name == "find":
-                    note_corrections(folder, told_of)
-                note(folder, name, digest)
-                later = {
-                    other for other in STAGES[STAGES.index(name) + 1 :] if (folder / _STAGES[other].file).is_file()
-                }
-            else:
-                as_it_was, later = _as_wanted(job, name, digest, made), set()
-            note_outdated(folder, (outdated(folder) | later) - {name})
-            if stage.file != TRACKS:
+            kept, as_it_was = _kept(job, name, made)
+            if made.name != TRACKS:
                 _tell_light(run, made)
         facts[name] = {**_facts(made), "file": str(made), "kept": kept}
         if talk:
             words = ", ".join(count(value, _ONE[key], key) for key, value in _facts(made).items())
             print(f"{made}: {words}" + (", as before" if as_it_was else ", ghosts as before" if kept else ""))
     return facts
+
+
+def _kept(job: _Job, name: str, made: Path) -> tuple[bool, bool]:
+    """Make a stage's file unless it is there; return whether it was, and whether all in it is as it was."""
+    from ..io.sentences import count
+    from ..measure.journal import journal
+    from ..measure.notes import is_current, note, note_corrections, note_outdated, outdated, run_digest
+
+    folder, stage = job.folder, _STAGES[name]
+    digest = run_digest(folder, job.run, stage.given(job))
+    if is_current(folder, name, digest, made):
+        note_outdated(folder, outdated(folder) - {name})
+        return True, _as_wanted(job, name, digest, made)
+    with journal(folder / f"{name}.journal", digest) as steps:
+        if steps.remembered:
+            job.told(f"{name} goes on after {count(steps.remembered, 'step')} that an earlier run had done")
+        stage.make(job, made, steps)
+    later = [other for other in STAGES[STAGES.index(name) + 1 :] if (folder / _STAGES[other].file).is_file()]
+    note_outdated(folder, outdated(folder).union(later) - {name})
+    if name == "find":
+        note_corrections(folder, job.corrections)
+    note(folder, name, digest)
+    return False, False
 
 
 def _tell_light(run: MergedRun, made: Path) -> None:
