@@ -72,11 +72,11 @@ def test_the_file_is_small_and_every_command_takes_it(folder, capsys, monkeypatc
         patch.setattr(Journal, "step", stopping)
         assert command(["measure", "compress", str(folder), "--every", "2"]) == 130
     capsys.readouterr()
-    assert (folder / "compress.journal").read_text().count("\n") == 3
+    assert (folder / "compress-residual.journal").read_text().count("\n") == 3
     assert command(["measure", "compress", str(folder), "--every", "2"]) == 0
     assert capsys.readouterr().out.endswith(", ghosts as before\n")
     assert made("measure", "compress", str(folder)) == [True]
-    assert not (folder / "compress.journal").exists()
+    assert not (folder / "compress-residual.journal").exists()
     assert min(size("model.json"), size("compact.json")) > LARGE
     assert read_ghost_model(folder / "compact.json").sprites
     assert made(*whole, "--no-residual") == [True] * 3

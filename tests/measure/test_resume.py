@@ -153,7 +153,7 @@ def test_stages_stopped_half_way_end_with_the_same_bytes(tmp_path, capsys, monke
         assert capsys.readouterr().err.endswith(said)
         lines = (folder / f"{stage}.journal").read_text().splitlines()
         assert len(lines) == 1 + done // 2
-        assert json.loads(lines[0])["journal"] == 9
+        assert json.loads(lines[0])["journal"] == 10
         assert command(["measure", stage, str(folder), "--every", "3"]) == 0
         assert f"goes on after {done // 2} steps" in capsys.readouterr().err
         assert (folder / file).read_bytes() == made[stage]

@@ -105,14 +105,26 @@ def test_what_is_of_an_earlier_model_is_neither_compressed_nor_reported(folder, 
     write_ghost_model(folder / "found.json", model)
     assert command(["measure", "fit", str(folder), "--every", "3", "--no-residual"]) == 0
     capsys.readouterr()
-    assert command(["measure", "report", str(folder), "--json"]) == 0
-    remarks = json.loads(capsys.readouterr().out)["remarks"]
+
+    def remarks(*more):
+        assert command(["measure", "report", str(folder), "--json", *more]) == 0
+        return json.loads(capsys.readouterr().out)["remarks"]
+
     for name in ("compact.json", "tracks.json"):
-        assert any(f"{name} was made before model.json was made anew" in remark for remark in remarks)
+        assert any(f"{name} was made from another model.json and is left out" in remark for remark in remarks())
     assert "<h2>Tracks</h2>" not in (folder / "report.html").read_text()
+    # who chooses it knows
+    assert remarks("--model", str(folder / "compact.json")) == []
     stages = ["--stages", "fit,track,compress", "--every", "3", "--no-residual"]
     assert command(["measure", "run", str(folder), "-o", str(folder), *stages]) == 0
     capsys.readouterr()
-    assert command(["measure", "report", str(folder), "--json"]) == 0
-    assert json.loads(capsys.readouterr().out)["remarks"] == []
+    assert remarks() == []
     assert "<h2>Tracks</h2>" in (folder / "report.html").read_text()
+    # tracks of other frames, and what is left beside the ghosts, make no other model
+    assert command(["measure", "track", str(folder), "--every", "2"]) == 0
+    assert command(["measure", "fit", str(folder), "--every", "3"]) == 0
+    assert read_ghost_model(folder / "model.json").sprites
+    capsys.readouterr()
+    assert remarks() == []
+    write_ghost_model(folder / "found.json", read_ghost_model(folder / "found.json").replace(remarks=("by hand",)))
+    assert remarks() == [f"{folder / 'model.json'} was made from another found.json; flarewright measure fit renews it"]

@@ -59,9 +59,14 @@ def test_a_stopped_fit_goes_on_with_other_threads(tmp_path, capsys, monkeypatch)
     with monkeypatch.context() as patch:
         patch.setattr(Journal, "step", stopping)
         assert command([*words, "--threads", "2"]) == 130
-    assert command([*words, "--threads", "1"]) == 0
-    assert len(read_ghost_model(tmp_path / "model.json").ghosts) == 2
     capsys.readouterr()
+    assert command([*words, "--threads", "1"]) == 0
+    assert "fit goes on after 1 step that an earlier run had done" in capsys.readouterr().err
+    stopped = read_ghost_model(tmp_path / "model.json")
+    (tmp_path / "model.json").unlink()
+    assert command([*words, "--threads", "1"]) == 0
+    assert read_ghost_model(tmp_path / "model.json") == stopped
+    assert len(stopped.ghosts) == 2
 
 
 def test_his_way_follows_a_ghost_from_picture_to_picture(tmp_path, capsys):

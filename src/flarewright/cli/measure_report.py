@@ -32,18 +32,22 @@ def report(
     check_place(place, (".html", ".htm"))
     from ..io.ghost_model_file import read_ghost_model, read_tracks
     from ..io.sentences import count
-    from ..measure.notes import outdated
     from ..measure.report import strange, write_report
-    from .measure_stages import COMPACT, MODEL, TRACKS
+    from .measure_sources import COMPACT, FOUND, MODEL, TRACKS, is_of_another
 
-    known, old = None, outdated(folder)
-    late = [name for stage, name in (("compress", COMPACT), ("track", TRACKS)) if stage in old]
-    remarks = [
-        f"{folder / name} was made before {MODEL} was made anew and is left out; flarewright measure run renews it"
-        for name in late
-        if (folder / name).is_file()
-    ]
-    left = [folder / name for name in (COMPACT, MODEL) if name not in late and (folder / name).is_file()]
+    known, remarks = None, []
+    late = [] if model else [(stage, name) for stage, name in (("compress", COMPACT), ("track", TRACKS))
+                             if (folder / name).is_file() and is_of_another(folder, stage)]  # fmt: skip
+    for stage, name in late:
+        more = ", or choose it by --model" if name == COMPACT else ""
+        remarks.append(
+            f"{folder / name} was made from another {MODEL} and is left out: "
+            f"renew it by flarewright measure {stage}{more}"
+        )
+    if not model and (folder / MODEL).is_file() and is_of_another(folder, "fit"):
+        remarks.append(f"{folder / MODEL} was made from another {FOUND}; flarewright measure fit renews it")
+    old = [name for _, name in late]
+    left = [folder / name for name in (COMPACT, MODEL) if name not in old and (folder / name).is_file()]
     for file in [model] if model else left:
         found = read_ghost_model(file)
         why = strange(run, found)
@@ -56,7 +60,7 @@ def report(
             f"{file} does not belong to the frames and is left out: {why}; flarewright measure fit renews it"
         )
     tell(remarks)
-    wanted = model is None and (known is not None or not remarks) and TRACKS not in late and (folder / TRACKS).is_file()
+    wanted = model is None and (known is not None or not remarks) and TRACKS not in old and (folder / TRACKS).is_file()
     tracks = read_tracks(folder / TRACKS) if wanted else None
     write_report(folder, run, known, place, tracks, remarks)
     if as_json:

@@ -11,6 +11,7 @@ import typer
 
 from ..errors import FlarewrightError
 from .common import print_json, progress_bar, tell
+from .measure_sources import COMPACT, FOUND, MODEL, TRACKS, as_measured, note_source
 
 if TYPE_CHECKING:
     from ..measure.journal import Journal
@@ -25,7 +26,6 @@ COMPRESS_EPILOG = (
     "Example:\n\nflarewright measure compress run\n\nThen: flarewright measure replay run/compact.json --help"
 )
 
-FOUND, MODEL, TRACKS, COMPACT = "found.json", "model.json", "tracks.json", "compact.json"
 # what facts are counted in, one of each
 _ONE = {"ghosts": "ghost", "lives": "life", "numbers": "number"}
 # in their order; later stages need the earlier ones
@@ -218,21 +218,19 @@ def _kept(job: _Job, name: str, made: Path) -> tuple[bool, bool]:
     """Make a stage's file unless it is there; return whether it was, and whether all in it is as it was."""
     from ..io.sentences import count
     from ..measure.journal import journal
-    from ..measure.notes import is_current, note, note_corrections, note_outdated, outdated, run_digest
+    from ..measure.notes import is_current, note, note_corrections, run_digest
 
     folder, stage = job.folder, _STAGES[name]
     digest = run_digest(folder, job.run, stage.given(job))
     if is_current(folder, name, digest, made):
-        note_outdated(folder, outdated(folder) - {name})
         return True, _as_wanted(job, name, digest, made)
     with journal(folder / f"{name}.journal", digest) as steps:
         if steps.remembered:
             job.told(f"{name} goes on after {count(steps.remembered, 'step')} that an earlier run had done")
         stage.make(job, made, steps)
-    later = [other for other in STAGES[STAGES.index(name) + 1 :] if (folder / _STAGES[other].file).is_file()]
-    note_outdated(folder, outdated(folder).union(later) - {name})
     if name == "find":
         note_corrections(folder, job.corrections)
+    note_source(folder, name)
     note(folder, name, digest)
     return False, False
 
@@ -248,14 +246,6 @@ def _tell_light(run: MergedRun, made: Path) -> None:
     reference = model.reference.replace(clipping=model.reference.clipping or known.clipping, **told)
     if reference != model.reference:
         write_ghost_model(made, model.replace(reference=reference))
-
-
-def _measured(model: GhostModel) -> str:
-    """Return a model as later stages are told of it: how bright the light was is nothing to them."""
-    from ..model.capture import OF_LIGHT
-
-    dark = model.model_copy(update={"reference": model.reference.replace(**dict.fromkeys(OF_LIGHT))})
-    return dark.model_dump_json(exclude={"reference": {"clipping"}})
 
 
 def _corrections(folder: Path, given: Path | None) -> Corrections | None:
@@ -299,8 +289,9 @@ def _find(job: _Job, made: Path, steps: Journal) -> None:
 
 
 def _fit_given(job: _Job) -> dict[str, object]:
-    given = {"every": job.every, "found": _measured(_model(job.needed(FOUND, "find")))}
-    return given if job.by == "joint" else {**given, "by": job.by}
+    given = {"every": job.every, "found": as_measured(_model(job.needed(FOUND, "find")))}
+    # told anew when the same numbers mean another ghost
+    return given if job.by == "joint" else {**given, "by": job.by, "numbers": "by the angle from the axis"}
 
 
 def _fit(job: _Job, made: Path, steps: Journal) -> None:
@@ -332,14 +323,17 @@ def _as_wanted(job: _Job, name: str, digest: str, made: Path) -> bool:
 
     if name not in ("fit", "compress"):
         return True
-    model = _model(made)
+    model, left = _model(made), job.folder / f"{name}-residual.journal"
     if model.sprites and not job.residual:
         write_ghost_model(made, model.replace(sprites=()))
     elif job.whole and not model.sprites:
-        with journal(job.folder / f"{name}.journal", f"{digest}, what is left") as steps:
+        with journal(left, digest) as steps:
             views = read_views(job.folder, job.run, job.every)
             write_ghost_model(made, with_rest(model, views, job.threads, steps))
     else:
+        if not job.residual:
+            # nobody wants to know what an earlier command had begun to learn
+            left.unlink(missing_ok=True)
         return True
     return False
 
@@ -347,7 +341,7 @@ def _as_wanted(job: _Job, name: str, digest: str, made: Path) -> bool:
 def _track_given(job: _Job) -> dict[str, object]:
     # ghosts are followed beside halo and star alone
     model = _model(job.needed(MODEL, "fit")).replace(sprites=())
-    return {"every": job.every, "model": _measured(model)}
+    return {"every": job.every, "model": as_measured(model)}
 
 
 def _track(job: _Job, made: Path, steps: Journal) -> None:

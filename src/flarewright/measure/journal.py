@@ -111,7 +111,7 @@ def journal(path: Path, digest: str) -> Iterator[Journal]:
     OutputError
         When the file cannot be written.
     """
-    head = {"journal": 9, "version": __version__, "digest": digest}
+    head = {"journal": 10, "version": __version__, "digest": digest}
     known = _read(path, head)
     text = "".join(json.dumps(line) + "\n" for line in (head, *known))
 

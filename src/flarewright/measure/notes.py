@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 
 from pydantic import ValidationError
@@ -15,7 +15,7 @@ from ..model.capture import OF_LIGHT, MergedRun
 from ..model.corrections import Corrections
 
 NOTES = "stages.json"
-_CORRECTIONS, _OUTDATED = "corrections", "outdated"
+_CORRECTIONS = "corrections"
 # raise when the same frames give other ghosts
 _VERSION = 1
 
@@ -71,15 +71,9 @@ def noted_other(folder: Path, stage: str, digest: str) -> bool:
     return _noted(folder).get(stage, digest) != digest
 
 
-def note_outdated(folder: Path, stages: Collection[str]) -> None:
-    """Note whose files were made before what they are made from was made anew; raises as `note`."""
-    if set(stages) != outdated(folder):
-        note(folder, _OUTDATED, ",".join(sorted(stages)))
-
-
-def outdated(folder: Path) -> set[str]:
-    """Return the stages whose files are noted to be of an earlier model."""
-    return set(filter(None, _noted(folder).get(_OUTDATED, "").split(",")))
+def noted(folder: Path, key: str) -> str | None:
+    """Return what is noted under a key."""
+    return _noted(folder).get(key)
 
 
 def note_corrections(folder: Path, corrections: Corrections | None) -> None:

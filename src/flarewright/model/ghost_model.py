@@ -185,16 +185,17 @@ class AberrationGhost(Frozen):
 
 
 class BezierGhost(Frozen):
-    """A ghost by Walch's primitive (2017, chapter 6): every number a polynomial over the constellation.
+    """A ghost by Walch's primitive (2017, chapter 6): every number a polynomial over the angle from the axis.
 
     Attributes
     ----------
     name : str
     numbers : tuple of 19 tuples of float
-        Coefficients, lowest order first, of z = (constellation - middle) / half range of `visible_deg`. In order:
-        centre along and across the field, height, extent left and right, control points left (along, across) and
-        right, falloff outside and inside, exponents outside and inside, border level and inner level of red, green
-        and blue. Pixels and radiance.
+        Coefficients, lowest order first, of z from -1 to 1 between the least and the largest angle from the axis that
+        `visible_deg` holds: both sides of the axis share them. In order: centre along and across the field, height,
+        extent left and right, control points left (along, across) and right, falloff outside and inside, exponents
+        outside and inside, border level and inner level of red, green and blue. Pixels and radiance. Control points
+        count from 0 to 1.5 times the extent and the height.
     uncertainty : tuple of float
         Standard deviation of each number about its polynomial, 0 where it is not known, or empty.
     visible_deg : tuple of float
