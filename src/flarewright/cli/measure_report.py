@@ -33,20 +33,10 @@ def report(
     from ..io.ghost_model_file import read_ghost_model, read_tracks
     from ..io.sentences import count
     from ..measure.report import strange, write_report
-    from .measure_sources import COMPACT, FOUND, MODEL, TRACKS, is_of_another
+    from .measure_sources import COMPACT, MODEL, TRACKS
 
-    known, remarks = None, []
-    late = [] if model else [(stage, name) for stage, name in (("compress", COMPACT), ("track", TRACKS))
-                             if (folder / name).is_file() and is_of_another(folder, stage)]  # fmt: skip
-    for stage, name in late:
-        more = ", or choose it by --model" if name == COMPACT else ""
-        remarks.append(
-            f"{folder / name} was made from another {MODEL} and is left out: "
-            f"renew it by flarewright measure {stage}{more}"
-        )
-    if not model and (folder / MODEL).is_file() and is_of_another(folder, "fit"):
-        remarks.append(f"{folder / MODEL} was made from another {FOUND}; flarewright measure fit renews it")
-    old = [name for _, name in late]
+    known = None
+    old, remarks = ([], []) if model else _of_another_model(folder)
     left = [folder / name for name in (COMPACT, MODEL) if name not in old and (folder / name).is_file()]
     for file in [model] if model else left:
         found = read_ghost_model(file)
@@ -69,3 +59,20 @@ def report(
     else:
         counted = "" if known is None else f", {count(len(known.ghosts), 'ghost')}"
         print(f"{place}: {count(len(run.frames), 'frame')}{counted}")
+
+
+def _of_another_model(folder: Path) -> tuple[list[str], list[str]]:
+    """Return which of a run's files are not of its model, by their names, and remarks about that."""
+    from .measure_sources import COMPACT, FOUND, MODEL, TRACKS, is_of_another
+
+    old, remarks = [], []
+    for stage, name, more in (("compress", COMPACT, ", or choose it by --model"), ("track", TRACKS, "")):
+        if (folder / name).is_file() and is_of_another(folder, stage):
+            old.append(name)
+            remarks.append(
+                f"{folder / name} was made from another {MODEL} and is left out: "
+                f"renew it by flarewright measure {stage}{more}"
+            )
+    if (folder / MODEL).is_file() and is_of_another(folder, "fit"):
+        remarks.append(f"{folder / MODEL} was made from another {FOUND}; flarewright measure fit renews it")
+    return old, remarks
