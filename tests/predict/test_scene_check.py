@@ -107,6 +107,22 @@ def test_a_lamp_in_a_lens_is_told_before_anything_is_drawn(scene, capsys):
     assert run(["scene", "check", str(scene(measured("whole.json"), lamp="[0.01, 0.1, 0]"))]) == 0
 
 
+def test_every_light_without_visible_light_is_told(scene, capsys):
+    file = scene(measured("whole.json"))
+    infrared = 'spectrum = { kind = "table", wavelength_nm = [1200, 1300], power = [1, 1] }\n'
+    more = "".join(
+        f'[[lights]]\nname = "{name}"\nposition_m = [3, 10, 0]\nintensity_cd = 100\n{spectrum}'
+        for name, spectrum in (("beacon", infrared), ("spot", 'spectrum = "black-body:3000"\n'), ("heater", infrared))
+    )
+    file.write_text(file.read_text() + more)
+    assert run(["scene", "check", str(file), "--json"]) == 2
+    remedy = "the spectrum (table) has no visible light; give it power between 380 and 780 nm"
+    problems = [f"lights[1].spectrum (beacon): {remedy}", f"lights[3].spectrum (heater): {remedy}"]
+    assert json.loads(capsys.readouterr().out)["problems"] == problems
+    assert run(["predict", str(file)]) == 2
+    assert f"scene.toml has 2 problems, the first: {problems[0]}" in capsys.readouterr().err
+
+
 def test_cameras_that_can_be_used_are_usable(scene, capsys):
     file = scene(
         measured("whole.json"),

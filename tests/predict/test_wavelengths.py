@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from flarewright.errors import FlarewrightError
 from flarewright.model import D65, BlackBody, Camera, Everywhere, Light, Lines, Output, Project, Quality, QuarterWave
 from flarewright.model.light import Tabulated
 from flarewright.optics.color import luminance_weights
@@ -42,6 +43,26 @@ def test_few_lines_stay_as_they_are_and_many_are_gathered():
     assert len(luminous_lines(comb, 4).lines) == 4
     table = Tabulated(wavelength_nm=(400.0, 550.0, 700.0), power=(0.0, 1.0, 0.0))
     assert len(luminous_lines(table, 4).lines) == 4
+
+
+@pytest.mark.parametrize(
+    "dark",
+    [
+        Tabulated(wavelength_nm=(1200.0, 1300.0), power=(1.0, 1.0)),
+        Tabulated(wavelength_nm=(500.0, 600.0), power=(0.0, 0.0)),
+        Lines(lines=((589.0, 0.0),)),
+    ],
+)
+def test_a_spectrum_without_visible_light_is_refused(dark):
+    with pytest.raises(FlarewrightError, match="has no visible light; give it power between 380 and 780 nm"):
+        luminous_lines(dark, 5)
+
+
+def test_narrow_and_strong_tables_have_their_lines():
+    narrow = Tabulated(wavelength_nm=(554.5, 555.5), power=(1.0, 1.0))
+    assert luminous_lines(narrow, 5).lines == (pytest.approx((555.0, 1.0 / cie_1931(555.0)[1])),)
+    weak, strong = (Tabulated(wavelength_nm=(400.0, 700.0), power=(power, power)) for power in (1.0, 1e308))
+    assert luminous_lines(strong, 5) == luminous_lines(weak, 5)
 
 
 def test_flare_of_a_quarter_wave_is_that_of_31_even_wavelengths():

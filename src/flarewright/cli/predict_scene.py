@@ -66,6 +66,7 @@ def predict_scene(path: Path, wishes: SceneWishes) -> None:
     from ..predict.worst import render_worst
 
     scene = read_scene(path)
+    _refuse_dark(path, scene)
     camera = None if wishes.near is None else _camera_number(scene, wishes.near)
     maker = partial(_named, quality=wishes.quality, threads=wishes.threads)
     with naming(path):
@@ -107,6 +108,17 @@ def _camera_number(scene: Scene, name: str) -> int:
     if name not in names:
         raise ProjectError(f"--near {name!r} is no camera of the scene{did_you_mean(name, names)}; it has {names}")
     return names.index(name)
+
+
+def _refuse_dark(path: Path, scene: Scene) -> None:
+    """Refuse lights without visible light, by their places, before anything is drawn."""
+    from ..io.project_file import ProjectFileError
+    from ..io.sentences import summary
+    from .scene_cameras import light_mistakes
+
+    problems = light_mistakes(scene)
+    if problems:
+        raise ProjectFileError(summary(str(path), problems), tuple(problems))
 
 
 def _named(camera: Any, light: Any, diameter_deg: float, distance_m: float | None, **how: Any) -> Any:

@@ -1,4 +1,4 @@
-"""What is wrong with the cameras of a scene, whose lenses and models are opened as `flarewright predict` opens them."""
+"""What is wrong with a scene's lights and cameras, of which lenses and models are opened as `predict` opens them."""
 
 from __future__ import annotations
 
@@ -48,6 +48,29 @@ def camera_mistakes(file: Path, scene: Scene, seen: Sequence[Sequence[Sighting]]
                 problems += _too_near(scene, c, row, settled)
         for key, mistake in mistakes.items():
             problems += [f"cameras[{c}].{key} ({camera.name}): {words}" for words in _findings(camera, mistake)]
+    return problems
+
+
+def light_mistakes(scene: Scene) -> list[str]:
+    """Tell of every light without visible light, which lens and eye know nothing of.
+
+    Parameters
+    ----------
+    scene : Scene
+
+    Returns
+    -------
+    list of str
+        A sentence each, with the light's place, key and name.
+    """
+    from ..optics.spectrum import luminance_shares
+
+    problems = []
+    for k, light in enumerate(scene.lights):
+        try:
+            luminance_shares(light.spectrum)
+        except FlarewrightError as error:
+            problems.append(f"lights[{k}].spectrum ({light.name}): {error}")
     return problems
 
 

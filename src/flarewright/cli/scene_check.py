@@ -20,13 +20,13 @@ def check(
     from ..io.scene_file import read_scene
     from ..io.sentences import count, summary
     from ..predict.tracks import camera_track, moments, sightings
-    from .scene_cameras import camera_mistakes
+    from .scene_cameras import camera_mistakes, light_mistakes
 
     with refused_as_json(file, as_json), naming(file):
         scene = read_scene(file)
         times, dates = moments(scene)
         tracks = [camera_track(one, times, f"cameras[{c}] ({one.name})") for c, one in enumerate(scene.cameras)]
-        problems = camera_mistakes(file, scene, sightings(scene, tracks, times, dates))
+        problems = light_mistakes(scene) + camera_mistakes(file, scene, sightings(scene, tracks, times, dates))
         if problems:
             raise ProjectFileError(summary(str(file), problems), tuple(problems))
     if as_json:

@@ -28,6 +28,7 @@ __all__ = [
     "band_parts",
     "band_weights",
     "cie_1931",
+    "luminance_shares",
     "planck",
     "spectral_power",
     "spectrum_xyz",
@@ -168,6 +169,29 @@ def spectrum_xyz(spectrum: Spectrum) -> Floats:
     _, xyz = _stimulus(spectrum)
     total: Floats = xyz.sum(axis=0)
     return total
+
+
+def luminance_shares(spectrum: Spectrum) -> tuple[Floats, Floats]:
+    """Tell which wavelengths hold a light's luminance.
+
+    Parameters
+    ----------
+    spectrum : Spectrum
+
+    Returns
+    -------
+    wavelength_nm : ndarray, shape (L,)
+        The lines in their own order, or every nanometre from 360 to 830.
+    share : ndarray, shape (L,)
+        Of the luminance; 1 in all.
+
+    Raises
+    ------
+    FlarewrightError
+        When the spectrum holds no visible light.
+    """
+    wave, xyz = _stimulus(spectrum)
+    return wave, xyz[:, 1]
 
 
 def band_weights(spectrum: Spectrum, wavelengths_nm: ArrayLike, colorspace: Colorspace) -> Floats:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..model.light import Lines, Spectrum
-from ..optics.spectrum import FIRST_NM, LAST_NM, cie_1931, spectral_power
+from ..optics.spectrum import cie_1931, luminance_shares
 
 Floats = NDArray[np.float64]
 
@@ -29,6 +29,11 @@ def luminous_lines(spectrum: Spectrum, count: int) -> Lines:
     Lines
         `count` of them, or the spectrum's own when those are no more. Luminance alone is right, colour is not.
 
+    Raises
+    ------
+    FlarewrightError
+        When the spectrum holds no visible light.
+
     Notes
     -----
     The reflectances R_j(l) R_i(l) of a ghost are smooth but far from straight between a few even wavelengths: a quarter
@@ -36,15 +41,12 @@ def luminous_lines(spectrum: Spectrum, count: int) -> Lines:
     two thirds, between seven by a fifth. Gauss' nodes and weights for S(l) y(l) integrate polynomials up to degree
     2 count - 1 exactly (Golub and Welsch 1969, from the measure's own recurrence).
     """
-    if isinstance(spectrum, Lines):
-        wave = np.array([line[0] for line in spectrum.lines])
-        light = np.array([line[1] for line in spectrum.lines]) * cie_1931(wave)[:, 1]
-        if len(np.unique(wave[light > 0.0])) <= count:
-            return spectrum
-    else:
-        wave = np.arange(FIRST_NM, LAST_NM + 1.0)
-        light = spectral_power(spectrum, wave) * cie_1931(wave)[:, 1]
-    nodes, weights = _gauss(wave, light / light.sum(), count)
+    wave, share = luminance_shares(spectrum)
+    lit = len(np.unique(wave[share > 0.0]))
+    if isinstance(spectrum, Lines) and lit <= count:
+        return spectrum
+    # a narrow table has light at few nanometres, and no more nodes than these
+    nodes, weights = _gauss(wave, share, min(count, lit))
     # a line's luminance is its power times y(l)
     power = weights / cie_1931(nodes)[:, 1]
     return Lines(lines=tuple((float(node), float(one)) for node, one in zip(nodes, power, strict=True)))
