@@ -7,9 +7,11 @@ import sys
 import pytest
 
 from flarewright.cli.app import run
+from flarewright.cli.predict_flares import camera_project
 from flarewright.io.ghost_model_file import write_ghost_model, write_tracks
 from flarewright.model.ghost_model import GhostModel, Halo, Reference
 from flarewright.model.ghost_tracks import Tracks
+from flarewright.model.scene import Lamp, SceneCamera
 
 LIT = Reference(luminance_cd_m2=1e5, solid_angle_sr=1e-4)
 
@@ -54,7 +56,7 @@ WRONG = {
     "too fast": ('lens = "heliar-tronnier"\nf_number = 1.0', "f_number", "f/1 is faster than"),
     "no zoom": ('lens = "heliar-tronnier"\nzoom = 70.0', "zoom", "no positions to zoom to"),
     "no such coating": ('lens = "heliar-tronnier"\ncoating = "preset:shiny"', "coating", "no coating preset 'shiny'"),
-    "no sensor": ('lens = "heliar-tronnier"\nsensor_mm = [36, 2e6]', "sensor_mm", "36x2e+06 mm is no sensor"),
+    "no such focus": ('lens = "heliar-tronnier"\nfocus_m = 1e306', "focus_m", "focus_distance should be a finite"),
 }  # fmt: skip
 
 
@@ -70,6 +72,33 @@ def test_check_refuses_what_predict_refuses(case, scene, capsys):
     told = capsys.readouterr().err
     assert "camera A: " in told
     assert words in told
+
+
+@pytest.mark.parametrize("camera", ['lens = "heliar-tronnier"\n', measured("whole.json")])
+@pytest.mark.parametrize(
+    ("sensor", "words"),
+    [
+        ("[1e-300, 1e300]", "1e-300x1e+300"), ("[36, 0.05]", "36x0.05"), ("[36, 1e-200]", "36x1e-200"),
+        ("[0.001, 24]", "0.001x24"), ("[1, 1000]", "1x1000"), ("[36, 3.5]", "36x3.5"), ("[2000, 1500]", "2000x1500"),
+    ],
+)  # fmt: skip
+def test_sensors_that_no_camera_has_are_refused(camera, sensor, words, scene, capsys):
+    file = scene(f"{camera}sensor_mm = {sensor}")
+    remedy = "give sides of 0.1 to 1000 mm, the longer at most 10 times the shorter"
+    for command in (["scene", "check"], ["predict"]):
+        assert run([*command, str(file)]) == 2
+        assert f"scene.toml: cameras[0].sensor_mm: {words} mm is no sensor; {remedy}" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("sensor", [(36.0, 3.6), (3.6, 36.0), (3.0, 0.3), (0.1, 0.1), (1000.0, 562.5)])
+def test_pixels_of_a_scene_are_square(sensor):
+    spot = Lamp(name="spot", position_m=(0.0, 9.0, 0.0), intensity_cd=1.0)
+    seen = SceneCamera(
+        name="A", lens="heliar-tronnier", position_m=(0.0, 0.0, 0.0), aim_m=(0.0, 1.0, 0.0), sensor_mm=sensor
+    )
+    camera = camera_project(seen, spot, 0.0).camera
+    assert camera.sensor_mm == sensor
+    assert camera.pixel_aspect == pytest.approx(1.0, rel=0.02)
 
 
 def test_everything_that_is_wrong_with_all_cameras_is_told_at_once(scene, capsys):

@@ -289,10 +289,13 @@ def _wanted(
 def _sensor(text: str | None) -> tuple[float, float] | None:
     if text is None:
         return None
+    from ..model.camera import predicted_sensor
+
     width, height = pair(text, "--sensor", "36x24 (mm)", "x")
-    if min(width, height) <= 0.0:
-        raise ProjectError(f"--sensor {text!r}: a sensor has a width and a height above 0 mm")
-    return width, height
+    try:
+        return predicted_sensor((width, height))
+    except ValueError as error:
+        raise ProjectError(f"--sensor {text!r}: {error}") from None
 
 
 def _setting(illuminance: float | None, luminance: str | None) -> Setting:
@@ -322,7 +325,7 @@ def _project(
     from .render_flags import in_flags
 
     width, height = sensor
-    size_px = (SHOWN_PX, max(1, min(round(SHOWN_PX * height / width), 10 * SHOWN_PX)))
+    size_px = (SHOWN_PX, round(SHOWN_PX * height / width))
     light = {
         "field_deg": (0.0, 0.0), "spectrum": parse_spectrum(spectrum or "d65"), "diameter_deg": light_diameter or 0.0
     }  # fmt: skip

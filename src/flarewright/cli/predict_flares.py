@@ -91,7 +91,7 @@ def camera_project(camera: SceneCamera, light: SceneLight, diameter_deg: float) 
     Raises
     ------
     ProjectError
-        When there is no such sensor.
+        When a lens cannot be asked for it, a focus beyond all numbers say.
     """
     from pydantic import ValidationError
 
@@ -103,7 +103,7 @@ def camera_project(camera: SceneCamera, light: SceneLight, diameter_deg: float) 
         "lens": camera.lens, "f_number": camera.f_number, "zoom": camera.zoom, "coating": camera.coating,
         "lights": ({"field_deg": (0.0, 0.0), "spectrum": light.spectrum, "diameter_deg": diameter_deg},),
         "camera": {
-            "size_px": (SHOWN_PX, max(1, min(round(SHOWN_PX * height / width), 10 * SHOWN_PX))),
+            "size_px": (SHOWN_PX, round(SHOWN_PX * height / width)),
             "sensor_mm": (width, height), "focus_distance": None if camera.focus_m is None else 1e3 * camera.focus_m,
         },
     }  # fmt: skip

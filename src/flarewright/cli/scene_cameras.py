@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from ..render.prepare import Settled
 
 # what a camera asks of its lens, each on top of those before it
-_ASKED = ("zoom", "focus_m", "f_number", "coating", "sensor_mm")
+_ASKED = ("zoom", "focus_m", "f_number", "coating")
 
 
 def camera_mistakes(file: Path, scene: Scene, seen: Sequence[Sequence[Sighting]]) -> list[str]:

@@ -12,6 +12,10 @@ from .plate import Plate
 
 # a kilometre: far beyond every sensor, and every ghost still has a size in the picture
 LARGEST_SENSOR_MM = 1e6
+# mm a side of sensors whose flare is predicted, and the longer side over the shorter: beyond, square pixels are too few
+# one way or too many the other
+PREDICTED_SIDES_MM = (0.1, 1000.0)
+PREDICTED_PROPORTIONS = 10.0
 
 
 class Camera(Frozen):
@@ -85,6 +89,30 @@ class Camera(Frozen):
         """Width of a pixel over its height, as a viewer shall show it."""
         (width, height), (across, down) = self.size_px, self.sensor
         return (across * (self.squeeze or 1.0) / width) / (down / height)
+
+
+def predicted_sensor(sensor_mm: tuple[float, float]) -> tuple[float, float]:
+    """Return a sensor whose flare can be predicted, as it is.
+
+    Parameters
+    ----------
+    sensor_mm : tuple of float
+        Width and height.
+
+    Raises
+    ------
+    ValueError
+        When a side or the proportions are no camera's.
+    """
+    least, most = PREDICTED_SIDES_MM
+    short, long = sorted(sensor_mm)
+    # no quotient, which may be beyond all numbers; 3x0.3 is not to fail by its last bit
+    if not (least <= short and long <= most and long <= PREDICTED_PROPORTIONS * short * (1.0 + 1e-9)):
+        raise ValueError(
+            f"{sensor_mm[0]:g}x{sensor_mm[1]:g} mm is no sensor; give sides of {least:g} to {most:g} mm, the longer at "
+            f"most {PREDICTED_PROPORTIONS:g} times the shorter"
+        )
+    return sensor_mm
 
 
 Colorspace = Literal["rec709", "acescg"]

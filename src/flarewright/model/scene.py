@@ -10,9 +10,10 @@ from datetime import datetime
 from itertools import pairwise
 from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from .base import Frozen
+from .camera import predicted_sensor
 from .light import D65, Spectrum
 from .project import AsLens, CoatingChoice
 
@@ -63,7 +64,7 @@ class SceneCamera(Frozen):
         Distance of the plane in focus; None: infinity.
     coating : CoatingChoice
     sensor_mm : tuple of float
-        Of a measured flare: in its captures' proportions; not told: 36 mm wide.
+        As `predicted_sensor`. Of a measured flare: in its captures' proportions; not told: 36 mm wide.
     iso, exposure_s : float
     keyframes : tuple of CameraKey
         Rising in time, straight lines between; the camera's own place is that at 0 unless a keyframe is.
@@ -82,7 +83,7 @@ class SceneCamera(Frozen):
     zoom: str | Positive | None = None
     focus_m: Positive | None = None
     coating: CoatingChoice = AsLens()
-    sensor_mm: tuple[Positive, Positive] = (36.0, 24.0)
+    sensor_mm: Annotated[tuple[Positive, Positive], AfterValidator(predicted_sensor)] = (36.0, 24.0)
     iso: float = Field(100.0, gt=0.0, le=1e7)
     exposure_s: float = Field(0.01, gt=0.0, le=1e5)
     keyframes: tuple[CameraKey, ...] = ()
