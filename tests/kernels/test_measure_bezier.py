@@ -38,7 +38,7 @@ HOLLOW = np.array([0.0, -3.0, 25.0, 60.0, 40.0, 55.0, 2.0, 0.0, 0.0, *NUMBERS[9:
 
 
 # where two feet are all but equally far, the place nearest to a point may lie beside the farther one
-@pytest.mark.parametrize(("numbers", "error"), [(NUMBERS, 1e-6), (CIRCLE, 1e-6), (HOLLOW, 1e-3)])
+@pytest.mark.parametrize(("numbers", "error"), [(NUMBERS, 1e-9), (CIRCLE, 1e-9), (HOLLOW, 1e-3)])
 def test_distance_is_that_of_the_polynomials_roots(numbers, error):
     rng = np.random.default_rng(3)
     # on a turned grid there are points on the line through the middle, with a foot on either side

@@ -15,7 +15,7 @@ SHAPE = 9
 LANES = 32
 
 # parts of a curve whose ends are compared first
-_PARTS = 12
+_PARTS = 16
 # steps from the nearest of them: until none goes farther, where Newton's next goes its square, and at most, which halve
 # such a part to less
 _ENOUGH, _STEPS = 1e-4, 24
@@ -80,7 +80,7 @@ def border_of(numbers, curves, places):
     numbers : ndarray, shape (19,)
     curves : ndarray, shape (2, 2, 4)
         Left and right; along and across the field; powers of t.
-    places : ndarray, shape (2, 13, 2)
+    places : ndarray, shape (2, 17, 2)
 
     Returns
     -------
