@@ -12,7 +12,7 @@ from ._jit import compiled, inlined, inner
 
 # centre along and across the field, height, extents left and right, control points (along, across) left and right
 SHAPE = 9
-LANES = 32
+LANES = 48
 
 # parts of a curve whose ends are compared first
 _PARTS = 16
