@@ -207,9 +207,11 @@ def run_stages(
             kept, as_it_was = _kept(job, name, made)
             if made.name != TRACKS:
                 _tell_light(run, made)
-        facts[name] = {**_facts(made), "file": str(made), "kept": kept}
+        # a model with its sprites is some 20 MB to read
+        counted = _facts(made)
+        facts[name] = {**counted, "file": str(made), "kept": kept}
         if talk:
-            words = ", ".join(count(value, _ONE[key], key) for key, value in _facts(made).items())
+            words = ", ".join(count(value, _ONE[key], key) for key, value in counted.items())
             print(f"{made}: {words}" + (", as before" if as_it_was else ", ghosts as before" if kept else ""))
     return facts
 
@@ -357,10 +359,10 @@ def _track(job: _Job, made: Path, steps: Journal) -> None:
 
 def _compress_given(job: _Job) -> dict[str, object]:
     from ..io.ghost_model_file import read_tracks
-    from ..measure.notes import noted_other, run_digest
+    from ..measure.notes import noted, run_digest
 
     tracks, given = read_tracks(job.needed(TRACKS, "track")), _track_given(job)
-    if noted_other(job.folder, "track", run_digest(job.folder, job.run, given)):
+    if noted(job.folder, "track") not in (None, run_digest(job.folder, job.run, given)):
         raise FlarewrightError(
             f"{job.folder / TRACKS} was made from another {MODEL}, from other frames or with another --every: run "
             f"flarewright measure track {job.folder} again, or measure run, which does what is needed"

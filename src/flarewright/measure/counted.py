@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from ..model.ghost_model import GhostModel
 from ..model.layer import Layer
+from .blocks import reduced
 from .dimmed import AROUND_LIGHT
 from .numbers import fit_in
 from .replay import light_px, replay
@@ -71,7 +72,7 @@ def counted(
     own = within((x * scale, y * scale + top), around * fine[0], fine)
     beyond = (layers["beauty"] - layers["ghosts"]) * (1.0 - own[..., None])
     return tuple(
-        Layer(name, _averaged(pixels, finer), (0, 0, width, height))
+        Layer(name, reduced(pixels, finer).astype(np.float32), (0, 0, width, height))
         for name, pixels in (("ghosts", layers["ghosts"]), ("scatter", beyond))
     )
 
@@ -111,9 +112,3 @@ def _finer(model: GhostModel, width_px: int) -> int:
         return _FINER
     needed = ceil(model.size_px[0] / width_px / (_SPIKE * model.star.width_px))
     return min(max(needed, _FINER), _FINEST)
-
-
-def _averaged(pixels: NDArray[np.floating], finer: int) -> NDArray[np.float32]:
-    """Return the means of squares of pixels."""
-    height, width = (side // finer for side in pixels.shape[:2])
-    return np.asarray(pixels.reshape(height, finer, width, finer, 3).mean(axis=(1, 3)), dtype=np.float32)

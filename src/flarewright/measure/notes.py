@@ -47,7 +47,7 @@ def run_digest(folder: Path, run: MergedRun, settings: Mapping[str, object]) -> 
 
 def is_current(folder: Path, stage: str, digest: str, made: Path) -> bool:
     """Tell whether a stage's file is there and was made from what it would be made from now."""
-    return made.is_file() and _noted(folder).get(stage) == digest
+    return made.is_file() and noted(folder, stage) == digest
 
 
 def note(folder: Path, stage: str, digest: str) -> None:
@@ -66,13 +66,8 @@ def note(folder: Path, stage: str, digest: str) -> None:
     write_atomically(folder / NOTES, write)
 
 
-def noted_other(folder: Path, stage: str, digest: str) -> bool:
-    """Tell whether it is noted that a stage's file was made from something else than a digest's."""
-    return _noted(folder).get(stage, digest) != digest
-
-
 def noted(folder: Path, key: str) -> str | None:
-    """Return what is noted under a key."""
+    """Return what is noted under a key, as what a stage was made from under the stage's name; None: nothing."""
     return _noted(folder).get(key)
 
 
@@ -89,7 +84,7 @@ def noted_corrections(folder: Path) -> Corrections | None:
     FlarewrightError
         When the note is damaged.
     """
-    text = _noted(folder).get(_CORRECTIONS, "")
+    text = noted(folder, _CORRECTIONS)
     try:
         return Corrections.model_validate_json(text) if text else None
     except ValidationError:

@@ -17,6 +17,7 @@ from ..model.ghost_model import GhostModel
 from ..model.layer import Layer
 from ..render.figure import Figure, Mark, Picture, Text
 from ..render.page import figures, image, paragraph, section
+from .blocks import reduced
 from .dimmed import AROUND_LIGHT
 from .overview import frame_of
 from .replay import replay
@@ -80,13 +81,6 @@ class _Shown:
         level = np.log10(np.maximum(light, dark) / dark) / _DECADES
         shown = np.where(self.clipped[..., None], 1.0, np.clip(level, 0.0, 1.0))
         return np.asarray((shown * 255.0).astype(np.uint8))
-
-
-def reduced(pixels: NDArray[np.generic], block: int) -> Floats:
-    """Return a picture averaged over blocks of pixels, shape (H, W, 3)."""
-    height, width = pixels.shape[0] // block, pixels.shape[1] // block
-    part = pixels[: height * block, : width * block].astype(np.float64)
-    return np.asarray(part.reshape(height, block, width, block, 3).mean(axis=(1, 3)))
 
 
 def place_of(info: FrameInfo, model: GhostModel) -> tuple[float, float] | None:
