@@ -1,15 +1,54 @@
-"""Common ground of all tests: helpers importable by name, and compiled kernels that fit the sources."""
+"""Common ground of all tests: helpers importable by name, and one cache of compiled kernels that fits the sources."""
 
 import hashlib
 import os
 import sys
 import tempfile
+from contextlib import contextmanager
 from pathlib import Path
 
 HERE = Path(__file__).parent
 sys.path[:0] = [str(HERE / part) for part in ("physics", "design", "measure", "predict")]
 
 # Numba notices a changed kernel but not a changed kernel that it calls, so the cache is named after all their sources
-_sources = sorted((HERE.parent / "src" / "flarewright" / "kernels").glob("*.py"))
+_sources = sorted((HERE.parent / "src" / "flarewright" / "kernels").rglob("*.py"))
 _digest = hashlib.sha256(b"".join(path.read_bytes() for path in _sources)).hexdigest()[:16]
 os.environ.setdefault("NUMBA_CACHE_DIR", str(Path(tempfile.gettempdir()) / f"flarewright-kernels-{_digest}"))
+
+
+@contextmanager
+def _locked(path):
+    """Hold a file's lock, which ends with the process at the latest; where the system has none, hold nothing."""
+    try:
+        import fcntl
+    except ImportError:
+        yield
+        return
+    with path.open("ab") as stream:
+        fcntl.flock(stream, fcntl.LOCK_EX)
+        yield
+
+
+def pytest_configure(config):
+    """Have each kernel compiled by one process; the others wait for it and load its machine code.
+
+    Numba also reads, changes and writes the index of a kernel without a lock, so that two processes that compile the
+    same kernel for other types can lose each other's code.
+    """
+    if config.getoption("numprocesses", default=None) and not hasattr(config, "workerinput"):
+        # the process that only hands out tests compiles nothing
+        return
+    from numba.core.dispatcher import Dispatcher
+
+    compile_alone = Dispatcher.compile
+
+    def compile_once(self, sig):
+        if self._cache.cache_path is None:
+            # nothing of it is cached: its callers hold its code
+            return compile_alone(self, sig)
+        index = Path(self._cache._cache_file._index_path)
+        index.parent.mkdir(parents=True, exist_ok=True)
+        with _locked(index.with_suffix(".lock")):
+            return compile_alone(self, sig)
+
+    Dispatcher.compile = compile_once
