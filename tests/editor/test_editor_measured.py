@@ -45,7 +45,7 @@ def path(tmp_path):
 
 
 @pytest.fixture
-def screen(path):
+def screen(path, screen_size):
     session, _ = begin(path)
     screen = Screen(session)
     screen.start()

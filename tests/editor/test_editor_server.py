@@ -23,7 +23,7 @@ CORPUS = Path(__file__).parents[1]
 
 
 @pytest.fixture
-def desk():
+def desk(screen_size):
     import uvicorn
 
     session, _ = begin(None)
@@ -32,7 +32,7 @@ def desk():
     thread = threading.Thread(target=server.run, daemon=True)
     thread.start()
     while not server.started:
-        pass
+        time.sleep(0.005)
     desk.address = f"http://127.0.0.1:{server.servers[0].sockets[0].getsockname()[1]}"
     desk.screen.start()
     assert desk.screen.wait(60.0)
@@ -186,7 +186,7 @@ def test_a_hand_that_vanishes_has_let_go(desk):
     def rests(wanted):
         end = time.monotonic() + 60.0
         while current() != wanted and time.monotonic() < end:
-            time.sleep(0.02)
+            time.sleep(0.05)
         return current() == wanted
 
     address = desk.address.replace("http", "ws") + "/ws/moving"

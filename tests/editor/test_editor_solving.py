@@ -3,12 +3,14 @@
 import io
 import threading
 import time
+from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from PIL import Image
 
+from flarewright.design.color_search import solve_colors
 from flarewright.design.colors import color_problem, own_colors, perceived_differences
 from flarewright.editor import solving, studio
 from flarewright.editor.shown import pixels_of
@@ -18,6 +20,19 @@ from flarewright.errors import ProjectError
 from flarewright.model import AsLens, Design, Everywhere, GhostWish, Light, Preset, QuarterWave, Surface
 from flarewright.optics.pack import resolve_coatings
 from flarewright.render.prepare import as_lens
+
+
+@pytest.fixture
+def project(project, screen_size):
+    """The project as simple as the size of the screen asks for."""
+    return screen_size(project)
+
+
+@pytest.fixture
+def few_descents(screen_size, monkeypatch):
+    """A search of colours makes an eighth of its descents, where the screen is small."""
+    if studio.WIDEST < 960:
+        monkeypatch.setattr(solving, "solve_colors", partial(solve_colors, starts=8))
 
 
 class _Session:
@@ -137,6 +152,7 @@ def test_a_colour_for_a_new_ghost_is_refused_in_the_pages_words(project):
         solver.start_colors("quarter-wave", 30.0)
 
 
+@pytest.mark.usefixtures("few_descents")
 def test_colours_that_are_found_keep_the_shot_as_it_is(project):
     """Only coatings are new: opening, glass and what was changed meanwhile stay."""
     puts = []
@@ -154,6 +170,7 @@ def test_colours_that_are_found_keep_the_shot_as_it_is(project):
     assert found == session.project.replace(coating=found.coating, design=None)
 
 
+@pytest.mark.usefixtures("few_descents")
 def test_how_near_colours_come_is_told_and_cemented_rows_stay_bare(project):
     wishes = (GhostWish(ghost="8-6", color=(1.0, 0.2, 0.1)),)
     session = _Session(project.replace(coating=AsLens(), design=Design(wishes=wishes)))
@@ -182,9 +199,13 @@ def test_how_near_colours_come_is_told_and_cemented_rows_stay_bare(project):
     assert said[-1] == "the cemented rows (1, 7) stay bare, for no film can be put there"
 
 
+@pytest.mark.usefixtures("few_descents")
 @pytest.mark.parametrize(("chosen", "look"), [(None, "srgb"), (9.0, "filmic")])
-def test_coatings_are_shown_as_they_will_be_once_they_are_taken(project, chosen, look):
+def test_coatings_are_shown_as_they_will_be_once_they_are_taken(project, chosen, look, monkeypatch):
     """At an exposure of their own they had looked brighter than the picture was with them."""
+    # so large that the codec changes less than a draft does
+    monkeypatch.setattr(studio, "WIDEST", max(studio.WIDEST, 480))
+    monkeypatch.setattr(studio, "HIGHEST", max(studio.HIGHEST, 270))
     shot = project.replace(design=Design(wishes=(GhostWish(ghost="8-6", color=(1.0, 0.2, 0.1)),)))
     view = View(exposure_stops=chosen, look=look)
     told = []
