@@ -92,33 +92,38 @@ def count(shot: Shot, path: LightPath, iris: Iris, *, w: int = 0, n: int = 240) 
     for fineness in (100, n):
         points, cell, size = _grid(box, fineness)
         data = trace_points(packed, w, path, tilt, points)
-        open_rays = (data[:, 4] > 0) & (data[:, 3] <= 1.0)
-        data[~open_rays] = 0.0
+        alive = (data[:, 4] > 0) & (data[:, 3] <= 1.0)
+        points, data = points[alive], data[alive]
         halves = []
         for mirror in (1.0, -1.0):
-            passing = open_rays.copy()
+            passing = np.ones(len(data), dtype=bool)
             for c in range(path.stop_crossings):
-                at = np.stack([mirror * data[:, 5 + 2 * c], data[:, 6 + 2 * c]], axis=1) @ shot.incidence.axes
-                passing &= transmission(iris, packed.stop_semi, at[:, 0], at[:, 1]) > 0.5
+                x, y = _turned(mirror * data[:, 5 + 2 * c], data[:, 6 + 2 * c], shot.incidence.axes)
+                passing &= transmission(iris, packed.stop_semi, x, y) > 0.5
             halves.append(passing)
         either = halves[0] | halves[1]
         if not either.any():
             return Counted(0.0, 0.0, (0.0, 0.0))
-        hit = points[either]
-        low, high = hit.min(axis=0) - 2.0 * size, hit.max(axis=0) + 2.0 * size
+        x, y = points[either].T
+        low, high = (x.min(), y.min()) - 2.0 * size, (x.max(), y.max()) + 2.0 * size
         # symmetric in x: the grid covers one half and must begin at the mirror axis
         box = np.array([max(low[0], 0.0), high[0], low[1], high[1]])
     half_sensor = 0.5 * np.array(shot.size_px) / shot.to_pixels[2:]
     flux, seen, reach = 0.0, 0.0, np.zeros(2)
     for mirror, passing in zip((1.0, -1.0), halves, strict=True):
         weight = data[passing, 2]
-        place = np.stack([mirror * data[passing, 0], data[passing, 1]], axis=1) @ shot.incidence.axes
+        x, y = (np.abs(a) for a in _turned(mirror * data[passing, 0], data[passing, 1], shot.incidence.axes))
         flux += weight.sum()
-        seen += weight[(np.abs(place) <= half_sensor).all(axis=1)].sum()
+        seen += weight[(x <= half_sensor[0]) & (y <= half_sensor[1])].sum()
         if passing.any():
-            reach = np.maximum(reach, np.abs(place).max(axis=0))
+            reach = np.maximum(reach, [x.max(), y.max()])
     scale = cell * shot.incidence.cosine
     return Counted(float(flux * scale), float(seen * scale), (float(reach[0]), float(reach[1])))
+
+
+def _turned(x, y, axes):
+    """Points as seen along the axes of a light: columns are fast where arrays of pairs are not."""
+    return x * axes[0, 0] + y * axes[1, 0], x * axes[0, 1] + y * axes[1, 1]
 
 
 def _grid(box, n):

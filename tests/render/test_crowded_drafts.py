@@ -44,12 +44,12 @@ def test_coarse_ghosts_cannot_be_told(rules, monkeypatch):
 
 
 def test_ghosts_are_weighed_as_they_are_drawn():
-    settled = settle(CANON)
+    settled = settle(CANON.replace(camera=Camera(size_px=(160, 90))))
     (shot,) = make_shots(settled, make_opening(settled, None))
     paths = ghost_paths(settled.lens)
     drawn = np.empty(len(paths))
     for k, path in enumerate(paths):
-        picture = np.zeros((270, 480, 3))
+        picture = np.zeros((90, 160, 3))
         ghosts_draft.draw_draft(shot, [path], picture)
         sum_rows(picture, picture)
         drawn[k] = luminance_weights(shot.colorspace) @ picture.sum(axis=(0, 1))

@@ -13,6 +13,7 @@ from flarewright.optics.border import closed
 from flarewright.optics.diffraction import Pattern, Soil, pupil_pattern
 from flarewright.optics.dirt import FIELD, Elements, lay_elements, rasterise, scattered
 from flarewright.optics.pupil import FFT_SIZE, WINDOW, pupil_amplitude
+from flarewright.render import starburst_pass
 from flarewright.render.direct import PUPIL_SPAN, direct_image, traced_pupil
 from flarewright.render.prepare import settle
 from flarewright.render.render import render
@@ -22,6 +23,7 @@ from flarewright.render.starburst import starburst_layer
 
 GREEN = (np.array([550.0]), np.ones((1, 3)))
 WAVES = np.arange(500.0, 601.0, 5.0)
+ROUND, SIX = Iris(), Iris(blades=6, rotation_deg=7.0)
 SOILS = {
     "dust": Dirt(dust_per_mm2=2.0, dust_um=(20.0, 200.0), seed=3),
     "fine dust": Dirt(dust_per_mm2=20.0, dust_um=(5.0, 40.0), seed=3),
@@ -51,33 +53,46 @@ def test_veil_of_random_discs_is_the_transform_of_their_picture():
     at = (np.arange(-560, 560) + 0.5) * spacing
     s = np.fft.fftfreq(2048, spacing)
     r = np.hypot(s, s[:, None])
-    rings = [(r > low) & (r < high) for low, high in ((8, 12), (12, 20), (20, 30), (30, 50))]
+    rings = [np.nonzero((r > low) & (r < high)) for low, high in ((8, 12), (12, 20), (20, 30), (30, 50))]
+    widths = [r[ring] for ring in rings]
     found, expected = np.zeros(len(rings)), np.zeros(len(rings))
-    for seed in range(8):
+    for seed in range(3):
         elements = lay_elements(Dirt(dust_per_mm2=0.2, dust_um=(150.0, 600.0), seed=seed), 8.0)
         inside = np.hypot(*elements.discs[:, :2].T) < 1.2
         amplitude, _ = rasterise(Elements(elements.discs[inside], elements.arcs), at)
-        P = np.abs(np.fft.fft2(1.0 - amplitude, (2048, 2048))) ** 2 * spacing**4 / np.sinc(spacing * r) ** 4
+        spectrum = np.fft.fft2(1.0 - amplitude, (2048, 2048))
         (term,) = scattered(elements, inside, np.ones(0, bool), power=1.0)
-        found += [P[ring].mean() for ring in rings]
-        expected += [np.interp(r[ring], term.s, term.radial).mean() for ring in rings]
-    # speckle: a ring of n grains is known to 1 / sqrt(n)
+        for k, (ring, at_s) in enumerate(zip(rings, widths, strict=True)):
+            found[k] += (np.abs(spectrum[ring]) ** 2 * spacing**4 / np.sinc(spacing * at_s) ** 4).mean()
+            expected[k] += np.interp(at_s, term.s, term.radial).mean()
+    # speckle: a ring of n grains is known to 1 / sqrt(n), the smallest of three pupils to two percent
     np.testing.assert_allclose(found, expected, rtol=0.1)
 
 
-@pytest.mark.parametrize("name", SOILS)
-@pytest.mark.parametrize("iris", [Iris(), Iris(blades=6, rotation_deg=7.0)])
+@pytest.mark.parametrize(
+    ("name", "iris"),
+    [
+        ("dust", ROUND),
+        ("fine dust", SIX),
+        ("scratches", SIX),
+        ("fingerprint", ROUND),
+        pytest.param("dust", SIX, marks=pytest.mark.slow),
+        pytest.param("fine dust", ROUND, marks=pytest.mark.slow),
+        pytest.param("scratches", ROUND, marks=pytest.mark.slow),
+        pytest.param("fingerprint", SIX, marks=pytest.mark.slow),
+    ],
+)
 def test_unit_flux_whatever_lies_on_the_pupil(name, iris):
     pattern = pupil_pattern(iris, radius_mm=8.0, soil=Soil(SOILS[name]))
-    size, pitch = (901, 901), 0.06
+    size, pitch = (451, 451), 0.12
     E = starburst_layer(
-        iris, 4.0, (pitch, pitch), size, (450.7, 450.2), WAVES, np.ones((len(WAVES), 3)), pattern=pattern
+        iris, 4.0, (pitch, pitch), size, (225.7, 225.2), WAVES, np.ones((len(WAVES), 3)), pattern=pattern
     )
-    clean = starburst_layer(iris, 4.0, (pitch, pitch), size, (450.7, 450.2), WAVES, np.ones((len(WAVES), 3)))
+    clean = starburst_layer(iris, 4.0, (pitch, pitch), size, (225.7, 225.2), WAVES, np.ones((len(WAVES), 3)))
     assert E[..., 0].sum(dtype=float) * pitch**2 / len(WAVES) == pytest.approx(1.0, abs=2e-3)
     assert 0.8 < pattern.transmittance < 0.9999
     # far from the centre there is more light than without dirt
-    assert E[:, :300].sum(dtype=float) > 1.02 * clean[:, :300].sum(dtype=float)
+    assert E[:, :150].sum(dtype=float) > 1.02 * clean[:, :150].sum(dtype=float)
 
 
 def test_parseval_in_the_fourier_core():
@@ -188,11 +203,12 @@ def picture(name="starburst", **changes):
 
 
 def test_the_lights_disc_blurs_and_keeps_the_flux():
-    point = picture()
+    small = Camera(size_px=(150, 100))
+    point = picture(camera=small)
     for degrees in (0.02, 0.53, 3.0):
-        disc = picture(lights=(Light(field_deg=(5.0, 2.0), diameter_deg=degrees),))
+        disc = picture(lights=(Light(field_deg=(5.0, 2.0), diameter_deg=degrees),), camera=small)
         assert disc.sum(dtype=float) == pytest.approx(point.sum(dtype=float), rel=2e-3)
-        radius = 99.24 * math.tan(math.radians(degrees / 2)) / (36 / 300)
+        radius = 99.24 * math.tan(math.radians(degrees / 2)) / (36 / 150)
         if radius > 2:
             bright = disc[..., 1] > 0.5 * disc[..., 1].max()
             assert bright.sum() == pytest.approx(math.pi * radius**2, rel=0.1)
@@ -205,13 +221,14 @@ def test_disc_blur_of_a_dot_is_the_disc():
     disc = spread(dot, shape_kernel(closed(np.stack([7.0 * np.cos(angle), 5.0 * np.sin(angle)], axis=1))))[..., 0]
     assert disc.sum() == pytest.approx(1.0, rel=1e-12)
     y, x = np.mgrid[-20:21, -25:26]
-    assert disc[(x / 7) ** 2 + (y / 5) ** 2 < 0.7] == pytest.approx(1 / (math.pi * 35), rel=0.01)
+    np.testing.assert_allclose(disc[(x / 7) ** 2 + (y / 5) ** 2 < 0.7], 1 / (math.pi * 35), rtol=0.01)
     assert np.abs(disc[(x / 7) ** 2 + (y / 5) ** 2 > 1.4]).max() < 1e-12
 
 
-def test_the_artists_hand_is_one_switch_away_from_the_physics():
+def test_the_artists_hand_is_one_switch_away_from_the_physics(monkeypatch):
+    monkeypatch.setattr(starburst_pass, "SPIRAL_COPIES", 3)
     plain = picture()
-    assert picture(starburst=Starburst(intensity=3.0)) == pytest.approx(3 * plain, rel=1e-5)
+    np.testing.assert_allclose(picture(starburst=Starburst(intensity=3.0)), 3 * plain, rtol=1e-5)
     wide = picture(starburst=Starburst(size=40.0))
     assert wide.sum(dtype=float) == pytest.approx(plain.sum(dtype=float), rel=0.1)
     assert wide.max() < 0.6 * plain.max()
@@ -252,6 +269,7 @@ def test_dirt_in_ghosts_takes_its_share_and_leaves_the_edges():
         "f_number": 5.6,
         "iris": Iris(blades=6),
         "quality": Quality(wavelengths=1, paths="same-side", ringing="off"),
+        "output": Output(layers="passes", starburst=False),
     }
     clean, dirty = picture("ghosts", **given), picture("ghosts", dirt=dirt, **given)
     only_burst = picture("ghosts", dirt=dirt.replace(in_ghosts=False), **given)

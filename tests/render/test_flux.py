@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 import pytest
 from PIL import Image
 from pupil_sum import D_LINE, by_name, count, layer_flux, layers_of, mono, path_of, picture, scene, shots_of
 
-from flarewright.model import D65, Everywhere, Iris, Light, Project, QuarterWave
+from flarewright.model import D65, Everywhere, Iris, Light, Output, Project, Quality, QuarterWave
 from flarewright.optics.ghosts import ghost_table
 from flarewright.optics.paths import ghost_paths
 from flarewright.optics.region import find_region
@@ -32,11 +33,22 @@ def monochrome(project) -> np.ndarray:
     return shot.weights(shot.packed.wavelengths_nm)[0]
 
 
-def counted(project) -> dict:
-    """Rays counted for every path."""
+def counted(project, rays: int | None = None) -> dict:
+    """Rays counted for every path; 170 a side know the flux of plain ghosts to 4e-4, 120 to 7e-4."""
+    # thin rings take more
+    rays = rays or (240 if project.lens == "double-gauss-tronnier" else 170)
+    camera = project.camera.replace(size_px=(64, 36))
+    lit = project.replace(camera=camera, quality=Quality(wavelengths=1), output=Output())
+    return _counted(lit.model_dump_json(), rays)
+
+
+@lru_cache(maxsize=16)
+def _counted(json: str, rays: int) -> dict:
+    """Count once what is lit alike on the same sensor, whatever its pixels."""
+    project = Project.model_validate_json(json)
     shot = shots_of(project)[0]
     lens = load_lens(project.lens)
-    return {f"ghost.{path.name}": count(shot, path, project.iris) for path in ghost_paths(lens)}
+    return {f"ghost.{path.name}": count(shot, path, project.iris, n=rays) for path in ghost_paths(lens)}
 
 
 def complaints(project, truth: dict, floor: float = FLOOR, tolerance: float = FLUX) -> list[str]:
@@ -58,10 +70,15 @@ def ghosts_of(lens: str, light: Light, **parts):
     return scene(lens, light, layers="ghosts", starburst=False, **parts)
 
 
+def slow(*values):
+    """Repeat a test on more lenses where time allows."""
+    return pytest.param(*values, marks=pytest.mark.slow)
+
+
 # --- the sum of each layer
 
 
-@pytest.mark.parametrize("lens", ["heliar-tronnier", "tessar-brendel", "double-gauss-tronnier"])
+@pytest.mark.parametrize("lens", ["heliar-tronnier", slow("tessar-brendel"), slow("double-gauss-tronnier")])
 def test_each_layer_holds_its_flux_whatever_the_picture(lens):
     """On a sensor that holds all, one of 36 mm and a square one; small, odd and ordinary pictures; two tolerances."""
     wide = ghosts_of(lens, mono((8.0, 5.0)), size_px=(64, 36), sensor_mm=HOLDS)
@@ -73,13 +90,23 @@ def test_each_layer_holds_its_flux_whatever_the_picture(lens):
         assert complaints(same, truth) == [], (size, tolerance)
 
 
-@pytest.mark.parametrize("lens", ["heliar-tronnier", "tessar-brendel", "double-gauss-tronnier"])
-@pytest.mark.parametrize(("size", "sensor"), [((333, 187), (36.0, 20.25)), ((101, 99), (100.0, 40.0))])
+@pytest.mark.parametrize(
+    ("lens", "size", "sensor"),
+    [
+        ("tessar-brendel", (333, 187), (36.0, 20.25)),
+        ("tessar-brendel", (101, 99), (100.0, 40.0)),
+        slow("heliar-tronnier", (333, 187), (36.0, 20.25)),
+        slow("double-gauss-tronnier", (333, 187), (36.0, 20.25)),
+        slow("heliar-tronnier", (101, 99), (100.0, 40.0)),
+        slow("double-gauss-tronnier", (101, 99), (100.0, 40.0)),
+    ],
+)
 def test_each_layer_holds_what_lands_on_the_sensor(lens, size, sensor):
     project = ghosts_of(lens, mono((-14.0, 3.0)), size_px=size, sensor_mm=sensor)
     assert complaints(project, counted(project)) == []
 
 
+@pytest.mark.slow
 def test_each_layer_holds_its_flux_behind_blades():
     """The iris lets the same rays through that `optics.iris.transmission` does."""
     project = ghosts_of("tessar-brendel", mono((8.0, 5.0)), iris=SIX, size_px=(160, 90), sensor_mm=(360.0, 202.5))
@@ -91,10 +118,10 @@ def test_each_layer_holds_its_flux_behind_blades():
     [
         ("heliar-tronnier", SIX, 8.0, (8.0, 5.0), (64, 36), (360.0, 202.5)),
         ("tessar-brendel", ROUNDED_FIVE, 8.0, (8.0, 5.0), (320, 180), (360.0, 202.5)),
-        ("double-gauss-tronnier", ROUNDED_FIVE, 8.0, (-14.0, 3.0), (101, 99), (100.0, 100.0)),
-        ("tessar-brendel", ROUND, 8.0, (8.0, 5.0), (160, 90), HOLDS),
+        slow("double-gauss-tronnier", ROUNDED_FIVE, 8.0, (-14.0, 3.0), (101, 99), (100.0, 100.0)),
+        slow("tessar-brendel", ROUND, 8.0, (8.0, 5.0), (160, 90), HOLDS),
         ("heliar-tronnier", ROUND, 32.0, (1.0, 0.75), (300, 300), (60.0, 60.0)),
-        ("heliar-tronnier", ROUND, 64.0, (0.5, 0.4), (300, 300), (60.0, 60.0)),
+        slow("heliar-tronnier", ROUND, 64.0, (0.5, 0.4), (300, 300), (60.0, 60.0)),
     ],
 )
 def test_every_edge_is_cut_exactly(lens, iris, f_number, field, size, sensor):
@@ -103,17 +130,21 @@ def test_every_edge_is_cut_exactly(lens, iris, f_number, field, size, sensor):
 
 
 @pytest.mark.parametrize(
-    ("lens", "field", "f_number"),
+    ("lens", "field", "f_number", "rays"),
     [
-        ("flektogon-35", (10.0, 5.0), 2.8),
-        ("takumar-50-f1.4", (8.0, 5.0), 1.4),
-        ("double-gauss-tronnier", (0.0, 0.0), 2.1),
+        ("flektogon-35", (10.0, 5.0), 2.8, 120),
+        ("takumar-50-f1.4", (8.0, 5.0), 1.4, 90),
+        # one of its ghosts is a ring so thin that few rays do not know its light
+        ("double-gauss-tronnier", (0.0, 0.0), 2.1, 170),
+        slow("flektogon-35", (10.0, 5.0), 2.8, 240),
+        slow("takumar-50-f1.4", (8.0, 5.0), 1.4, 240),
+        slow("double-gauss-tronnier", (0.0, 0.0), 2.1, 240),
     ],
 )
-def test_light_beside_rays_that_end_is_drawn(lens, field, f_number):
+def test_light_beside_rays_that_end_is_drawn(lens, field, f_number, rays):
     """Where no rim bounds a ghost but rays that miss a surface do, and where T falls steeply before them."""
     project = ghosts_of(lens, mono(field), f_number=f_number, size_px=(240, 160), sensor_mm=HOLDS)
-    assert complaints(project, counted(project)) == []
+    assert complaints(project, counted(project, rays)) == []
 
 
 @pytest.mark.parametrize(
@@ -121,7 +152,7 @@ def test_light_beside_rays_that_end_is_drawn(lens, field, f_number):
     [
         ("heliar-tronnier", (8.0, 5.0), 8.0),
         ("double-gauss-tronnier", (8.0, 5.0), 8.0),
-        ("takumar-50-f1.4", (8.0, 5.0), 1.4),
+        slow("takumar-50-f1.4", (8.0, 5.0), 1.4),
     ],
 )
 def test_layers_agree_with_the_ghost_table(lens, field, f_number):
@@ -136,7 +167,7 @@ def test_layers_agree_with_the_ghost_table(lens, field, f_number):
 
 
 @pytest.mark.parametrize("mode", ["passes", "ghosts"])
-@pytest.mark.parametrize("lens", ["heliar-tronnier", "tessar-brendel"])
+@pytest.mark.parametrize("lens", ["heliar-tronnier", slow("tessar-brendel")])
 def test_the_pass_holds_all_ghosts(lens, mode):
     """Drawn together, faint ghosts at lower resolution, or drawn one by one."""
     project = scene(lens, mono((8.0, 5.0)), layers=mode, starburst=False, size_px=(320, 180), sensor_mm=(72.0, 40.5))
@@ -162,12 +193,14 @@ def test_colours_hold_the_flux_of_every_wavelength(bridge, waves):
         size_px=(400, 400), sensor_mm=(200.0, 200.0), wavelengths=waves, bridge=bridge, coating=coating,
     )  # fmt: skip
     layers = layers_of(project)
-    every = project.quality.replace(wavelengths=41 if bridge else waves, bridge=False)
+    every = project.quality.replace(wavelengths=21 if bridge else waves, bridge=False)
     (shot,) = shots_of(project.replace(quality=every))
     weights = shot.weights(shot.packed.wavelengths_nm)
     for name in ("ghost.7-6", "ghost.4-2", "ghost.2-0"):
         path = path_of(project, name)
-        flux = np.array([count(shot, path, project.iris, w=w).on_sensor for w in range(len(weights))])
+        # a wavelength of many need not be known as well as one of five
+        rays = 90 if bridge else 170
+        flux = np.array([count(shot, path, project.iris, w=w, n=rays).on_sensor for w in range(len(weights))])
         expected = flux @ weights
         error = np.abs(layer_flux(layers[name], project) - expected)
         # the grid serves all wavelengths, so its own error adds to that of the colours between them
@@ -181,13 +214,13 @@ def test_few_wavelengths_tell_the_colours_of_single_films(mode, limit):
     parts = {"layers": "passes", "starburst": False, "mode": mode, "size_px": (96, 54), "sensor_mm": (72.0, 40.5)}
     film = Everywhere(coating=QuarterWave(center_wavelength_nm=550.0))
     found = {}
-    for waves, bridge in ((61, False), (7, False), (7, True)):
+    for waves, bridge in ((31, False), (7, False), (7, True)):
         project = scene(
             "tessar-brendel", Light(field_deg=(5.0, 0.0), spectrum=D65()), wavelengths=waves, bridge=bridge,
             coating=film, **parts,
         )  # fmt: skip
         found[waves, bridge] = layer_flux(layers_of(project)["ghosts"], project)
-    truth = found[61, False]
+    truth = found[31, False]
     error = {key: np.abs(rgb - truth).max() / np.abs(truth).max() for key, rgb in found.items()}
     assert error[7, True] < limit
     assert error[7, True] < 0.3 * error[7, False]
@@ -266,12 +299,14 @@ def test_a_fine_picture_averaged_is_the_coarse_one(lens):
 @pytest.mark.parametrize("layers", ["passes", "ghosts"])
 def test_threads_do_not_change_a_byte(mode, layers):
     lights = (Light(field_deg=(8.0, 5.0)), Light(field_deg=(-3.0, 9.0), intensity=0.3))
-    project = scene("heliar-tronnier", *lights, iris=SIX, mode=mode, layers=layers, size_px=(160, 90), wavelengths=3)
-    one, two, again = (render(project, threads=n).layers for n in (1, 2, 5))
-    for a, b, c in zip(one, two, again, strict=True):
-        assert a.name == b.name == c.name
-        assert a.window == b.window == c.window
-        assert a.pixels.tobytes() == b.pixels.tobytes() == c.pixels.tobytes()
+    # one of the four has a starburst too
+    shown = {"layers": layers, "starburst": (mode, layers) == ("draft", "passes")}
+    project = scene("heliar-tronnier", *lights, iris=SIX, mode=mode, size_px=(160, 90), wavelengths=3, **shown)
+    one, five = (render(project, threads=n).layers for n in (1, 5))
+    for a, b in zip(one, five, strict=True):
+        assert a.name == b.name
+        assert a.window == b.window
+        assert a.pixels.tobytes() == b.pixels.tobytes()
 
 
 # --- symmetry
@@ -380,13 +415,13 @@ def test_a_starburst_outside_the_picture_leaves_it_dark():
 def test_draft_tends_to_exact_rays_near_the_axis():
     """Matrices are the limit of rays: flux of the big ghosts against counted rays, as angle and opening shrink."""
     errors = []
-    for shrink in (0.25, 0.125, 0.0625):
+    for shrink in (0.25, 0.0625):
         parts = {
             "f_number": 8.0 / shrink, "layers": "ghosts", "starburst": False, "sensor_mm": HOLDS, "size_px": (300, 300),
         }  # fmt: skip
         field = (4.0 * shrink, 3.0 * shrink)
         project = scene("heliar-tronnier", mono(field), mode="draft", **parts)
-        draft, rgb, truth = layers_of(project), monochrome(project), counted(project)
+        draft, rgb, truth = layers_of(project), monochrome(project), counted(project, 120)
         # rims other than the first surface's bound some ghosts for good; these are bounded by the iris
         big = [name for name, c in truth.items() if c.flux > 0.05 * max(c.flux for c in truth.values())]
         assert len(big) >= 10
@@ -513,8 +548,10 @@ def test_a_black_picture_is_told():
         render(
             Project(
                 lens="tessar-brendel",
+                f_number=16.0,
                 lights=(Light(field_deg=(8.0, 4.0), intensity=value),),
                 camera={"size_px": (48, 27)},
+                quality={"wavelengths": 1, "ringing": "off", "paths": "same-side"},
             )
         )
         for value in (1.0, 0.0)
@@ -529,6 +566,7 @@ def test_an_iris_image_that_is_not_square_is_told(tmp_path):
         Image.new("L", size, 255).save(tmp_path / "iris.png")
         made = Project(
             lens="tessar-brendel",
+            f_number=16.0,
             lights=(Light(field_deg=(8.0, 4.0)),),
             iris=Iris(mask=str(tmp_path / "iris.png")),
             camera={"size_px": (48, 27)},

@@ -21,7 +21,7 @@ from flarewright.render.shot import make_opening, make_shots
 SIZE = (96, 64)
 
 
-def project(*rules, gain=None, limit=2e-4, light=None, **parts):
+def project(*rules, gain=None, limit=1e-3, light=None, **parts):
     made = scene(
         "heliar-tronnier", light or mono((8.0, 5.0)), size_px=SIZE, sensor_mm=(150.0, 100.0), layers="ghosts",
         starburst=False, wavelengths=1, **parts,
@@ -81,7 +81,7 @@ def test_the_search_depends_on_neither_threads_nor_room(monkeypatch):
 
 
 def test_a_lower_limit_draws_more_and_leaves_out_less(plain):
-    more = render(project(limit=1e-5))
+    more = render(project(limit=2e-4))
     assert fours_of(plain) < fours_of(more)
     assert plain.summary["ghosts.order4"]["left_out_share"] > more.summary["ghosts.order4"]["left_out_share"] > 0.0
 
@@ -93,7 +93,7 @@ def test_a_limit_too_low_says_so(monkeypatch):
 
 def test_same_side_paths_stay_on_one_side():
     stop = load_lens("heliar-tronnier").stop_row
-    names = fours_of(render(project(limit=1e-5, paths="same-side")))
+    names = fours_of(render(project(limit=2e-4, paths="same-side")))
     assert names
     for name in names:
         assert len({int(row) < stop for row in name.split("-")}) == 1

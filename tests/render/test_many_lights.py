@@ -10,7 +10,21 @@ import pytest
 from flarewright.editor.files import project_for_lens
 from flarewright.kernels.bundle import measure_bundle
 from flarewright.kernels.trace import WEIGHT
-from flarewright.model import D65, BlackBody, Camera, Dirt, Iris, Light, Lines, Output, Project, Quality
+from flarewright.model import (
+    D65,
+    Art,
+    BlackBody,
+    Camera,
+    Dirt,
+    Iris,
+    Light,
+    Lines,
+    Output,
+    Project,
+    Quality,
+    Rule,
+    Starburst,
+)
 from flarewright.optics.bundle import trace_bundle, trace_grid
 from flarewright.optics.diffraction import Soil, pupil_pattern
 from flarewright.optics.paths import ghost_paths
@@ -38,32 +52,41 @@ def many(count, seed=3):
     )
 
 
-def project(lights, mode="final", **changes):
+def project(lights, mode="final", wavelengths=3, **changes):
     return Project(
         lens="heliar-tronnier",
         f_number=8.0,
         lights=lights,
         camera=Camera(size_px=SIZE),
-        quality=Quality(mode=mode, wavelengths=3 if mode == "draft" else 7, **changes),
+        quality=Quality(mode=mode, wavelengths=wavelengths, **changes),
         output=Output(layers="passes"),
     )
 
 
 def pictures(rendering):
     found = {}
+    columns, rows = rendering.project.camera.size_px
     for layer in rendering.layers:
         x, y, width, height = layer.window
-        found[layer.name] = np.zeros((SIZE[1], SIZE[0], 3))
+        found[layer.name] = np.zeros((rows, columns, 3))
         found[layer.name][y : y + height, x : x + width] = layer.pixels
     return found
 
 
-@pytest.mark.parametrize("mode", ["final", "draft"])
-def test_many_lights_are_the_sum_of_single_ones(mode):
-    lights = many(24)
-    rendering = render(project(lights, mode))
+@pytest.mark.parametrize(
+    ("mode", "count", "quality"),
+    [
+        ("final", 8, {"paths": "same-side", "ringing": "off"}),
+        ("draft", 8, {}),
+        pytest.param("final", 24, {"wavelengths": 7}, marks=pytest.mark.slow),
+        pytest.param("draft", 24, {}, marks=pytest.mark.slow),
+    ],
+)
+def test_many_lights_are_the_sum_of_single_ones(mode, count, quality):
+    lights = many(count)
+    rendering = render(project(lights, mode, **quality))
     together = pictures(rendering)
-    singles = [pictures(render(project((light,), mode))) for light in lights]
+    singles = [pictures(render(project((light,), mode, **quality))) for light in lights]
     for name in ("ghosts", "starburst"):
         alone = np.sum([single[name] for single in singles], axis=0)
         sums = together[name].sum(axis=(0, 1)) / alone.sum(axis=(0, 1))
@@ -77,15 +100,26 @@ def test_many_lights_are_the_sum_of_single_ones(mode):
         assert any("single lights" in remark for remark in rendering.remarks)
 
 
+def test_an_intensity_of_stars_multiplies_those_of_many_lights_too():
+    """Eight lights and more are drawn together; the artist's factor is theirs as it is a single one's."""
+    lights = many(8)
+    plain, brighter = (
+        pictures(render(project(lights, "draft").replace(starburst=Starburst(**look))))["starburst"]
+        for look in ({}, {"intensity": 2.5})
+    )
+    np.testing.assert_allclose(brighter, 2.5 * plain, rtol=1e-5, atol=1e-7 * plain.max())
+
+
 def test_the_number_of_threads_does_not_show():
-    one, three = (render(project(many(12)), threads=threads) for threads in (1, 3))
+    one, three = (render(project(many(8), paths="same-side", ringing="off"), threads=threads) for threads in (1, 3))
     for a, b in zip(one.layers, three.layers, strict=True):
         assert np.array_equal(a.pixels, b.pixels)
 
 
 def test_a_layer_of_its_own_holds_every_light():
-    lights = many(10)
-    found = render(project(lights).replace(output=Output(layers="ghosts", starburst=False)))
+    lights = many(8)
+    wanted = project(lights, paths="same-side", ringing="off")
+    found = render(wanted.replace(output=Output(layers="ghosts", starburst=False)))
     assert found.summary["ghosts"].get("faint", 0) == 0
     whole = sum(layer.pixels.sum() for layer in found.layers if layer.name.startswith("ghost."))
     ghosts = next(layer for layer in found.layers if layer.name == "ghosts")
@@ -94,7 +128,7 @@ def test_a_layer_of_its_own_holds_every_light():
 
 @pytest.mark.parametrize("iris", [Iris(), Iris(blades=6, rotation_deg=7.0), Iris(blades=5)])
 def test_stars_laid_together_are_stars_drawn_one_by_one(iris):
-    wave = np.arange(380.0, 781.0, 5.0)
+    wave = np.arange(380.0, 781.0, 10.0)
     weights = band_weights(D65(), wave, "rec709")
     pattern = pupil_pattern(iris)
     pixel, size = (0.05, 0.06), (300, 200)
@@ -123,30 +157,30 @@ def test_stars_laid_together_are_stars_drawn_one_by_one(iris):
     ],
     ids=["rounded", "rough", "mask", "dirt"],
 )
-@pytest.mark.parametrize("draft", [False, True])
-def test_whatever_shapes_the_iris_its_stars_are_laid_together(iris, mask, soil, draft):
-    wave = np.arange(380.0, 781.0, 5.0)
+def test_whatever_shapes_the_iris_its_stars_are_laid_together(iris, mask, soil):
+    wave = np.arange(380.0, 781.0, 10.0)
     weights = band_weights(D65(), wave, "rec709")
     pattern = pupil_pattern(iris, mask, radius_mm=5.0, soil=soil)
     pixel, size = (0.05, 0.06), (150, 100)
     # within, on the border, beside, and so far outside that it is drawn by itself
     centres = np.array([[75.3, 40.8], [0.2, 99.3], [-30.0, 15.5], [111.5, 10.0], [90.25, -120.5]])
     gains = np.array([[1.0, 1.0, 1.0], [0.5, 0.7, 0.9], [3.0, 3.0, 3.0], [0.1, 0.1, 0.1], [2.0, 1.0, 1.0]])
-    together = draw_stars(Stars(pattern, 8.0, wave, weights, centres, gains), pixel, size, draft=draft, threads=2)
     alone = np.zeros((size[1], size[0], 3))
     for (x, y), gain in zip(centres, gains, strict=True):
         alone += starburst_layer(iris, 8.0, pixel, size, (x, y), wave, weights * gain, pattern=pattern)
-    assert together.sum(axis=(0, 1)) == pytest.approx(alone.sum(axis=(0, 1)), rel=1e-3)
-    # spikes get wider by a fraction of a pixel
-    assert np.abs(together - alone).sum() < (5e-3 if draft else 3e-3) * np.abs(alone).sum()
-    assert np.median(np.abs(together - alone) / np.abs(alone)) < (0.05 if draft else 0.02)
-    # of the light that is far from every centre too
     far = np.ones(size[::-1], dtype=bool)
     y, x = np.indices(far.shape) + 0.5
     for column, row in centres:
         far &= np.hypot(x - column, y - row) > 25.0
-    assert together[far].sum(axis=0) == pytest.approx(alone[far].sum(axis=0), rel=1e-2)
-    assert np.abs(together - alone)[far].sum() < (0.25 if draft else 0.1) * np.abs(alone[far]).sum()
+    for draft in (False, True):
+        together = draw_stars(Stars(pattern, 8.0, wave, weights, centres, gains), pixel, size, draft=draft, threads=2)
+        assert together.sum(axis=(0, 1)) == pytest.approx(alone.sum(axis=(0, 1)), rel=1e-3), draft
+        # spikes get wider by a fraction of a pixel
+        assert np.abs(together - alone).sum() < (5e-3 if draft else 3e-3) * np.abs(alone).sum()
+        assert np.median(np.abs(together - alone) / np.abs(alone)) < (0.05 if draft else 0.02)
+        # of the light that is far from every centre too
+        assert together[far].sum(axis=0) == pytest.approx(alone[far].sum(axis=0), rel=1e-2)
+        assert np.abs(together - alone)[far].sum() < (0.25 if draft else 0.1) * np.abs(alone[far]).sum()
 
 
 def test_a_sheet_in_parts_is_the_whole_sheet(monkeypatch):
@@ -180,15 +214,25 @@ def test_few_spectra_stand_for_many():
     assert 0 < fits.sum() < len(lights)
 
 
-@pytest.mark.parametrize("mode", ["final", "draft"])
-def test_lights_of_many_spectra_are_the_sum_of_single_ones(mode):
+@pytest.mark.parametrize(
+    ("mode", "count", "f_number"),
+    [
+        # where the core of a star is as wide as a pixel, its surroundings need not be divided finely
+        ("draft", 11, 32.0),
+        pytest.param("draft", 16, 8.0, marks=pytest.mark.slow),
+        pytest.param("final", 16, 8.0, marks=pytest.mark.slow),
+    ],
+)
+def test_lights_of_many_spectra_are_the_sum_of_single_ones(mode, count, f_number):
     rng = np.random.default_rng(5)
     lights = tuple(
         light.replace(spectrum=BlackBody(temperature_k=float(t)))
-        for light, t in zip(many(16), rng.uniform(2000.0, 9000.0, 16), strict=True)
+        for light, t in zip(many(count), rng.uniform(2000.0, 9000.0, count), strict=True)
     )
     lights += (Light(field_deg=(3.0, 2.0), spectrum=Lines(lines=((589.0, 1.0),))),)
-    scene = project(lights, mode).replace(iris=Iris(blades=6, rounding=0.3))
+    # no ghosts: only stars have patterns that many spectra share
+    dark = Art(rules=(Rule(select="all", enable=False),))
+    scene = project(lights, mode).replace(iris=Iris(blades=6, rounding=0.3), art=dark, f_number=f_number)
     together = pictures(render(scene))["starburst"]
     alone = np.sum([pictures(render(scene.replace(lights=(light,))))["starburst"] for light in lights], axis=0)
     assert together.sum(axis=(0, 1)) == pytest.approx(alone.sum(axis=(0, 1)), rel=2e-3)
@@ -196,7 +240,7 @@ def test_lights_of_many_spectra_are_the_sum_of_single_ones(mode):
 
 
 def _shots(lights):
-    settled = settle(project(lights))
+    settled = settle(project(lights, wavelengths=7))
     return settled, make_shots(settled, make_opening(settled, None))
 
 

@@ -55,7 +55,9 @@ def slit(at, half, scale):
     return 0.5 * ((c1 - c2) ** 2 + (s1 - s2) ** 2)
 
 
-@pytest.mark.parametrize(("ghost", "width"), [("2-1", 20.0), ("4-1", 36.0), ("8-6", 36.0)])
+@pytest.mark.parametrize(
+    ("ghost", "width"), [("2-1", 20.0), ("8-6", 36.0), pytest.param("4-1", 36.0, marks=pytest.mark.slow)]
+)
 def test_a_ghost_on_the_axis_is_collins_integral(ghost, width):
     """Second method: the ghost's matrices and the analytic slit, pixel by pixel over a square ghost."""
     camera = Camera(size_px=(400, 400), sensor_mm=(width, width))
@@ -133,10 +135,13 @@ def test_a_ghost_keeps_its_flux(lens, path, f_number, field, width):
 
 
 def test_a_disc_takes_the_rings_away_and_lines_show_more_than_white():
+    # a strip across the middle of the ghost
+    strip = Camera(size_px=(400, 40), sensor_mm=(20.0, 2.0))
+
     def ripple(**light):
-        found = luminance(picture(project("2-1", lights=(Light(field_deg=(0.0, 0.0), **light),))))
+        found = luminance(picture(project("2-1", lights=(Light(field_deg=(0.0, 0.0), **light),), camera=strip)))
         # along the edge, where the first fringes run
-        profile = found[180:220, 86:150].mean(axis=0)
+        profile = found[:, 86:150].mean(axis=0)
         return profile.std() / profile.mean()
 
     green, white, sun = ripple(spectrum=GREEN), ripple(), ripple(diameter_deg=0.53)
@@ -189,12 +194,15 @@ def test_the_same_pixels_on_any_number_of_threads():
 
 def test_the_next_picture_of_an_iris_finds_its_patterns_and_looks_the_same(monkeypatch):
     """A hand moves the light: patterns are made once, whatever was drawn before."""
-    lens = {"lens": "canon-28-80", "f_number": 8.0, "camera": Camera(size_px=(192, 108))}
-    quality = Quality(mode="final", wavelengths=3, ringing="collins")
+    lens = {"lens": LENS, "f_number": 8.0, "camera": Camera(size_px=(192, 108))}
+    quality = Quality(mode="final", wavelengths=3, ringing="collins", paths="same-side")
     here, there = (
-        Project(**lens, iris=Iris(blades=8), lights=(Light(field_deg=place),), quality=quality)
+        Project(
+            **lens, iris=Iris(blades=8), lights=(Light(field_deg=place),), quality=quality,
+            output=Output(starburst=False),
+        )
         for place in ((9.0, 5.0), (10.0, 4.0))
-    )
+    )  # fmt: skip
     monkeypatch.setattr(last_of, "_LAST", last_of._Last())
     alone = render(there).layers[0].pixels
     first = last_of._LAST.held
@@ -211,6 +219,7 @@ def test_the_next_picture_of_an_iris_finds_its_patterns_and_looks_the_same(monke
     assert not np.array_equal(after, made)
 
 
+@pytest.mark.slow
 def test_dirt_in_ghosts_diffracts_too():
     dirt = Dirt(dust_per_mm2=0.3, dust_um=(200.0, 400.0), seed=2, in_ghosts=True)
     sharp, found = (picture(project("2-1", ringing, dirt=dirt)) for ringing in ("off", "collins"))
@@ -243,6 +252,10 @@ def test_a_part_of_an_opening_rings_as_all_of_it_does(lens, ghost, dirt, sensor,
     whole = picture(wanted)
     assert asked == [True]
     assert np.abs(whole - sharp).sum() > 0.01 * whole.sum()
+    if dirt.in_ghosts:
+        # grains that the rays see as shadows have rings, and no light is lost
+        assert np.abs(part - sharp).max() > 0.2 * sharp.max()
+        assert part.sum() == pytest.approx(sharp.sum(), rel=0.01)
     # samples of both lie elsewhere
     assert np.abs(part - whole).sum() < 0.08 * np.abs(whole - sharp).sum()
     assert part.sum() == pytest.approx(whole.sum(), rel=2e-3)

@@ -89,17 +89,27 @@ def test_what_is_left_out_is_below_what_an_eye_tells_apart(f_number, light, draw
     assert (np.abs(found - whole) / lit).max() < 1.5 * 0.01
 
 
-def test_an_area_light_washes_rings_out(drawn):
-    def ripples_of(size):
-        wanted = project(lights=(Light(field_deg=(10.0, 5.0), diameter_deg=size),))
-        found, sharp = picture(wanted), picture(wanted.replace(quality=Quality(wavelengths=3, ringing="off")))
+@pytest.mark.parametrize(
+    ("size", "coarse", "paths"),
+    [((320, 180), (160, 90), "same-side"), pytest.param((640, 360), (640, 360), "all", marks=pytest.mark.slow)],
+)
+def test_an_area_light_washes_rings_out(size, coarse, paths, drawn):
+    quality = Quality(wavelengths=3, paths=paths)
+    camera = Camera(size_px=size)
+
+    def lit_by(degrees, camera=camera):
+        return project(lights=(Light(field_deg=(10.0, 5.0), diameter_deg=degrees),), quality=quality, camera=camera)
+
+    def ripples_of(degrees):
+        wanted = lit_by(degrees)
+        found, sharp = picture(wanted), picture(wanted.replace(quality=quality.replace(ringing="off")))
         return (np.abs(found - sharp) / np.maximum(sharp, 0.01 * sharp.mean())).max(), found.sum() / sharp.sum()
 
     (point, whole), (sun, light) = ripples_of(0.0), ripples_of(0.53)
     assert sun < 0.15 * point
     assert (whole, light) == pytest.approx((1.0, 1.0), rel=2e-3)
     drawn.clear()
-    ripples_of(4.0)
+    picture(lit_by(4.0, Camera(size_px=coarse)))
     # some ghosts of an area light are left as they are, whose rings a point would show
     assert not all(drawn)
 

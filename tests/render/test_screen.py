@@ -15,7 +15,7 @@ from flarewright.render.render import render
 from flarewright.render.shot import make_opening, make_shots
 
 
-@pytest.mark.parametrize("lens", ["tessar-brendel", "nikkor-85-f1.4"])
+@pytest.mark.parametrize("lens", ["tessar-brendel", pytest.param("nikkor-85-f1.4", marks=pytest.mark.slow)])
 def test_what_a_screen_shows_is_the_whole_picture(lens):
     """All ghosts and all wavelengths: light, colour and shapes stay, only detail below the screen's steps goes."""
     project = project_for_lens(lens).replace(

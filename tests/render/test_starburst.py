@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 
 import numpy as np
 import pytest
 
 from flarewright.kernels.resample import blend_blade_wings
-from flarewright.model import D65, Camera, Iris, Light, Output, Project, Quality
+from flarewright.model import D65, Art, Camera, Iris, Light, Output, Project, Quality, Rule
 from flarewright.optics.diffraction import BladeWings, FanWings, pupil_pattern, spike_profile
 from flarewright.optics.iris import blade_edges, outline
 from flarewright.optics.spectrum import band_weights
@@ -28,9 +29,25 @@ SHAPES = [
 ]
 
 
+@lru_cache(maxsize=12)
+def pattern_of(iris):
+    """Return the pattern that `starburst_layer` makes of an iris: a transform of 4096 samples, made once."""
+    return pupil_pattern(iris)
+
+
 def layer(iris, f_number=16.0, pitch=0.028, size=(200, 160), centre=None, wave=WHITE_NM, weights=WHITE, mask=None):
     centre = centre or (size[0] / 2 + 0.3, size[1] / 2 - 0.2)
-    return starburst_layer(iris, f_number, (pitch, pitch), size, centre, wave, weights, mask=mask)
+    pattern = pattern_of(iris) if mask is None else None
+    return starburst_layer(iris, f_number, (pitch, pitch), size, centre, wave, weights, mask=mask, pattern=pattern)
+
+
+def some(fast, others):
+    """Pair f-numbers (and pixels) with shapes: those of `fast` at all times, the others where time allows."""
+    return [
+        pytest.param(*frame, iris, id=f"{frame[0]}-{k}", marks=() if k in fast.get(frame, ()) else pytest.mark.slow)
+        for frame in (*fast, *others)
+        for k, iris in enumerate(SHAPES)
+    ]
 
 
 def radii(size, centre, pitch):
@@ -69,24 +86,30 @@ def test_size_scales_with_wavelength_and_f_number():
     np.testing.assert_allclose(c * 4, a, rtol=2e-5)
 
 
-@pytest.mark.parametrize("iris", SHAPES)
-@pytest.mark.parametrize(("f_number", "pitch"), [(16.0, 0.028), (4.0, 0.028), (1.0, 0.05), (22.0, 0.004)])
-def test_unit_flux(iris, f_number, pitch):
+@pytest.mark.parametrize(
+    ("f_number", "pitch", "iris"),
+    some({(16.0, 0.028): (0, 1, 2, 3, 4), (4.0, 0.028): (0, 4), (1.0, 0.05): (0, 2), (22.0, 0.004): (1, 3)}, ()),
+)
+def test_unit_flux(f_number, pitch, iris):
     size = (501, 501)
-    E = layer(iris, f_number, pitch, size, weights=GREY)
-    mean_nm = WHITE_NM @ GREY[:, 0] / GREY[:, 0].sum()
+    # Where the pattern is resolved, every wavelength is expensive; what lies outside is linear in it.
+    step = 4 if pitch < 0.01 else 1
+    wave, grey = WHITE_NM[::step], GREY[::step]
+    E = layer(iris, f_number, pitch, size, wave=wave, weights=grey)
+    mean_nm = wave @ grey[:, 0] / grey[:, 0].sum()
     # What falls outside a circle of radius r: perimeter * 2 N lambda / (2 pi^2 area r), exact for the circle.
     r, centre = radii(size, (250.8, 250.3), pitch), 0.45 * 501 * pitch
     line = outline(iris, 1.0, 2000)
     perimeter = np.linalg.norm(line - np.roll(line, -1, axis=0), axis=1).sum()
     outside = perimeter * 2 * f_number * mean_nm * 1e-6 / (2 * math.pi**3 * centre)
-    inside = E[..., 0][r < centre].sum(dtype=float) * pitch**2 / GREY[:, 0].sum()
+    inside = E[..., 0][r < centre].sum(dtype=float) * pitch**2 / grey[:, 0].sum()
     assert inside + outside == pytest.approx(1.0, abs=6e-4)
     assert E.min() >= 0.0
 
 
 def test_wings_of_the_round_opening_are_the_mean_airy_tail():
-    size, centre, N = (601, 601), (300.5, 300.5), 16.0
+    # A quarter of the picture: the pattern is round.
+    size, centre, N = (301, 301), (0.5, 0.5), 16.0
     for pitch in (0.004, 0.028):
         E, r = layer(Iris(), N, pitch, size, centre, weights=GREY), radii(size, centre, pitch)
         moment = (2 * N * WHITE_NM * 1e-6) @ GREY[:, 0] / (2 * math.pi**3)
@@ -112,23 +135,28 @@ def exact_polygon(iris, sx, sy):
 @pytest.mark.parametrize("iris", [Iris(blades=5, rotation_deg=7), Iris(blades=6)])
 def test_core_is_the_exact_polygon(iris):
     pattern = pupil_pattern(iris)
-    P = np.diff(np.diff(pattern.table, axis=0), axis=1) * pattern.knots_per_s**2
-    s = (np.arange(len(P)) - len(P) // 2) / pattern.knots_per_s
-    with np.errstate(invalid="ignore"):
-        exact = exact_polygon(iris, s, s[:, None])
-    r = np.hypot(s, s[:, None])
-    assert np.abs(P - exact)[(r > 0) & (r < 3)].max() < 1e-5 * math.pi
-    # Everywhere, and between the spikes alone, where little light is.
-    between = np.min([np.abs(n[0] * s[:, None] - n[1] * s) for n in blade_edges(iris, 1.0)], axis=0) > 2.0
-    for low, high in ((3, 10), (10, 30), (30, 58)):
-        ring = (r > low) & (r < high)
-        assert P[ring].sum() == pytest.approx(exact[ring].sum(), rel=3e-3)
-        assert P[ring & between].sum() == pytest.approx(exact[ring & between].sum(), rel=5e-3)
+    whole = np.diff(np.diff(pattern.table, axis=0), axis=1) * pattern.knots_per_s**2
+    K = len(whole) // 2
+    near = int(11 * pattern.knots_per_s)
+    # All samples near the middle, every third one each way farther out.
+    parts = (np.arange(K - near, K + near + 1), ((3, 10),)), (np.arange(0, 2 * K + 1, 3), ((10, 30), (30, 58)))
+    for samples, rings in parts:
+        P, s = whole[np.ix_(samples, samples)], (samples - K) / pattern.knots_per_s
+        with np.errstate(invalid="ignore"):
+            exact = exact_polygon(iris, s, s[:, None])
+        r = np.hypot(s, s[:, None])
+        assert np.abs(P - exact)[(r > 0) & (r < 3)].max() < 1e-5 * math.pi
+        # Everywhere, and between the spikes alone, where little light is.
+        between = np.min([np.abs(n[0] * s[:, None] - n[1] * s) for n in blade_edges(iris, 1.0)], axis=0) > 2.0
+        for low, high in rings:
+            ring = (r > low) & (r < high)
+            assert P[ring].sum() == pytest.approx(exact[ring].sum(), rel=3e-3)
+            assert P[ring & between].sum() == pytest.approx(exact[ring & between].sum(), rel=5e-3)
 
 
 def test_blade_wings_are_the_exact_polygon_without_its_fringes():
     iris = Iris(blades=6, rotation_deg=13)
-    wings = pupil_pattern(iris).wings
+    wings = pattern_of(iris).wings
     assert isinstance(wings, BladeWings)
     edges = blade_edges(iris, 1.0)
     rng = np.random.default_rng(5)
@@ -164,7 +192,7 @@ def test_spike_profile_is_averaged_over_the_pixel():
     wings = pupil_pattern(Iris(blades=6)).wings
     pitch, N = 0.028, 8.0
     profile = spike_profile(wings, WHITE_NM, WHITE, N, (pitch, pitch))
-    part = (np.arange(400) + 0.5) / 400 - 0.5
+    part = (np.arange(50) + 0.5) / 50 - 0.5
     for k, angle in enumerate(wings.angle):
         shadow = pitch / (2 * N) * (np.sin(angle) * part[:, None] + np.cos(angle) * part).ravel()
         for at in (0, 60, 200, 420):
@@ -173,20 +201,32 @@ def test_spike_profile_is_averaged_over_the_pixel():
             np.testing.assert_allclose(profile.density[k, at], brute, rtol=5e-3)
 
 
-@pytest.mark.parametrize("iris", SHAPES)
-@pytest.mark.parametrize("f_number", [2.8, 8.0, 22.0])
-def test_a_draft_errs_near_the_centre_only(iris, f_number):
-    final = layer(iris, f_number, size=(640, 360), weights=GREY)
-    size, centre = (640, 360), (320.3, 179.8)
-    draft = starburst_layer(iris, f_number, (0.028, 0.028), size, centre, WHITE_NM, GREY, split=1)
+@pytest.mark.parametrize(("f_number", "iris"), some({(2.8,): (0, 1, 4), (8.0,): (2, 3), (22.0,): (0, 1)}, ()))
+def test_a_draft_errs_near_the_centre_only(f_number, iris):
+    size, centre = (320, 180), (160.3, 89.8)
+    final = layer(iris, f_number, size=size, centre=centre, weights=GREY)
+    draft = starburst_layer(
+        iris, f_number, (0.028, 0.028), size, centre, WHITE_NM, GREY, pattern=pattern_of(iris), split=1
+    )
     assert np.abs(draft - final).max() < 5e-6 * final.max()
     assert draft.sum(dtype=float) == pytest.approx(final.sum(dtype=float), rel=3e-5)
     far = radii(size, centre, 1.0) > 12.0
     np.testing.assert_array_equal(draft[far], final[far])
 
 
-@pytest.mark.parametrize(("blades", "spikes"), [(4, 4), (5, 10), (6, 6), (7, 14), (8, 8), (9, 18)])
-@pytest.mark.parametrize("f_number", [2.8, 16.0])
+@pytest.mark.parametrize(
+    ("f_number", "blades", "spikes"),
+    [
+        (2.8, 5, 10),
+        (16.0, 5, 10),
+        (2.8, 6, 6),
+        (16.0, 6, 6),
+        (2.8, 9, 18),
+        (2.8, 4, 4),
+        *(pytest.param(2.8, n, m, marks=pytest.mark.slow) for n, m in ((7, 14), (8, 8))),
+        *(pytest.param(16.0, n, m, marks=pytest.mark.slow) for n, m in ((4, 4), (7, 14), (8, 8), (9, 18))),
+    ],
+)
 def test_even_blades_give_n_spikes_odd_ones_2n(blades, spikes, f_number):
     size, centre = (700, 700), (350.0, 350.0)
     E = layer(Iris(blades=blades, rotation_deg=3.0), f_number, 0.028, size, centre)[..., 1]
@@ -208,31 +248,31 @@ def test_spikes_stand_along_the_normals_of_the_blades_in_the_upright_picture():
         assert E[i - 1 : i + 2, j - 1 : j + 2].max() > 100 * dark
 
 
-def test_a_curved_blade_spreads_its_spike_into_a_fan_of_the_same_flux():
+@pytest.mark.parametrize("roundings", [(0.0, 0.5, 1.0), pytest.param((0.2, 0.9, 1.0), marks=pytest.mark.slow)])
+def test_a_curved_blade_spreads_its_spike_into_a_fan_of_the_same_flux(roundings):
     size, centre, N = (800, 800), (400.0, 400.0), 16.0
     r = radii(size, centre, 0.028)
     ring = (r > 5) & (r < 10)
     flux = {}
-    for rounding in (0.0, 0.2, 0.5, 0.9, 1.0):
+    for rounding in roundings:
         iris = Iris(blades=5, rounding=rounding)
         line = outline(iris, 1.0, 4000)
         perimeter = np.linalg.norm(line - np.roll(line, -1, axis=0), axis=1).sum()
         E = layer(iris, N, 0.028, size, centre, weights=GREY)[..., 0]
         flux[rounding] = E[ring].sum(dtype=float) / perimeter
         if 0 < rounding < 1:
-            wings = pupil_pattern(iris).wings
+            wings = pattern_of(iris).wings
             assert isinstance(wings, BladeWings)
             assert wings.length * 5 == pytest.approx(perimeter, rel=1e-5)
     for value in flux.values():
         assert value == pytest.approx(flux[1.0], rel=5e-3)
 
 
-@pytest.mark.parametrize("iris", SHAPES)
-@pytest.mark.parametrize("f_number", [2.0, 16.0])
-def test_resolution_independence(iris, f_number):
-    fine = layer(iris, f_number, 0.014, (360, 360), (181.2, 178.6), weights=GREY)
-    coarse = layer(iris, f_number, 0.028, (180, 180), (90.6, 89.3), weights=GREY)
-    blocks = fine.reshape(180, 2, 180, 2, 3).mean(axis=(1, 3), dtype=float)
+@pytest.mark.parametrize(("f_number", "iris"), some({(2.0,): (0, 1, 4), (16.0,): (2, 3)}, ()))
+def test_resolution_independence(f_number, iris):
+    fine = layer(iris, f_number, 0.014, (180, 180), (91.2, 88.6), weights=GREY)
+    coarse = layer(iris, f_number, 0.028, (90, 90), (45.6, 44.3), weights=GREY)
+    blocks = fine.reshape(90, 2, 90, 2, 3).mean(axis=(1, 3), dtype=float)
     assert np.abs(blocks - coarse).sum() < 2e-3 * coarse.sum()
     bright = coarse > 1e-4 * coarse.max()
     np.testing.assert_allclose(blocks[bright], coarse[bright], rtol=0.02)
@@ -241,14 +281,13 @@ def test_resolution_independence(iris, f_number):
 def test_shift_by_a_part_of_a_pixel_conserves():
     sums = [
         layer(Iris(blades=6), 8.0, 0.028, (300, 300), (150 + d, 150 - d), weights=GREY).sum(dtype=float)
-        for d in (0.0, 0.13, 0.37, 0.5, 0.81)
+        for d in (0.0, 0.13, 0.5, 0.81)
     ]
     np.testing.assert_allclose(sums, sums[0], rtol=2e-4)
 
 
-@pytest.mark.parametrize("iris", SHAPES)
-@pytest.mark.parametrize("f_number", [4.0, 16.0])
-def test_a_picture_is_a_window_on_an_unbounded_one(iris, f_number):
+@pytest.mark.parametrize(("f_number", "iris"), some({(4.0,): (1, 2, 4), (16.0,): (0, 3)}, ()))
+def test_a_picture_is_a_window_on_an_unbounded_one(f_number, iris):
     whole = layer(iris, f_number, 0.028, (300, 200), (40.3, 30.8))
     part = layer(iris, f_number, 0.028, (180, 120), (40.3 - 70, 30.8 - 50))
     np.testing.assert_allclose(part, whole[50:170, 70:250], rtol=1e-5, atol=1e-9 * whole.max())
@@ -330,6 +369,8 @@ def test_no_flux_is_lost_where_the_core_is_smaller_than_a_pixel(mode, lights):
             camera=Camera(size_px=size),
             quality=Quality(mode=mode, wavelengths=3, ringing="off"),
             output=Output(layers="passes"),
+            # no ghosts: only the starburst is looked at
+            art=Art(rules=(Rule(select="all", enable=False),)),
         )
         (layer,) = (layer for layer in render(project).layers if layer.name == "starburst")
         found.append(layer.pixels.sum(dtype=np.float64) / size[0] ** 2)
