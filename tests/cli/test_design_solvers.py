@@ -64,11 +64,16 @@ def test_ctrl_c_ends_a_search_and_keeps_the_best(folder, capsys, monkeypatch):
     assert "sade" not in told.out
 
 
-def test_benchmark_compares_solvers(folder, capsys):
-    for package in ("pygmo", "cmaes"):
-        pytest.importorskip(package, reason=f"the extra evo is not installed: no {package}")
-    words = ["design", "benchmark", "heliar", "--unsigned", "--seeds", "2", "--time", "0.2", "--report", "a.html"]
-    names = ["pools", "pso:2x2", "cmaes"]
+# the package cmaes loads most of SciPy
+@pytest.mark.parametrize(
+    ("third", "package", "seconds"),
+    [("sade:2x2", "pygmo", "0.05"), pytest.param("cmaes", "cmaes", "0.2", marks=pytest.mark.slow)],
+)
+def test_benchmark_compares_solvers(folder, capsys, third, package, seconds):
+    for needed in ("pygmo", package):
+        pytest.importorskip(needed, reason=f"the extra evo is not installed: no {needed}")
+    words = ["design", "benchmark", "heliar", "--unsigned", "--seeds", "2", "--time", seconds, "--report", "a.html"]
+    names = ["pools", "pso:2x2", third]
     assert run([*words, *(part for name in names for part in ("--solver", name)), "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
     assert [(one["solver"], one["seed"]) for one in told["runs"]] == [(name, seed) for name in names for seed in (0, 1)]
@@ -93,7 +98,7 @@ def test_benchmark_compares_solvers(folder, capsys):
 
 def test_coatings_and_scratch_are_compared_too(folder, capsys):
     pytest.importorskip("pygmo", reason="the extra evo is not installed: no pygmo")
-    words = ["design", "benchmark", "heliar", "--coatings", "quarter-wave", "--time", "0.5", "--report", "c.html"]
+    words = ["design", "benchmark", "heliar", "--coatings", "quarter-wave", "--time", "0.1", "--report", "c.html"]
     assert run([*words, "--solver", "ours", "--solver", "sade:2x4", "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
     assert [(one["solver"], one["saw"]) for one in told["runs"]] == [("ours", "ours"), ("sade:2x4", "algorithm2")]
@@ -103,9 +108,9 @@ def test_coatings_and_scratch_are_compared_too(folder, capsys):
     page = (folder / "c.html").read_text()
     assert page.count("data:image/png;base64,") == 3
     assert "figure 6.10" in page
-    assert run([*words[:6], "0.3", "--fitness", "ours"]) == 0
+    assert run([*words[:6], "0.05", "--fitness", "ours"]) == 0
     assert "quarter waves, 5.45 degrees" in " ".join(capsys.readouterr().out.split())
-    words = ["design", "benchmark", "scratch", "--ghosts", "5", "--unsigned", "--time", "0.5", "--seeds", "2"]
+    words = ["design", "benchmark", "scratch", "--ghosts", "5", "--unsigned", "--time", "0.1", "--seeds", "2"]
     assert run([*words, "--picture", "s.png", "--report", "s.html", "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
     assert [one["seed"] for one in told["runs"]] == [0, 1]
@@ -115,7 +120,7 @@ def test_coatings_and_scratch_are_compared_too(folder, capsys):
 
 def test_population_sizes_are_figure_6_5(capsys):
     pytest.importorskip("pygmo", reason="the extra evo is not installed: no pygmo")
-    words = ["design", "benchmark", "heliar", "--angle", "13.40", "--time", "0.1", "--json"]
+    words = ["design", "benchmark", "heliar", "--angle", "13.40", "--time", "0.05", "--json"]
     assert run([*words, "--solver", "pso:2x2", "--solver", "pso:2x4"]) == 0
     assert json.loads(capsys.readouterr().out)["figures"][0]["figure"] == "6.5"
 

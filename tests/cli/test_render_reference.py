@@ -8,7 +8,7 @@ import pytest
 from flarewright.cli.app import run
 from flarewright.io.exr import read_exr
 from flarewright.io.reference_state import read_state
-from flarewright.render import reference
+from flarewright.render import ledger, reference
 
 SMALL = ["render", "triplet-pestrecov", "--light", "8,4", "--size", "24x16", "--no-starburst", "--no-png", "--ledger"]
 REFERENCE = [*SMALL, "--quality", "reference"]
@@ -18,6 +18,7 @@ REFERENCE = [*SMALL, "--quality", "reference"]
 def _folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(reference, "SIDE", 16)
+    monkeypatch.setattr(ledger, "SIDE", 16)
 
 
 def test_render_and_go_on(capsys, tmp_path):

@@ -12,12 +12,23 @@ from flarewright.design.trials import Trial, figures_shown
 
 
 @pytest.mark.parametrize("case", ["heliar", "canon"])
-def test_planted_quarter_waves_are_found_to_the_last_pixel(case):
-    trial = Trial(case, films="quarter-wave")
-    task = color_task(trial)
+def test_what_is_planted_is_a_quarter_wave_on_each_surface(case):
+    task = color_task(Trial(case, films="quarter-wave"))
     assert np.all((task.planted >= 380.0) & (task.planted <= 750.0))
     assert np.array_equal(colors_of(task.problem, task.planted), task.problem.targets)
-    run, target, found = run_colors(trial, limits=Limits(None, 8 if case == "heliar" else 2), seed=1)
+
+
+@pytest.mark.parametrize(
+    ("case", "most"),
+    [
+        ("heliar", 4),
+        pytest.param("heliar", 8, marks=pytest.mark.slow),
+        pytest.param("canon", 2, marks=pytest.mark.slow),
+    ],
+)
+def test_planted_quarter_waves_are_found_to_the_last_pixel(case, most):
+    trial = Trial(case, films="quarter-wave")
+    run, target, found = run_colors(trial, limits=Limits(None, most), seed=1)
     assert run.recovered
     assert run.fitness_algorithm2 < 1e-6
     assert run.psnr_db > 100.0
@@ -30,15 +41,17 @@ def test_planted_quarter_waves_are_found_to_the_last_pixel(case):
     assert run.trace[-1].fitness_algorithm2 == pytest.approx(run.fitness_algorithm2, abs=1e-12)
 
 
-def test_free_films_make_the_colours_of_quarter_waves():
-    run, _, _ = run_colors(Trial("heliar", films="film"), limits=Limits(None, 16), seed=0)
+@pytest.mark.parametrize("most", [1, pytest.param(16, marks=pytest.mark.slow)])
+def test_free_films_make_the_colours_of_quarter_waves(most):
+    run, _, _ = run_colors(Trial("heliar", films="film"), limits=Limits(None, most), seed=0)
     assert run.psnr_db > 50.0
     assert not run.recovered
 
 
-def test_ghosts_from_scratch_are_compared_with_what_was_wanted():
+@pytest.mark.parametrize("most", [100, pytest.param(1500, marks=pytest.mark.slow)])
+def test_ghosts_from_scratch_are_compared_with_what_was_wanted(most):
     trial = Trial("scratch", ghosts=3, unsigned=True)
-    run, target, found = run_trial(trial, limits=Limits(None, 1500), seed=2)
+    run, target, found = run_trial(trial, limits=Limits(None, most), seed=2)
     assert run.psnr_db > run.psnr_black_db + 10.0
     assert np.mean((target - found) ** 2) == pytest.approx(10.0 ** (-run.psnr_db / 10.0))
     assert not run.recovered

@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 from planted import planted
 
+from flarewright.design import freedom
 from flarewright.design.freedom import alike, moderation, to_the_middle
 from flarewright.design.polish import polish
+from flarewright.design.prescription import Structure
 from flarewright.design.problem import SOLVED, Candidate
 
 
@@ -51,9 +53,19 @@ def test_what_is_unsolved_stays():
     assert alike(problem, far) == (far,)
 
 
-def test_other_structures_have_the_ghosts_too():
+# one of the three other structures has the ghosts too
+OTHER = Structure(4, (True, True, True, False, False, True, False))
+
+
+@pytest.mark.parametrize("others", [(OTHER,), pytest.param(None, marks=pytest.mark.slow)])
+def test_other_structures_have_the_ghosts_too(monkeypatch, others):
     problem, solved = free_planted(signed=False)
+    if others:
+        monkeypatch.setattr(freedom, "SEARCHES", 1000)
+        assert {solved.structure, *others} < set(problem.structures)
+        problem = replace(problem, structures=(solved.structure, *others))
     found = alike(problem, solved, seed=1)
+    assert {one.structure for one in found} == {solved.structure, OTHER}
     assert len({one.structure for one in found}) == len(found)
     assert all(one.cost <= SOLVED for one in found)
     by = [moderation(problem.variables(one.structure), one.x) for one in found]

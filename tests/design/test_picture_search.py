@@ -107,12 +107,14 @@ def test_a_local_search_makes_the_picture_better_inside_the_bounds():
     assert not np.array_equal(kept[before <= worth], near[before <= worth])
 
 
-def test_lenses_found_by_the_picture_have_better_pictures_than_those_by_places_and_sizes():
+@pytest.mark.parametrize("searches", [100, pytest.param(1500, marks=pytest.mark.slow)])
+def test_lenses_found_by_the_picture_have_better_pictures_than_those_by_places_and_sizes(searches):
     problem = scratch(10, 0)
     plain = replace(problem, objective=replace(problem.objective, picture=None))
     fine = finer(problem)
     best = [
-        finest(fine, solve(one, seed=0, time_limit=None, most_searches=1500).best, 0).cost for one in (problem, plain)
+        finest(fine, solve(one, seed=0, time_limit=None, most_searches=searches).best, 0).cost
+        for one in (problem, plain)
     ]
     assert best[0] < 0.9 * best[1]
     assert finer(fine) is fine
@@ -130,7 +132,7 @@ def test_ghosts_that_a_lens_can_have_are_met_exactly_all_the_same():
 
 def test_lenses_are_told_with_the_cost_of_the_finer_picture():
     problem = scratch(8, 1)
-    state = solve(problem, seed=0, time_limit=None, most_searches=300)
+    state = solve(problem, seed=0, time_limit=None, most_searches=100)
     (best,) = outcomes(state, problem, count=1)
     known = problem.variables(best.structure)
     (cost,) = polish_within(known, known.search_point(best.vector)[None], finer(problem).objective, 0)[1]

@@ -10,10 +10,11 @@ from flarewright.design.target import problem_of
 from flarewright.model.design import GhostWish
 
 
-def test_ghosts_along_a_line_are_met():
+@pytest.mark.parametrize("searches", [250, pytest.param(4000, marks=pytest.mark.slow)])
+def test_ghosts_along_a_line_are_met(searches):
     wishes = tuple(GhostWish(place_mm=p, radius_mm=r) for p, r in ((5.0, 2.0), (-8.0, 1.0), (12.0, 4.0)))
     problem, _ = problem_of(scratch_project(wishes, (6.0, 6.0), surfaces=6, signed=False))
-    state = solve(problem, seed=0, time_limit=None, most_searches=4000)
+    state = solve(problem, seed=0, time_limit=None, most_searches=searches)
     best = outcomes(state, problem, count=1)[0]
     assert np.abs(best.residuals).max() < 0.2
     # the ghosts that nobody asked for are large, so faint

@@ -156,12 +156,17 @@ def test_a_commented_project_teaches_every_key(tmp_path, monkeypatch):
         assert read_project("p.toml")
 
 
+@pytest.fixture(scope="module")
+def schema():
+    found = project_json_schema()
+    jsonschema.Draft202012Validator.check_schema(found)
+    assert json.dumps(found)
+    return jsonschema.Draft202012Validator(found)
+
+
 @pytest.mark.parametrize("project", PROJECTS)
-def test_the_schema_accepts_what_is_written(project):
-    schema = project_json_schema()
-    jsonschema.Draft202012Validator.check_schema(schema)
-    jsonschema.validate(tomllib.loads(project_text(project)), schema)
-    assert json.dumps(schema)
+def test_the_schema_accepts_what_is_written(schema, project):
+    schema.validate(tomllib.loads(project_text(project)))
 
 
 def test_paths_start_at_the_projects_folder(tmp_path, monkeypatch):

@@ -275,3 +275,13 @@ def test_check_and_convert_take_such_files(tmp_path):
 def test_bytes_that_are_no_text_do_not_break_it():
     assert decoded(b"\xff\xfeV\x00E\x00") == "VE"
     assert decoded(b"NAME \xd8") == "NAME Ø"
+
+
+@pytest.mark.parametrize(("unit", "mm"), [("MM", 1.0), ("CM", 10.0), ("IN", 25.4)])
+def test_a_field_given_as_a_height_is_in_the_unit_of_the_file(unit, mm, tmp_path):
+    """FTYP 2 gives the height of the image, here half the focal length: atan(1/2) from the axis."""
+    order = first_order(load_lens(write(tmp_path, doublet(), "plain.zmx")))
+    text = doublet(unit=unit, field=0.5 * order.efl).replace("FTYP 0", "FTYP 2")
+    lens = load_lens(write(tmp_path, text))
+    assert first_order(lens).efl == pytest.approx(mm * order.efl, rel=1e-6)
+    assert lens.field_deg == pytest.approx(np.degrees(np.arctan(0.5)), rel=1e-3)

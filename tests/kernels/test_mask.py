@@ -1,11 +1,13 @@
 """An iris given as an image: what falls into each pixel is the mean of what the image lets through there."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 
 from flarewright.kernels._jit import for_python
 from flarewright.kernels.bundle import draw_bundle, node_densities
-from flarewright.kernels.mask import even_value
+from flarewright.kernels.mask import even_value, mask_value
 from flarewright.kernels.pattern import AT_X, AT_Y, COLUMNS, FIRST, PER_MM_X, PER_MM_Y, ROWS
 from flarewright.kernels.raster import blank_plane, to_pixels
 from flarewright.kernels.trace import ALIVE, STOP_X, WEIGHT, X, Y
@@ -64,11 +66,17 @@ def means(mask, zoom, *, twice=False):
     return fine.reshape(SIDE, times, SIDE, times).mean(axis=(1, 3)) / zoom**2
 
 
-@pytest.mark.parametrize("texels", [16, 40, 64, 300, 1000])
+@cache
+def gear_and_means(texels):
+    mask = gear(texels)
+    return mask, means(mask, 20.0)
+
+
+@pytest.mark.parametrize("texels", [16, 40, 64, 300, pytest.param(1000, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("cells", [1, 4, 37])
 def test_a_pixel_holds_the_mean_of_the_mask_over_it(texels, cells):
-    mask = gear(texels)
-    got, expected = drawn(mask, cells), means(mask, 20.0)
+    mask, expected = gear_and_means(texels)
+    got = drawn(mask, cells)
     assert got.sum() == pytest.approx(expected.sum(), rel=2e-3)
     # pixels' centres and halved resolutions stand for means, so the border is a little softer or sharper
     assert np.abs(got - expected).sum() < 0.04 * expected.sum()
@@ -127,3 +135,15 @@ def test_levels_keep_their_place_and_their_light(shape):
         ramp = 0.5 + 0.1 * at_x + 0.05 * at_y[:, None]
         # the last row and column may repeat others
         np.testing.assert_allclose(level[: height - 1, : width - 1], ramp[: height - 1, : width - 1], atol=1e-5)
+
+
+def test_an_image_of_the_opening_stands_upright():
+    """Its first row is up and its first column left; between the samples it is interpolated, outside it is dark."""
+    half = 2.0
+    value = for_python(mask_value)
+    image = np.array([[0.9, 0.5], [0.3, 0.1]], dtype=np.float32)
+    for (row, column), expected in np.ndenumerate(image):
+        assert value(image, half, column * half - 0.5 * half, 0.5 * half - row * half) == pytest.approx(expected)
+    assert value(image, half, 0.0, 0.0) == pytest.approx(0.45)
+    assert value(image, half, 0.0, 1.0) == pytest.approx(0.7)
+    assert value(image, half, 0.0, 2.5) == 0.0

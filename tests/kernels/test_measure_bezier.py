@@ -39,11 +39,12 @@ HOLLOW = np.array([0.0, -3.0, 25.0, 60.0, 40.0, 55.0, 2.0, 0.0, 0.0, *NUMBERS[9:
 
 # where two feet are all but equally far, the place nearest to a point may lie beside the farther one
 @pytest.mark.parametrize(("numbers", "error"), [(NUMBERS, 1e-9), (CIRCLE, 1e-9), (HOLLOW, 1e-3)])
-def test_distance_is_that_of_the_polynomials_roots(numbers, error):
+@pytest.mark.parametrize(("count", "apart"), [(80, 20.0), pytest.param(400, 8.0, marks=pytest.mark.slow)])
+def test_distance_is_that_of_the_polynomials_roots(numbers, error, count, apart):
     rng = np.random.default_rng(3)
     # on a turned grid there are points on the line through the middle, with a foot on either side
-    grid = np.stack(np.meshgrid(np.arange(-80.0, 80.0, 8.0), np.arange(-70.0, 70.0, 8.0)), axis=-1).reshape(-1, 2)
-    points = np.concatenate([rng.uniform(-60.0, 90.0, (400, 2)), grid, grid @ [[0.985, 0.174], [-0.174, 0.985]]])
+    grid = np.stack(np.meshgrid(np.arange(-80.0, 80.0, apart), np.arange(-70.0, 70.0, apart)), axis=-1).reshape(-1, 2)
+    points = np.concatenate([rng.uniform(-60.0, 90.0, (count, 2)), grid, grid @ [[0.985, 0.174], [-0.174, 0.985]]])
     found = np.empty(len(points))
     signed_distances(numbers, points, found)
     exact = [by_roots(numbers, *point) for point in points]
@@ -58,7 +59,8 @@ def test_inside_is_positive():
 
 
 @pytest.mark.parametrize("numbers", [NUMBERS, CIRCLE, HOLLOW])
-def test_inside_is_what_the_border_encloses(numbers):
+@pytest.mark.parametrize("count", [500, pytest.param(3000, marks=pytest.mark.slow)])
+def test_inside_is_what_the_border_encloses(numbers, count):
     t = np.linspace(0.0, 1.0, 4001)[:, None]
     corners = []
     for side, at, extent in ((1.0, 7, numbers[4]), (-1.0, 5, numbers[3])):
@@ -68,7 +70,7 @@ def test_inside_is_what_the_border_encloses(numbers):
         curve = (1 - t) ** 3 * p[0] + 3 * (1 - t) ** 2 * t * p[1] + 3 * (1 - t) * t**2 * p[2] + t**3 * p[3]
         corners.append(curve if side > 0.0 else curve[::-1])
     x, y = np.concatenate(corners[::-1]).T
-    points = np.random.default_rng(5).uniform(-90.0, 90.0, (3000, 2))
+    points = np.random.default_rng(5).uniform(-90.0, 90.0, (count, 2))
     px, py = points[:, :1], np.abs(points[:, 1:] - numbers[1])
     # how often a ray upwards crosses the upper border
     over = (x[:-1] <= px) != (x[1:] <= px)

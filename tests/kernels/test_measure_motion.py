@@ -27,9 +27,13 @@ def compared(here, there, around, reach=(2, 3)):
     return out
 
 
-def block(picture, row, column):
-    """Return a block, also where it hangs over the border."""
-    wide = np.pad(picture.astype(float), [(40, 40), (40, 40), (0, 0)], mode="edge")
+def widened(picture):
+    """Return a picture that goes on beyond its border."""
+    return np.pad(picture.astype(float), [(40, 40), (40, 40), (0, 0)], mode="edge")
+
+
+def block(wide, row, column):
+    """Return a block of a widened picture, also where it hangs over the border."""
     row, column = row + 40 - HALF, column + 40 - HALF
     return wide[row : row + 2 * HALF + 1, column : column + 2 * HALF + 1]
 
@@ -42,6 +46,7 @@ def test_blocks_are_compared_in_every_place_that_is_asked_for(far):
     # some stay where they are, and are told by sums that blocks share
     around[::2, ::3] = 0
     found = compared(here, there, around)
+    here, there = widened(here), widened(there)
     for i, row in enumerate(ROWS):
         for j, column in enumerate(COLUMNS):
             for v in range(5):
@@ -61,9 +66,10 @@ def test_a_block_misses_by_nothing_where_it_was_put(down, along):
 def test_a_block_is_as_rich_as_it_differs_from_its_mean():
     out = np.empty((ROWS.size, COLUMNS.size))
     block_structure(light(), ROWS, COLUMNS, HALF, out)
+    wide = widened(light())
     for i, row in enumerate(ROWS):
         for j, column in enumerate(COLUMNS):
-            own = block(light(), row, column)
+            own = block(wide, row, column)
             assert out[i, j] == pytest.approx(((own - own.mean(axis=(0, 1))) ** 2).sum(), rel=1e-6)
 
 

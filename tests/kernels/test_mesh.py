@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -63,29 +63,31 @@ MESHES = [
 ]
 
 
+@cache
+def meshed(lens: str, field, f_number: float, pair):
+    """The light, path, region and grid of one of the meshes."""
+    shot, path = shot_of(lens, field, f_number), ghost_path(load_lens(lens), *pair)
+    return shot, path, *mesh_of(shot, path)
+
+
 @pytest.mark.parametrize(("lens", "field", "f_number", "pair"), MESHES)
 def test_the_grid_has_no_cracks(lens, field, f_number, pair):
     """Every edge inside belongs to two triangles that run along it in opposite directions; no node lies on an edge."""
-    shot = shot_of(lens, field, f_number)
-    region, bundle = mesh_of(shot, ghost_path(load_lens(lens), *pair))
+    _, _, region, bundle = meshed(lens, field, f_number, pair)
     pupil, triangles = bundle.pupil, bundle.triangles
     assert len(triangles) > 32
     assert (signed_areas(pupil, triangles) > 0.0).all()
-    directed = Counter()
-    for t in triangles:
-        for k in range(3):
-            directed[int(t[k]), int(t[(k + 1) % 3])] += 1
-    assert max(directed.values()) == 1
-    border = [edge for edge in directed if edge[::-1] not in directed]
+    directed = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=-1).reshape(-1, 2)
+    # an edge as one number
+    along, against = (directed[:, k] * len(pupil) + directed[:, 1 - k] for k in (0, 1))
+    assert np.diff(np.sort(along)).min() > 0
+    border = directed[~np.isin(along, against, assume_unique=True)]
     # what has no partner surrounds the kept cells: each border node is entered as often as it is left
-    ins, outs = Counter(e[1] for e in border), Counter(e[0] for e in border)
-    assert ins == outs
+    outs, ins = (np.bincount(border[:, k], minlength=len(pupil)) for k in (0, 1))
+    assert np.array_equal(ins, outs)
     # a T-junction would be a border node in the middle of a border edge that runs the other way
-    ends = {tuple(np.round(pupil[e[0]], 9)) for e in border}
-    for a, b in border:
-        middle = tuple(np.round(0.5 * (pupil[a] + pupil[b]), 9))
-        if middle in ends:
-            pytest.fail(f"a node lies on the edge from {pupil[a]} to {pupil[b]}")
+    ends, middles = (np.round(at, 9) @ [1.0, 1.0j] for at in (pupil[border[:, 0]], pupil[border].mean(axis=1)))
+    assert not np.isin(middles, ends).any()
     assert region.box[0] - 1e-9 <= pupil[triangles, 0].min()
     assert pupil[triangles, 0].max() <= region.box[1] + 1e-9
 
@@ -93,18 +95,20 @@ def test_the_grid_has_no_cracks(lens, field, f_number, pair):
 @pytest.mark.parametrize(("lens", "field", "f_number", "pair"), MESHES)
 def test_triangles_tile_the_kept_cells(lens, field, f_number, pair):
     """Any point of the box lies in one triangle, or in a cell that was left out and passes nothing."""
-    shot = shot_of(lens, field, f_number)
-    path = ghost_path(load_lens(lens), *pair)
-    region, bundle = mesh_of(shot, path)
+    shot, path, region, bundle = meshed(lens, field, f_number, pair)
     rng = np.random.default_rng(1)
     low, high = region.box[[0, 2]], region.box[[1, 3]]
     points = rng.uniform(low, high, (600, 2))
     corners = bundle.pupil[bundle.triangles]
-    edges = np.roll(corners, -1, axis=1) - corners
-    hits = np.zeros(len(points), dtype=int)
-    for k, p in enumerate(points):
-        at = p - corners
-        hits[k] = ((edges[..., 0] * at[..., 1] - edges[..., 1] * at[..., 0]) >= 0.0).all(axis=1).sum()
+    # each triangle with the points between its left and its right
+    points = points[np.argsort(points[:, 0])]
+    first = np.searchsorted(points[:, 0], corners[..., 0].min(axis=1))
+    count = np.searchsorted(points[:, 0], corners[..., 0].max(axis=1), side="right") - first
+    near = corners[np.repeat(np.arange(len(corners)), count)]
+    which = np.repeat(first - np.cumsum(count) + count, count) + np.arange(count.sum())
+    edges, at = np.roll(near, -1, axis=1) - near, points[which][:, None] - near
+    inside = ((edges[..., 0] * at[..., 1] - edges[..., 1] * at[..., 0]) >= 0.0).all(axis=1)
+    hits = np.bincount(which[inside], minlength=len(points))
     assert hits.max() <= 1
     # the kept cells' area is that of the triangles
     share = signed_areas(bundle.pupil, bundle.triangles).sum() / float((high - low).prod())

@@ -484,9 +484,12 @@ position_m = [4.0, 10.0, 4.0]
 """
 
 
-def test_command_plans_a_scene_and_its_veil_is_that_of_a_final_render(tmp_path, capsys):
+def test_command_plans_a_scene_and_its_veil_is_that_of_a_final_render(tmp_path, capsys, monkeypatch):
+    # bare glass reflects all colours much alike
+    monkeypatch.setattr("flarewright.cli.predict_flares.JUDGED_NM", 3)
     file, page, cache = tmp_path / "s.toml", tmp_path / "s.html", tmp_path / "s.npz"
-    file.write_text(SCENE)
+    file.write_text(SCENE.replace("position_m = [0.0, -20.0, 2.0]", "f_number = 8.0\nposition_m = [0.0, -20.0, 2.0]")
+                    .replace("position_m = [5.0", "f_number = 8.0\nposition_m = [5.0"))  # fmt: skip
     arguments = [
         "predict",
         str(file),

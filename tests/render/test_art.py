@@ -151,7 +151,6 @@ def test_a_tint_colours_each_channel_whatever_else_is_done_to_the_ghost(mode, ch
     np.testing.assert_allclose(tinted, plain * tint, rtol=2e-5, atol=1e-6 * plain.max())
 
 
-
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("shown", ["passes", "ghosts"])
 def test_with_every_ghost_muted_the_layer_of_ghosts_is_black(mode, shown):
@@ -346,7 +345,6 @@ def test_a_ramp_is_laid_over_the_ghost_before_it_is_blurred(mode):
     assert (error < 0.01 * np.abs(expected).max(axis=(0, 1))).all()
 
 
-
 # --- who is chosen
 
 
@@ -444,7 +442,6 @@ def test_culling_and_level_of_detail_go_by_the_brightest_channel(channel):
     rules = (Rule(select=SOME, tint=tint, gain=4.0), Rule(select=SOME, ramp=((0, 1, 1, 1), (1, 0, 1, 3))))
     changed = resolve_art(settle(project("draft", *rules))).paths[SOME]
     assert changed.visible_gain == pytest.approx(4.0 * 3.0)
-
 
 
 def test_pixels_do_not_depend_on_the_thread_count():
