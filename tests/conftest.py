@@ -5,7 +5,10 @@ import os
 import sys
 import tempfile
 from contextlib import contextmanager
+from functools import cache
 from pathlib import Path
+
+import pytest
 
 HERE = Path(__file__).parent
 sys.path[:0] = [str(HERE / part) for part in ("physics", "design", "measure", "predict")]
@@ -52,3 +55,16 @@ def pytest_configure(config):
             return compile_alone(self, sig)
 
     Dispatcher.compile = compile_once
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _one_tree_of_commands():
+    """Keep the commands that Typer builds at every call: building them costs more than most commands of the tests do.
+
+    Tests that start a process, as `test_the_package_runs_as_a_module`, build the tree as a user's process does.
+    """
+    import typer.main
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(typer.main, "get_command", cache(typer.main.get_command))
+        yield

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import contextmanager
+
 import numpy as np
 import pytest
 from prescriptions import HELIAR, lens
@@ -23,6 +25,17 @@ def heliar():
     return lens(HELIAR, 4.5)
 
 
+@contextmanager
+def only(*names):
+    """Have tables made of some paths alone, where the others are not looked at."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(
+            "flarewright.optics.ghosts.ghost_paths",
+            lambda *which, **how: [path for path in ghost_paths(*which, **how) if path.name in names],
+        )
+        yield
+
+
 def named(table):
     return {f"{row.first_reflection}-{row.second_reflection}": row for row in table.ghosts}
 
@@ -33,7 +46,8 @@ def plain(heliar):
 
 
 def test_a_filter_dims_the_picture_and_mirrors_it_onto_itself(heliar, plain):
-    table = ghosts(heliar, FIELD, coating=Everywhere(coating=Bare()), f_number=8.0, filter_plate=GLASS)
+    with only("1-0", "6-3"):
+        table = ghosts(heliar, FIELD, coating=Everywhere(coating=Bare()), f_number=8.0, filter_plate=GLASS)
     assert table.efl == pytest.approx(plain.efl, rel=1e-12)
     assert table.sensor_distance == pytest.approx(plain.sensor_distance, rel=1e-12)
     # each face passes 0.96 of what runs along the axis
@@ -99,7 +113,8 @@ def test_a_tilted_glass_throws_its_reflection_aside_by_twice_the_tilt_times_the_
     built = build(heliar, cover_glass=Plate(thickness=0.5, gap=4.0, n_d=1.5, v_d=60.0)).lens
     angle = np.radians(0.2)
     tilted = built.replace(elements=(Element(rows=(9, 10), tilt_deg=(0.2, 0.0)),))
-    tables = [ghost_table(a, (0.0, 0.0), f_number=8.0, sensor=SensorMirror(0.1)) for a in (built, tilted)]
+    with only("sensor-10", "sensor-9"):
+        tables = [ghost_table(a, (0.0, 0.0), f_number=8.0, sensor=SensorMirror(0.1)) for a in (built, tilted)]
     one, other = map(named, tables)
     # a tilted plate also moves the picture itself, by its thickness times the tilt times 1 - 1/n
     through = tables[1].direct.centroid_mm[1]
@@ -160,10 +175,12 @@ def test_small_imperfections_move_ghosts_in_proportion(heliar, plain):
         sample = Imperfection(seed=5, decentre_um=um, tilt_arcmin=um / 10.0)
         return named(ghosts(heliar, FIELD, coating=Everywhere(coating=Bare()), f_number=8.0, imperfection=sample))
 
-    little, more = centroids(20.0), centroids(40.0)
+    names = ("3-2", "4-0", "4-1", "6-4")
+    with only(*names):
+        little, more = centroids(20.0), centroids(40.0)
     before = named(plain)
     moved = 0.0
-    for name in ("3-2", "4-0", "4-1", "6-4"):
+    for name in names:
         a, b = (np.subtract(found[name].centroid_mm, before[name].centroid_mm) for found in (little, more))
         assert np.abs(b - 2.0 * a).max() < 0.1 * np.abs(b).max() + 2e-3, name
         moved = max(moved, float(np.abs(b).max()))

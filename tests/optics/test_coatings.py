@@ -94,7 +94,7 @@ def test_an_offset_that_eats_the_film_is_refused():
         film_stack(QuarterWave(center_wavelength_nm=500, thickness_offset_nm=-200), 1.0, 1.5)
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=100, deadline=None)
 @given(index, index, films, wavelength, cosine)
 def test_no_light_is_lost(n0, n2, stack, lam, c):
     n, d = [f[0] for f in stack], [f[1] for f in stack]
@@ -103,7 +103,7 @@ def test_no_light_is_lost(n0, n2, stack, lam, c):
     assert np.all((R >= 0) & (T >= 0))
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=80, deadline=None)
 @given(index, index, films, wavelength, st.floats(1e-4, 1.0))
 def test_a_stack_is_the_same_from_both_sides_at_one_snell_invariant(n0, n2, stack, lam, c0):
     sine = n0 * math.sqrt(1 - c0 * c0) / n2
@@ -117,6 +117,7 @@ def test_a_stack_is_the_same_from_both_sides_at_one_snell_invariant(n0, n2, stac
     np.testing.assert_allclose(forward, backward, rtol=0, atol=1e-8 / min(c0, c2))
 
 
+@settings(max_examples=60, deadline=None)
 @given(index, index, cosine)
 def test_no_film_is_fresnel(n0, n2, c):
     if n0 == n2:
@@ -124,15 +125,17 @@ def test_no_film_is_fresnel(n0, n2, c):
     assert stack_reflectance(n0, n2, (), (), 550.0, c) == pytest.approx(fresnel(n0, n2, c), abs=1e-9)
 
 
+@settings(max_examples=60, deadline=None)
 @given(index, index, st.floats(1.0, 3.0), st.floats(0.0, 500.0), wavelength, st.floats(0.01, 1.0))
 def test_one_film_is_airys_formula(n0, n2, n1, d, lam, c):
     assert stack_reflectance(n0, n2, (n1,), (d,), lam, c) == pytest.approx(one_film(n0, n1, n2, d, lam, c), abs=1e-9)
 
 
-def test_agrees_with_tmm():
+@pytest.mark.parametrize("stacks", [300, pytest.param(1500, marks=pytest.mark.slow)])
+def test_agrees_with_tmm(stacks):
     rng = np.random.default_rng(7)
     worst = 0.0
-    for _ in range(1500):
+    for _ in range(stacks):
         count = rng.integers(0, 7)
         n0, n2 = rng.uniform(1.0, 2.2, 2)
         n, d = rng.uniform(1.0, 2.6, count), rng.uniform(0.0, 400.0, count)

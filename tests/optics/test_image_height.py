@@ -13,7 +13,9 @@ from flarewright.render.render import render
 def test_heights_are_paraxial_near_the_axis_and_the_renders_far_from_it(name, angle_deg):
     project = Project(
         lens=name, f_number=11.0, lights=(Light(field_deg=(angle_deg, 0.0)),),
-        camera=Camera(size_px=(64, 36)), quality=Quality(wavelengths=3, ringing="off"), output=Output(layers="passes"),
+        camera=Camera(size_px=(64, 36)), output=Output(layers="passes"),
+        # of all qualities the direct image is the same; a draft has the cheapest ghosts
+        quality=Quality(mode="draft", wavelengths=3, paths="same-side"),
     )  # fmt: skip
     settled = settle(project)
     # at 0.1 degrees, by how much the angle is rounded apart

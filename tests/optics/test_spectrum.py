@@ -145,3 +145,11 @@ def test_matrices():
     )
     with pytest.raises(ValueError, match="unknown"):
         xyz_to_rgb_matrix("bt2020")
+
+
+@pytest.mark.parametrize("count", [3, 4])
+def test_lines_are_traced_at_themselves_where_they_are_no_more_than_the_wavelengths(count):
+    mercury = Lines(lines=((578.0, 0.5), (435.833, 1.0), (546.074, 1.0), (400.0, 0.0)))
+    assert traced_wavelengths(count, mercury).tolist() == [435.833, 546.074, 578.0]
+    # one wavelength too few: they stand for a range again
+    assert traced_wavelengths(2, mercury).tolist() == traced_wavelengths(2).tolist()

@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
-from flarewright.model import Everywhere, Film, Standard
+from flarewright.model import D65, Everywhere, Film, Standard
 from flarewright.optics.coating_response import BAND_NM, coating_response
 from flarewright.optics.coatings import film_stack, stack_reflectance, stack_reflectance_transmittance
 from flarewright.optics.pack import resolve_coatings
+from flarewright.optics.spectrum import cie_1931, spectral_power
 from flarewright.optics.standard_coatings import BROADBAND_GLASS, STANDARD_COATINGS, standard_films
 from flarewright.render.prepare import load_lens
 
@@ -138,3 +139,16 @@ def test_the_response_of_a_cemented_surface():
     np.testing.assert_allclose(bare.reflectance, (0.02 / 3.22) ** 2, rtol=1e-12)
     film = coating_response(Film(index=1.38, thickness_nm=100.0), 1.62, 1.62, 0.0, (1.60, 1.60))
     assert film.luminous_reflectance[0] > 100.0 * bare.luminous_reflectance[0]
+
+
+def test_the_colour_of_a_coating_is_rec709_in_each_channel():
+    """Summed by hand: CIE 15 from R and daylight, then the matrix that IEC 61966-2-1 prints."""
+    response = coating_response(Standard(name="single-1950s"), 1.52, 1.52, [0.0, 40.0])
+    wave = response.wavelengths_nm
+    white = spectral_power(D65(), wave)[:, None] * cie_1931(wave)
+    xyz = response.reflectance @ white / white[:, 1].sum()
+    printed = np.array([[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [0.0557, -0.2040, 1.0570]])
+    np.testing.assert_allclose(response.rgb, xyz @ printed.T, rtol=3e-3)
+    # the film leaves purple
+    red, green, blue = response.rgb[0]
+    assert min(red, blue) > 1.1 * green

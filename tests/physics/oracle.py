@@ -150,6 +150,8 @@ def reflectance_sp(
     # Beyond the critical angle the cosine is +i |..|, so that waves decay into the far side.
     cosines = [np.sqrt((1.0 - tangential / m**2).astype(complex)) for m in n]
     cosines[0] = cos_from.astype(complex)
+    # what a film turns the phase by, there and back, is the same for both
+    turns = [np.exp(4j * np.pi / wavelength_nm * m * e * c) for m, e, c in zip(n[1:], d, cosines[1:], strict=False)]
     out = []
     with np.errstate(divide="ignore", invalid="ignore"):
         for s in (True, False):
@@ -160,10 +162,10 @@ def reflectance_sp(
                     a, b = (n[k + 1] * cosines[k], n[k] * cosines[k + 1])
                 r = (a - b) / (a + b)
                 if echo is not None:
-                    turn = np.exp(2j * (2.0 * np.pi * n[k + 1] * d[k] * cosines[k + 1] / wavelength_nm))
-                    r = (r + echo * turn) / (1.0 + r * echo * turn)
+                    behind = echo * turns[k]
+                    r = (r + behind) / (1.0 + r * behind)
                 echo = r
-            out.append(np.abs(echo) ** 2)
+            out.append(echo.real**2 + echo.imag**2)
     return out[0], out[1]
 
 
@@ -205,12 +207,17 @@ class Rays:
     """(3, n), arriving at the sensor."""
 
 
+def _dot(a: Array, b: Array) -> Array:
+    """Return the inner products of two rows of three-vectors."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
 def _hit_sphere(o: Array, d: Array, z: float, curvature: float) -> tuple[Array, Array]:
     """Return step and inner product form of physics.md: t = -D.d - sgn(R d_z) sqrt(...)."""
     R = 1.0 / curvature
     D = o - np.array([[0.0], [0.0], [z + R]])
-    b = np.sum(D * d, axis=0)
-    under = b * b - np.sum(D * D, axis=0) + R * R
+    b = _dot(D, d)
+    under = b * b - _dot(D, D) + R * R
     t = -b - np.sign(R * d[2]) * np.sqrt(under)
     normal = (D + t * d) / R
     return t, normal
@@ -227,7 +234,7 @@ def _hit_conic(o: Array, d: Array, z: float, c: float, k: float) -> tuple[Array,
         t = np.where(np.sign(root) == np.sign(-B), C / (root - B), (-B - root) / A)
     q = p + t * d
     gradient = np.stack([c * q[0], c * q[1], c * (1.0 + k) * q[2] - 1.0])
-    return t, -gradient / np.sqrt(np.sum(gradient**2, axis=0))
+    return t, -gradient / np.sqrt(_dot(gradient, gradient))
 
 
 def _hit(o: Array, d: Array, z: float, row: OracleRow) -> tuple[Array, Array]:
@@ -296,9 +303,9 @@ def trace(
             if row.is_stop:
                 sx, sy = o[0].copy(), o[1].copy()
             # Where it goes. The normal is turned against the ray.
-            against = np.where(np.sum(normal * d, axis=0) > 0.0, -1.0, 1.0)
+            against = np.where(_dot(normal, d) > 0.0, -1.0, 1.0)
             normal = normal * against
-            c = -np.sum(normal * d, axis=0)
+            c = -_dot(normal, d)
             ok = np.isfinite(t) & np.isfinite(c) & (rel <= drop_beyond)
             if step.mirror:
                 d = d + 2.0 * c * normal
@@ -312,12 +319,15 @@ def trace(
             ok &= d[2] > 0.0 if ends_forward else d[2] < 0.0
             # What is lost.
             if weigh and not row.is_stop:
+                # sets that coat this surface alike share its R
+                known: dict[Films, Array] = {}
                 for s, films in enumerate(sets):
                     met = films[step.row] if step.forward else films[step.row][::-1]
                     if not step.mirror and not met and step.n_from == step.n_to:
                         continue
-                    R = reflectance(step.n_from, met, step.n_to, c, wavelength_nm)
-                    w[s] *= R if step.mirror else 1.0 - R
+                    if met not in known:
+                        known[met] = reflectance(step.n_from, met, step.n_to, c, wavelength_nm)
+                    w[s] *= known[met] if step.mirror else 1.0 - known[met]
             if not ok.all():
                 keep, rel, sx, sy = keep[ok], rel[ok], sx[ok], sy[ok]
                 o, d, w = o[:, ok], d[:, ok], w[:, ok]
@@ -588,14 +598,15 @@ def table(
     samples: int = 6000,
     replicas: int = 8,
     seed: int = 1,
+    grid: int = 96,
 ) -> list[dict[Path, Estimate]]:
     """Integrate every ghost above `floor` of the strongest (a rough first round finds them) and the direct path.
 
-    Returns one table per set of films.
+    Regions are searched by `grid` cells a side; each cell costs a ray a replica. Returns one table per set of films.
     """
     wanted = [None, *ghost_paths(system)] if paths is None else list(paths)
     sets = 1 if film_sets is None else len(film_sets)
-    regions = {p: r for p in wanted if (r := find_region(system, p, field_deg)) is not None}
+    regions = {p: r for p in wanted if (r := find_region(system, p, field_deg, grid)) is not None}
 
     def run(path: Path, region: Region, n: int, k: int) -> list[Estimate] | None:
         return estimate(

@@ -24,7 +24,7 @@ NEARER = 6
 POINTS, COARSE = 12_000, 64
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", cache=True)
 def follow(curvature, form, z_vertex, inv_semi, n_gap, reflectance, sensor_z, stop_row, j, i, direction, x0, y0,
            blades, to_pixels, size, light):  # fmt: skip
     """Fill `light` with what is left of each ray from x0, y0 that reflects at j, then at i: 0 beside the picture."""

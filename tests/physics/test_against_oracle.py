@@ -25,6 +25,7 @@ from prescriptions import CANON, FIVE, HELIAR, SUPER_ANGULON, lens, system
 
 from flarewright.model import Bare, Everywhere, Lens, QuarterWave
 from flarewright.optics import ghosts
+from flarewright.optics.paths import ghost_path
 from flarewright.render.analysis import ghosts as analyse
 from flarewright.render.prepare import load_lens
 
@@ -72,13 +73,24 @@ def compare(prescription, f_number, field, **how) -> None:
     compare_systems(system(prescription, f_number), lens(prescription, f_number), field, **how)
 
 
-def compare_systems(s: System, a_lens: Lens, field, *, paths=None, samples=4000, replicas=6) -> None:
+def our_table(a_lens: Lens, field, choice, paths) -> ghosts.GhostTable:
+    """Make the program's table, of some paths only where the others are not judged: a zoom has hundreds."""
+    if paths is None:
+        return ghosts.ghost_table(a_lens, field, coating=choice)
+    some = tuple(ghost_path(a_lens, *path) for path in paths if path is not None)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(ghosts, "ghost_paths", lambda *_, **__: some)
+        return ghosts.ghost_table(a_lens, field, coating=choice)
+
+
+def compare_systems(s: System, a_lens: Lens, field, *, paths=None, samples=4000, replicas=6, grid=96) -> None:
     """Trace bare and coated in one go, then judge both tables."""
     film_sets = [[()] * len(s.rows), glass_air_films(s, QUARTER_WAVE)]
-    truth = table(s, field, film_sets=film_sets, paths=paths, floor=FLOOR, samples=samples, replicas=replicas)
+    how = {"floor": FLOOR, "samples": samples, "replicas": replicas, "grid": grid}
+    truth = table(s, field, film_sets=film_sets, paths=paths, **how)
     wrong = []
     for k, choice in enumerate((Everywhere(coating=Bare()), Everywhere(coating=QUARTER_WAVE))):
-        ours = ghosts.ghost_table(a_lens, field, coating=choice)
+        ours = our_table(a_lens, field, choice, paths)
         assert ours.sensor_distance == pytest.approx(s.sensor_distance, abs=1e-9)
         assert ours.stop_semi_diameter == pytest.approx(s.rows[s.stop].semi_diameter, abs=1e-9)
         rows = {(g.first_reflection, g.second_reflection): g for g in ours.ghosts} | {None: ours.direct}
@@ -119,20 +131,26 @@ def second_look(s: System, path, field, films, row) -> list[str]:
     return [f"the oracle knows nothing of {path}"] if first is None else complaints(row, first, ask_again)
 
 
+# cells a side of the oracle's search; half of the usual number takes a quarter of the rays
+COARSE = 48
+
+
 def test_heliar():
-    compare(HELIAR, 4.5, (8.0, 5.0), samples=2000)
+    """Five of 28; `test_five_lenses` judges all of them at this angle."""
+    some = [None, (1, 0), (4, 1), (7, 0), (8, 6)]
+    compare(HELIAR, 4.5, (8.0, 5.0), paths=some, samples=2000, grid=COARSE)
 
 
 def test_canon_some_paths():
-    """Seven of 351: inside the front group, across the stop, behind it."""
-    some = [None, (1, 0), (5, 4), (9, 1), (17, 3), (25, 11), (27, 23)]
-    compare(CANON, 2.8, (8.0, 5.0), paths=some, samples=2000)
+    """Three of 351: inside the front group, across the stop, behind it; `test_five_lenses` judges all of them."""
+    some = [(5, 4), (17, 3), (27, 23)]
+    compare(CANON, 2.8, (8.0, 5.0), paths=some, samples=2000, grid=COARSE)
 
 
 def test_a_shipped_lens():
     """The file, its loader and the table together, against the oracle's reading of the same frozen data."""
     a_lens = load_lens("triplet-pestrecov")
-    compare_systems(from_lens(a_lens), a_lens, (6.0, 4.0), samples=2000)
+    compare_systems(from_lens(a_lens), a_lens, (6.0, 4.0), samples=2000, grid=COARSE)
 
 
 def test_a_ring_of_steep_rays_around_the_rest():

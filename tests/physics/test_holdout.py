@@ -13,7 +13,7 @@ from flarewright.model import Camera, Holdout, Light, Lines, Output, Polygon, Pr
 from flarewright.optics.border import brightness, centroid, closed, content, mapped
 from flarewright.optics.color import luminance_weights
 from flarewright.optics.holdout import behind, hidden_at
-from flarewright.render.ledger import trace_ledger
+from flarewright.render import ledger, montecarlo, reference
 from flarewright.render.prepare import settle
 from flarewright.render.reference import ReferenceRun
 from flarewright.render.render import BLACK, HIDDEN, render
@@ -23,6 +23,9 @@ from flarewright.render.spread import covered
 D_LINE = Lines(lines=((587.56, 1.0),))
 SIZE = (120, 80)
 FINE = 8
+# half of the ghosts show what is hidden of a light
+SOME = {"paths": "same-side"}
+QUALITIES = [SOME, pytest.param({}, marks=pytest.mark.slow)]
 DISC = Light(field_deg=(6.0, 4.0), spectrum=D_LINE, diameter_deg=3.0)
 
 
@@ -38,17 +41,29 @@ def project(light=DISC, holdout=None, mode="final", **how):
     )
 
 
+RENDERED = {}
+
+
+def rendered(made):
+    """Render a project once: files of holdouts are written once, so it has one picture."""
+    key = made.model_dump_json()
+    if key not in RENDERED:
+        RENDERED[key] = render(made)
+    return RENDERED[key]
+
+
 def picture(made, name):
-    found = next(layer for layer in render(made).layers if layer.name == name)
+    found = next(layer for layer in rendered(made).layers if layer.name == name)
     return found.pixels.astype(np.float64) @ luminance_weights("rec709")
 
 
 @pytest.fixture(scope="module")
 def whole():
-    """The disc in full: ghosts, direct image, and column and row of its middle."""
-    x, y = render(project()).summary["lights"][0]["direct_position_mm"]
+    """The disc in full: its direct image, and column and row of its middle."""
+    full = project(quality=SOME)
+    x, y = rendered(full).summary["lights"][0]["direct_position_mm"]
     middle = (SIZE[0] / 2 + x * SIZE[0] / 36.0, SIZE[1] / 2 - y * SIZE[0] / 36.0)
-    return {name: picture(project(), name) for name in ("ghosts", "starburst")}, middle
+    return picture(full, "starburst"), middle
 
 
 def matte(path, column):
@@ -70,15 +85,17 @@ def depth_plate(path, depth, name="Z"):
 # The light that is left
 
 
+@pytest.mark.parametrize("quality", QUALITIES)
 @pytest.mark.parametrize("mode", ["final", "draft"])
-def test_two_halves_of_a_disc_are_the_disc(mode, whole, tmp_path):
+def test_two_halves_of_a_disc_are_the_disc(mode, quality, whole, tmp_path):
     """Half the direct image each, and together every pixel of the ghosts."""
     file = matte(tmp_path / "m.png", whole[1][0])
     halves = [Holdout(image=file), Holdout(image=file, invert=True)]
-    full = picture(project(mode=mode), "ghosts")
-    made = [{name: picture(project(DISC, held, mode), name) for name in whole[0]} for held in halves]
+    full = picture(project(mode=mode, quality=quality), "ghosts")
+    held = [project(DISC, half, mode, quality=quality) for half in halves]
+    made = [{name: picture(half, name) for name in ("ghosts", "starburst")} for half in held]
     for half in made:
-        assert half["starburst"].sum() == pytest.approx(0.5 * whole[0]["starburst"].sum(), rel=0.01)
+        assert half["starburst"].sum() == pytest.approx(0.5 * whole[0].sum(), rel=0.01)
         # the ghosts of the two halves differ by which rims they meet
         assert half["ghosts"].sum() == pytest.approx(0.5 * full.sum(), rel=0.1)
     both = made[0]["ghosts"] + made[1]["ghosts"]
@@ -86,32 +103,40 @@ def test_two_halves_of_a_disc_are_the_disc(mode, whole, tmp_path):
     assert np.abs(both - full).sum() < 0.02 * full.sum()
     # the black half is dark, the other as bright as it was
     column = int(whole[1][0])
-    assert made[0]["starburst"][:, : column - 2].sum() < 0.02 * whole[0]["starburst"].sum()
-    assert np.abs(made[0]["starburst"][:, column + 3 :] / whole[0]["starburst"][:, column + 3 :]).max() < 1.01
+    assert made[0]["starburst"][:, : column - 2].sum() < 0.02 * whole[0].sum()
+    assert np.abs(made[0]["starburst"][:, column + 3 :] / whole[0][:, column + 3 :]).max() < 1.01
 
 
-def test_what_is_seen_of_a_rectangle_is_a_smaller_one(whole, tmp_path):
+@pytest.mark.parametrize("quality", QUALITIES)
+def test_what_is_seen_of_a_rectangle_is_a_smaller_one(quality, tmp_path):
     window = Light(field_deg=(6.0, 4.0), spectrum=D_LINE, shape=Rectangle(size_deg=(4.0, 2.0)))
-    x = render(project(window)).summary["lights"][0]["direct_position_mm"][0]
-    hidden = project(window, Holdout(image=matte(tmp_path / "m.png", SIZE[0] / 2 + x * SIZE[0] / 36.0)))
+    x = rendered(project(window, mode="draft")).summary["lights"][0]["direct_position_mm"][0]
+    held = Holdout(image=matte(tmp_path / "m.png", SIZE[0] / 2 + x * SIZE[0] / 36.0))
+    hidden = project(window, held, quality=quality)
     middle = np.degrees(np.arctan(np.tan(np.radians((4.0, 8.0))).mean())) - 6.0
     right = Polygon(corners_deg=((middle, -1.0), (2.0, -1.0), (2.0, 1.0), (middle, 1.0)))
     shots = make_shots(settle(hidden), make_opening(settle(hidden), None))
     left = sum(shot.share for shot in shots)
     assert left == pytest.approx(0.5, abs=0.005)
-    seen = project(Light(field_deg=(6.0, 4.0), spectrum=D_LINE, shape=right, intensity=left))
+    seen = project(Light(field_deg=(6.0, 4.0), spectrum=D_LINE, shape=right, intensity=left), quality=quality)
     for name in ("ghosts", "starburst"):
         one, other = picture(hidden, name), picture(seen, name)
         assert one.sum() == pytest.approx(other.sum(), rel=3e-3)
     assert np.abs(picture(hidden, "ghosts") - picture(seen, "ghosts")).sum() < 0.02 * picture(seen, "ghosts").sum()
 
 
-def test_the_reference_sees_the_same(whole, tmp_path):
+@pytest.mark.parametrize("effort", ["small", pytest.param("whole", marks=pytest.mark.slow)])
+def test_the_reference_sees_the_same(effort, whole, tmp_path, monkeypatch):
     """Random directions of what is left, by z-test; and what enters is what is seen."""
+    layers, batches = "ghosts", 24
+    if effort == "small":
+        # each direction costs as much as hundreds of rays
+        monkeypatch.setattr(montecarlo, "AIMS", 4)
+        monkeypatch.setattr(ledger, "SIDE", 8)
+        layers, batches = "passes", 12
     held = Holdout(image=matte(tmp_path / "m.png", whole[1][0] + 1.0))
-    judged = judge(
-        project(DISC, held, quality={"source_step_deg": 1.5}, layers="ghosts", starburst=False), batches=24, side=32
-    )
+    quality = {"source_step_deg": 1.5}
+    judged = judge(project(DISC, held, quality=quality, layers=layers, starburst=False), batches=batches, side=32)
     final, mean, error = judged.total
     assert abs(final - mean) < 5e-3 * mean + 4.0 * error < 0.1 * mean
     _, worst = probabilities(judged, judged.mean)
@@ -120,15 +145,17 @@ def test_the_reference_sees_the_same(whole, tmp_path):
     for hiding in (held, None):
         settled = settle(project(DISC, hiding))
         shots = make_shots(settled, make_opening(settled, None))
-        entered.append((trace_ledger(shots, 0).entered_mm2, sum(shot.share for shot in shots)))
+        entered.append((ledger.trace_ledger(shots, 0).entered_mm2, sum(shot.share for shot in shots)))
     assert entered[0][0] / entered[1][0] == pytest.approx(entered[0][1], rel=0.01)
     assert entered[0][1] == pytest.approx(0.427, abs=0.01)
 
 
-def test_a_state_of_another_holdout_is_refused(tmp_path):
+def test_a_state_of_another_holdout_is_refused(tmp_path, monkeypatch):
     """By what it hides, not by its name."""
+    monkeypatch.setattr(reference, "SIDE", 16)
     file, state = tmp_path / "m.png", tmp_path / "a.state.npz"
-    made = project(DISC, Holdout(image=matte(file, 94.0)), "reference", quality={"reference_samples": 1})
+    quality = {"reference_samples": 1, "reference_from": "light"}
+    made = project(DISC, Holdout(image=matte(file, 94.0)), "reference", quality=quality)
     render(made, run=ReferenceRun(state_file=state))
     render(made, run=ReferenceRun(resume=read_state(state)))
     matte(file, 96.0)
@@ -136,12 +163,13 @@ def test_a_state_of_another_holdout_is_refused(tmp_path):
         render(made, run=ReferenceRun(resume=read_state(state)))
 
 
-def test_grey_lets_its_part_through(whole, tmp_path):
+def test_grey_lets_its_part_through(tmp_path):
     grey = np.full((SIZE[1], SIZE[0]), 64, dtype=np.uint8)
     Image.fromarray(grey).save(tmp_path / "g.png")
     for light in (DISC, DISC.replace(diameter_deg=0.0)):
         full, part = (
-            picture(project(light, held), "ghosts") for held in (None, Holdout(image=str(tmp_path / "g.png")))
+            picture(project(light, held, quality=SOME), "ghosts")
+            for held in (None, Holdout(image=str(tmp_path / "g.png")))
         )
         assert part.sum() == pytest.approx(64.0 / 255.0 * full.sum(), rel=2e-3)
         assert np.abs(part - 64.0 / 255.0 * full).sum() < 0.01 * part.sum()

@@ -1,6 +1,7 @@
 """Final quality against the reference: every block of 16 x 16 pixels, every path, with regard to the variance."""
 
 import numpy as np
+import path_rays
 import pytest
 from judge import blocks_of, deviations, judge, probabilities
 from path_rays import path_flux
@@ -79,15 +80,15 @@ def told_of_paths(judged):
     return f"{told}, the worst of those ({worst}) {known[worst][0]:+.2%} +- {known[worst][1]:.2%} off"
 
 
-@pytest.fixture(scope="module")
-def small():
-    """A coated triplet with a pentagonal iris, two wavelengths, a small picture."""
+@pytest.fixture(scope="module", params=[24, pytest.param(64, marks=pytest.mark.slow)])
+def small(request):
+    """A coated triplet with a pentagonal iris, two wavelengths, a small picture; batches of the reference."""
     coated = Everywhere(coating=QuarterWave(center_wavelength_nm=550.0))
     project = scene(
         "triplet-pestrecov", (8.0, 4.0), 4.0, size=(96, 64), coating=coated, iris=Iris(blades=5), wavelengths=2,
         light=Light(field_deg=(8.0, 4.0)),
     )  # fmt: skip
-    return project, judge(project, batches=64, side=64)
+    return project, judge(project, batches=request.param, side=64)
 
 
 def test_a_small_picture_agrees(small):
@@ -103,7 +104,8 @@ def test_a_small_picture_agrees(small):
 def test_wrong_pictures_are_refused(small):
     """The judgement has teeth: 5 % too bright, a path left out, a shift by half a block, a mirrored picture."""
     project, judged = small
-    ghosts = next(layer for layer in render(project).layers if layer.name == "ghosts")
+    layers = render(project).layers
+    ghosts = next(layer for layer in layers if layer.name == "ghosts")
     assert blocks_of(ghosts.pixels, ghosts.window, project) == pytest.approx(judged.final)
     whole = picture(ghosts, (96, 64))
     shifted = np.roll(whole, 8, axis=1)
@@ -112,7 +114,7 @@ def test_wrong_pictures_are_refused(small):
         blocks_of(shifted, (0, 0, 96, 64), project),
         blocks_of(whole[:, ::-1], (0, 0, 96, 64), project),
     ]
-    third = sorted((layer for layer in render(project).layers if layer.name.startswith("ghost.")),
+    third = sorted((layer for layer in layers if layer.name.startswith("ghost.")),
                    key=lambda layer: -float(layer.about["flux_mm2"]))[2]  # fmt: skip
     wrong.append(judged.final - blocks_of(third.pixels, third.window, project))
     for blocks in wrong:
@@ -120,26 +122,37 @@ def test_wrong_pictures_are_refused(small):
         assert min(everywhere, worst) < 1e-6
 
 
-@pytest.fixture(scope="module")
-def fours():
-    """All four-reflection ghosts of an uncoated triplet that are worth anything."""
-    project = scene("triplet-pestrecov", (8.0, 4.0), 4.0, size=(96, 64))
-    return project, render(project.replace(quality=project.quality.replace(orders=4, order4_limit=1e-6)))
+def two_singlets():
+    """Return the triplet without its middle lens, whose four-reflection paths are 24, not 190."""
+    whole = load_lens("triplet-pestrecov")
+    rows = (*whole.rows[:2], *whole.rows[4:])
+    return whole.replace(name="two singlets", rows=rows, coating_presets={}, sensor_distance=None)
+
+
+# two singlets have paths of the same kinds; the faintest of the triplet take seconds to find
+@pytest.fixture(scope="module", params=["two singlets", pytest.param("triplet", marks=pytest.mark.slow)])
+def fours(request):
+    """All four-reflection ghosts of an uncoated lens that are worth anything; a side of the reference's batches."""
+    lens, limit, side = (two_singlets(), 4e-6, 32) if request.param != "triplet" else ("triplet-pestrecov", 1e-6, 64)
+    project = scene(lens, (8.0, 4.0), 4.0, size=(96, 64))
+    project = project.replace(quality=project.quality.replace(orders=4, order4_limit=limit))
+    return project, render(project), side
 
 
 def test_ghosts_of_four_reflections_agree(fours):
     """Their sum, block by block, against rays that end after the fourth reflection."""
-    project, rendering = fours
+    project, rendering, side = fours
     layers = {layer.name: layer for layer in rendering.layers}
     facts = rendering.summary["ghosts.order4"]
-    assert facts["drawn"] > 130
+    assert facts["drawn"] > (130 if len(settle(project).lens.rows) > 5 else 20)
     assert facts["left_out_share"] < 1e-3
     singles = [layer for name, layer in layers.items() if name.count("-") == 3]
     assert len(singles) == facts["drawn"]
     ghosts = layers["ghosts.order4"]
     final = blocks_of(ghosts.pixels, ghosts.window, project)
     assert sum(float(layer.about["flux_mm2"]) for layer in singles) == pytest.approx(final.sum(), rel=1e-5)
-    judged = judge(project, batches=64, side=64, fours=True)
+    pairs = project.replace(quality=project.quality.replace(orders=2))
+    judged = judge(pairs, batches=64, side=side, fours=True)
     everywhere, worst = probabilities(judged, final)
     assert everywhere > CHANCE
     assert worst > CHANCE
@@ -147,7 +160,7 @@ def test_ghosts_of_four_reflections_agree(fours):
     assert error < 0.02 * mean
     assert abs(final.sum() - mean) < 5e-3 * mean + 4.0 * error
     # and without them the picture is the same but for them
-    two = {layer.name: layer for layer in render(project).layers}
+    two = {layer.name: layer for layer in render(pairs).layers}
     np.testing.assert_array_equal(two["ghosts"].pixels, layers["ghosts"].pixels)
     np.testing.assert_array_equal(
         layers["beauty"].pixels, two["beauty"].pixels + picture(ghosts, project.camera.size_px)
@@ -156,12 +169,13 @@ def test_ghosts_of_four_reflections_agree(fours):
 
 def test_every_path_of_four_reflections_agrees(fours):
     """Flux of each path against the rays that the reference saw take it."""
-    project, rendering = fours
+    project, rendering, side = fours
     drawn = {str(layer.about["path"]): float(layer.about["flux_mm2"]) for layer in rendering.layers
              if layer.name.count("-") == 3}  # fmt: skip
     settled = settle(project)
     shots = make_shots(settled, make_opening(settled, None))
-    sources = [ray_source(shot, 7, side=64, light=k, followed=(4.0, 0.0)) for k, shot in enumerate(shots)]
+    limit = project.quality.order4_limit
+    sources = [ray_source(shot, 7, side=side, light=k, followed=(4.0, 0.0)) for k, shot in enumerate(shots)]
     batches, count = 24, len(settled.lens.rows)
     found = np.zeros((batches, count**4))
     two = 0.0
@@ -172,9 +186,9 @@ def test_every_path_of_four_reflections_agrees(fours):
     mean, error = found.mean(axis=0), found.std(axis=0, ddof=1) / np.sqrt(batches)
     keys = {"-".join(map(str, np.unravel_index(k, (count,) * 4))): k for k in np.flatnonzero(mean)}
     # none that is clearly above the limit is missing
-    assert {name for name, k in keys.items() if mean[k] - 4.0 * error[k] > 1.3e-6 * two} <= set(drawn)
+    assert {name for name, k in keys.items() if mean[k] - 4.0 * error[k] > 1.3 * limit * two} <= set(drawn)
     bright = {name: flux for name, flux in drawn.items() if flux > 3e-5 * two}
-    assert len(bright) > 80
+    assert len(bright) > (80 if len(settled.lens.rows) > 5 else 20)
     bound = stats.t.isf(CHANCE / (2 * len(bright)), batches - 1)
     for name, flux in bright.items():
         k = keys[name]
@@ -206,10 +220,12 @@ def judged_paths(project, batches=8):
     return {f"{j}-{i}": (final.get(f"{j}-{i}", 0.0), *path_flux(shot, j, i, batches)) for j, i in pairs}
 
 
-def test_rays_of_one_path_are_the_references():
+@pytest.mark.parametrize(("side", "points"), [(32, 6_000), pytest.param(64, 12_000, marks=pytest.mark.slow)])
+def test_rays_of_one_path_are_the_references(side, points, monkeypatch):
     """All paths at once, and each by itself: by z-test."""
+    monkeypatch.setattr(path_rays, "POINTS", points)
     project = scene("triplet-pestrecov", (8.0, 4.0), 4.0, size=(96, 64), iris=Iris(blades=5))
-    judged = judge(project, batches=64, side=64)
+    judged = judge(project, batches=64, side=side)
     alone = judged_paths(project)
     z = []
     for name, (_, mean, error) in judged.paths.items():
