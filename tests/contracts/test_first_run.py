@@ -28,6 +28,13 @@ from flarewright.io.exr import read_exr
 from flarewright.kernels import _jit, first_run, helpers
 from flarewright.kernels.first_run import ROOTS, compile_together, divided
 
+
+@pytest.fixture(autouse=True)
+def _helpers_may_start(monkeypatch):
+    """Undo what tests/conftest.py does for all other tests."""
+    monkeypatch.delenv("FLAREWRIGHT_HELPER", raising=False)
+
+
 # a command, and what it compiled, loaded and was asked for
 WATCHED = """
 import json, sys

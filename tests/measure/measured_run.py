@@ -1,4 +1,4 @@
-"""The synthetic run that several tests look at: how it is photographed, and what there is of it."""
+"""The runs that several tests look at: how they are made, and what there is of them."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,7 +9,7 @@ from synthetic_camera import Setup
 from flarewright.model.capture import MergedRun
 
 SETUP = Setup(
-    size_px=(240, 160), angles_deg=tuple(1.8 * k for k in range(-2, 11)), pitch_deg=0.3, axis_offset_px=(2, -1),
+    size_px=(240, 160), angles_deg=tuple(3.6 * k for k in range(-1, 5)), pitch_deg=0.3, axis_offset_px=(2, -1),
     drift=0.0,
 )  # fmt: skip
 
@@ -22,3 +22,12 @@ class Measured:
     folder: Path
     truth: dict[str, Any]
     run: MergedRun
+
+
+@dataclass(frozen=True)
+class Staged:
+    """The folder of a run with all its stages, what these reported, and how many steps each had."""
+
+    folder: Path
+    facts: dict[str, Any]
+    steps: dict[str, int]

@@ -2,16 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from pathlib import Path
+
 import numpy as np
 
+from flarewright.io.merged import write_frame, write_run
 from flarewright.measure.fit import render
+from flarewright.measure.found import Found
 from flarewright.measure.numbers import NUMBERS, field, frame
-from flarewright.measure.shape import Shape
+from flarewright.measure.settle import to_model
+from flarewright.measure.shape import Shape, enlarged
 from flarewright.measure.views import View
+from flarewright.model.capture import FrameInfo, MergedFrame, MergedRun
+from flarewright.model.ghost_model import GhostModel
 
 SIZE = (240, 160)
 LARGEST = 24.0
 NOISE = 0.01
+# of a merged run: constellations, and pixels per radian
+ANGLES = np.linspace(2.0, LARGEST, 12)
+FOCAL = 900.0
 
 
 def shape(
@@ -34,6 +45,11 @@ GHOSTS = (
     shape(90.0, 7.0, 1.5, bend=-5.0),
 )
 
+# the same in pictures of half the size, for what goes through several stages
+SMALL = (120, 80)
+SMALL_GHOSTS = tuple(enlarged(one, 0.5) for one in GHOSTS)
+SMALL_ANGLES = np.linspace(2.0, LARGEST, 5)
+
 
 def views(ghosts=GHOSTS, *, angles=None, roll_deg=0.0, noise=NOISE, seed=0, size=SIZE) -> list[View]:
     """Return noisy views of ghosts; all three colours alike."""
@@ -46,3 +62,50 @@ def views(ghosts=GHOSTS, *, angles=None, roll_deg=0.0, noise=NOISE, seed=0, size
         total = sum((render(ghost, view) for ghost in ghosts), np.zeros((size[1], size[0])))
         out.append(view.showing((total[..., None] + rng.normal(0.0, noise, blank.shape)).astype(np.float32)))
     return out
+
+
+def write(
+    folder: Path,
+    ghosts: Sequence[Shape],
+    *,
+    angles=ANGLES,
+    size=SIZE,
+    focal=FOCAL,
+    last_from=0,
+    roll_deg=0.0,
+    seed=0,
+) -> MergedRun:
+    """Write a merged run of planted ghosts, the last of which is born at one of the constellations."""
+    (folder / "frames").mkdir(parents=True)
+    born = views(ghosts, angles=angles, size=size, roll_deg=roll_deg, seed=seed)
+    before = views(ghosts[:-1], angles=angles, size=size, roll_deg=roll_deg, seed=seed) if last_from else []
+    infos = []
+    for k, view in enumerate([*before[:last_from], *born[last_from:]]):
+        x, y, cosine, sine, _ = (float(each) for each in view.frame)
+        along = focal * float(np.tan(np.radians(angles[k])))
+        info = FrameInfo(
+            file=f"frames/{k:03d}.exr", constellation_deg=float(angles[k]), nominal_deg=float(angles[k]),
+            roll_deg=roll_deg, nominal_roll_deg=roll_deg, light_px=(x + along * cosine, y - along * sine),
+            axis_px=(x, y),
+        )  # fmt: skip
+        write_frame(folder, MergedFrame(info, view.pixels, view.variance))
+        infos.append(info)
+    run = MergedRun(size_px=size, frames=tuple(infos), axis_px=(x, y), px_per_rad=focal)
+    write_run(folder, run)
+    return run
+
+
+def write_small(folder: Path, ghosts: Sequence[Shape] = SMALL_GHOSTS[:1], **told) -> MergedRun:
+    """Write a merged run of few small pictures."""
+    return write(folder, ghosts, **{"angles": SMALL_ANGLES, "size": SMALL, **told})
+
+
+def rough_model(run: MergedRun, ghosts: Sequence[Shape] = SMALL_GHOSTS[:1]) -> GhostModel:
+    """Return the ghosts of a run as a search finds them at best."""
+    angles = [frame.constellation_deg for frame in run.frames]
+    found = [Found((one, one, one), 0, len(angles) - 1) for one in ghosts]
+    return GhostModel(
+        size_px=run.size_px, axis_px=run.axis_px, focal_px=run.px_per_rad, largest_deg=max(angles),
+        constellation_deg=(min(angles), max(angles)),
+        ghosts=to_model(found, views((), angles=angles, size=run.size_px)),
+    )  # fmt: skip

@@ -285,7 +285,8 @@ def test_what_was_refused_is_tried_again_when_more_is_known(monkeypatch):
 
     monkeypatch.setattr(pursuit, "_try", trial)
     monkeypatch.setattr(pursuit, "_candidates", left)
-    shown = views(GHOSTS[:1], angles=FEW)
+    monkeypatch.setattr(pursuit, "fitted_jointly", lambda found, *_, **__: [ghost.shapes[1] for ghost in found])
+    shown = views(GHOSTS[:1], angles=FEW[:3])
     found = pursue(shown, masks(shown), most=4)
     assert len(found) == 4
     assert tried[0] is tried[-1] is votes[0]
@@ -300,7 +301,10 @@ def test_who_was_refused_three_times_is_not_tried_again(monkeypatch):
 
     monkeypatch.setattr(pursuit, "_try", trial)
     monkeypatch.setattr(pursuit, "_candidates", lambda *_: ([votes[0], *(e for e in votes if e not in tried)], []))
-    shown = views(GHOSTS[:1], angles=FEW)
+    # what all these ghosts at one place leave is rounding, of which a search for lunes makes what it likes
+    monkeypatch.setattr(pursuit, "_lunes", lambda *_: [])
+    monkeypatch.setattr(pursuit, "fitted_jointly", lambda found, *_, **__: [ghost.shapes[1] for ghost in found])
+    shown = views(GHOSTS[:1], angles=FEW[:3])
     assert len(pursue(shown, masks(shown), most=40)) == 23
     assert tried.count(votes[0]) == 3
 

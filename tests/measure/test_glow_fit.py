@@ -1,6 +1,7 @@
 """Halo and star by what stays beside the light while the camera turns."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -18,11 +19,14 @@ HALO = Halo(
 STAR = Star(
     spikes=14, first_deg=11.0, width_px=1.3, radius_px=(2.0, 500.0), radiance=((40.0, 40.0, 30.0), (0.1, 0.1, 0.1))
 )
+# constellations
+COUNT = 14
 
 
+@cache
 def shown(star):
     out = []
-    for k, view in enumerate(views(GHOSTS[:2], noise=0.005, angles=np.linspace(2.0, 24.0, 14))):
+    for k, view in enumerate(views(GHOSTS[:2], noise=0.005, angles=np.linspace(2.0, 24.0, COUNT))):
         light = (20.5 + 15.3 * k, 79.5)
         x, y = offsets(light, SIZE, 1.0)
         pixels = view.pixels + halo_radiance(HALO, x, y) + (star_radiance(STAR, x, y) if star else 0.0)
@@ -30,7 +34,7 @@ def shown(star):
             view.constellation_deg, view.sigma, view.frame, light, pixels.astype(np.float32), view.variance
         )
         out.append(seen)
-    return out
+    return tuple(out)
 
 
 def test_halo_is_what_stays_and_ghosts_are_not_in_it():
@@ -157,7 +161,7 @@ def test_glow_taken_off_leaves_the_ghosts():
 
 def test_halo_star_and_veil_are_followed_over_the_constellations():
     # the lens shades its own star; a large faint ghost brightens the whole picture
-    fading, veil = np.linspace(1.0, 0.3, 14), np.linspace(0.0, 0.6, 14)
+    fading, veil = np.linspace(1.0, 0.3, COUNT), np.linspace(0.0, 0.6, COUNT)
     some = []
     for k, view in enumerate(shown(star=True)):
         x, y = offsets(view.light_px, SIZE, 1.0)

@@ -12,7 +12,7 @@ from flarewright.measure.numbers import NUMBERS
 from flarewright.measure.pursuit import beginning, pursue
 from flarewright.measure.shape import Shape
 
-ANGLES = np.linspace(6.0, 22.0, 17)
+ANGLES = np.linspace(6.0, 22.0, 11)
 BELOW_W = 1.8
 
 
@@ -89,7 +89,7 @@ def test_a_lune_begins_as_its_outline_is():
 def test_a_search_that_has_run_dry_finds_lunes():
     planted = lune(-260.0)
     shown = views((planted,), angles=ANGLES)
-    found = pursue(shown, [np.ones((SIZE[1], SIZE[0]), bool) for _ in shown], most=3)
+    found = pursue(shown, [np.ones((SIZE[1], SIZE[0]), bool) for _ in shown], most=1)
     # after these it is a few pixels long, and a search's rough fit need not be right
-    for view in shown[:13:4]:
+    for view in shown[:8]:
         assert max(overlap(render(ghost.shapes[1], view), render(planted, view)) for ghost in found) > 0.9

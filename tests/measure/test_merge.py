@@ -41,7 +41,7 @@ FULL = CAMERA.white - CAMERA.black
 
 
 def test_the_mean_of_many_merges_is_the_truth_and_their_spread_is_the_variance(tmp_path):
-    light, runs = scene(), 60
+    light, runs = scene(), 30
     found = [merge(shoot(tmp_path, light, seed=k)) for k in range(runs)]
     mean = np.stack([one[0] for one in found]).astype(np.float64) / FULL
     variance = np.stack([one[1] for one in found]).astype(np.float64) / FULL**2
@@ -154,3 +154,16 @@ def test_digits_of_noise_are_rounded_away_and_nothing_else():
     assert np.isinf(told[~known]).all()
     packed, full = (len(zlib.compress(values.tobytes())) for values in (told, variance))
     assert packed < 0.8 * full
+
+
+@pytest.mark.parametrize("iso", [100.0, 200.0, 800.0])
+def test_noise_grows_with_the_iso_as_counted_electrons_do(iso):
+    """Photons are drawn (Poisson), read (Gauss) and rounded: at eight times the ISO a unit holds an eighth of them."""
+    camera = CameraNoise(electrons_per_unit=4.0, read_noise=3.0, iso=100.0)
+    per_unit = 4.0 * 100.0 / iso
+    rng = np.random.default_rng(12)
+    for units in (0.0, 40.0, 900.0):
+        electrons = rng.poisson(units * per_unit, 40000) + rng.normal(0.0, 3.0, 40000)
+        drawn = np.round(electrons / per_unit).var()
+        # of a variance of so many samples: sqrt(2 / n) of it, here 0.7 %; four times that
+        assert noise_of(camera, iso, 1.0).variance(np.array(units)) == pytest.approx(drawn, rel=0.03)

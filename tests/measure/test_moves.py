@@ -8,7 +8,7 @@ from zlib import compress
 import numpy as np
 import pytest
 from planted_run import views
-from test_carried import BETWEEN, CAPTURED, TRUE, missed, mistaken, model_of
+from test_carried import CAPTURED, FEW, TRUE, between, missed, mistaken, model_of
 
 from flarewright.measure.carried import carried
 from flarewright.measure.moved import halfway, landed, middles, spread
@@ -19,34 +19,40 @@ from flarewright.model.moves import Moves, packed_moves
 from flarewright.model.sprite import Sprite, packed
 
 
+@pytest.fixture(scope="module", params=[FEW, pytest.param(CAPTURED, marks=pytest.mark.slow)], ids=["few", ""])
+def captured(request):
+    """Return at which constellations there are captures."""
+    return request.param
+
+
 @pytest.fixture(scope="module")
-def unknown():
+def unknown(captured):
     """Return a model that knows no ghost, before and after it has moves."""
-    model, _ = model_of(())
+    model, _ = model_of((), captured)
     return model, with_moves(model)
 
 
-def test_ghosts_that_nobody_knows_are_foretold_between_captures(unknown):
+def test_ghosts_that_nobody_knows_are_foretold_between_captures(unknown, captured):
     before, after = unknown
-    truth = views(TRUE, angles=BETWEEN, noise=0.0)
+    truth = views(TRUE, angles=between(captured), noise=0.0)
     assert missed(after, truth) < 0.3 * missed(before, truth)
 
 
-def test_known_ghosts_still_go_with_their_boxes():
-    model, _ = model_of(tuple(mistaken(one) for one in TRUE))
-    truth = views(TRUE, angles=BETWEEN, noise=0.0)
+def test_known_ghosts_still_go_with_their_boxes(captured):
+    model, _ = model_of(tuple(mistaken(one) for one in TRUE), captured)
+    truth = views(TRUE, angles=between(captured), noise=0.0)
     # nor is a ghost a loss that is drawn quite elsewhere than it is
     assert missed(with_moves(model), truth) < 1.1 * missed(model, truth)
-    strange, _ = model_of((replace(TRUE[0], numbers=-TRUE[0].numbers),))
+    strange, _ = model_of((replace(TRUE[0], numbers=-TRUE[0].numbers),), captured)
     assert missed(with_moves(strange), truth) < 0.5 * missed(strange, truth)
 
 
-def test_at_captures_and_next_to_them_nothing_changes(unknown):
+def test_at_captures_and_next_to_them_nothing_changes(unknown, captured):
     _, model = unknown
     sprite = model.sprites[0]
-    for k in (0, 7, len(CAPTURED) - 1):
+    for k in (0, len(captured) // 3, len(captured) - 1):
         own = sprite.pictures[k]
-        for beside in (CAPTURED[k] - 1e-7, CAPTURED[k], CAPTURED[k] + 1e-7):
+        for beside in (captured[k] - 1e-7, captured[k], captured[k] + 1e-7):
             there = carried(sprite, pack(model), model, float(beside))
             assert np.abs(there - own).max() < 1e-4 * np.abs(own).max()
 

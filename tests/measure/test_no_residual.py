@@ -4,9 +4,9 @@ import json
 
 import numpy as np
 import pytest
-from planted_run import GHOSTS, views
+from planted_run import SMALL as SIZE
+from planted_run import SMALL_ANGLES, SMALL_GHOSTS, views, write_small
 from test_compact import model_of
-from test_stages import ANGLES, write
 
 from flarewright.cli.app import run as command
 from flarewright.io.exr import read_exr
@@ -14,21 +14,23 @@ from flarewright.io.ghost_model_file import read_ghost_model, write_ghost_model
 from flarewright.measure.fit import render
 from flarewright.measure.journal import Journal
 
-PLANTED = GHOSTS[:2]
-# bytes: some 4 kB a ghost, and what is left of six small pictures of nothing but noise
+PLANTED = SMALL_GHOSTS[:1]
+# bytes: some 4 kB a ghost, and what is left of five small pictures of nothing but noise
 SMALL, LARGE = 12_000, 30_000
+
+pytestmark = pytest.mark.usefixtures("no_lunes")
 
 
 @pytest.fixture
 def folder(tmp_path):
-    write(tmp_path, PLANTED)
-    write_ghost_model(tmp_path / "found.json", model_of(PLANTED, "ab"))
+    write_small(tmp_path, PLANTED)
+    write_ghost_model(tmp_path / "found.json", model_of(PLANTED, "a", SIZE))
     return tmp_path
 
 
 def test_the_file_is_small_and_every_command_takes_it(folder, capsys, monkeypatch):
     def made(*words):
-        assert command([*words, "--every", "2", "--json"]) == 0
+        assert command([*words, "--json"]) == 0
         facts = json.loads(capsys.readouterr().out)
         return [facts[stage]["kept"] for stage in ("fit", "track", "compress") if stage in facts]
 
@@ -42,19 +44,19 @@ def test_the_file_is_small_and_every_command_takes_it(folder, capsys, monkeypatc
     assert size("compact.json") < SMALL
     small = {name: (folder / name).read_bytes() for name in ("model.json", "compact.json")}
     # it draws the ghosts that were planted, and nothing that it calls residual
-    angle, out = float(ANGLES[5]), folder / "o.exr"
+    angle, out = float(SMALL_ANGLES[2]), folder / "o.exr"
     model = str(folder / "compact.json")
     assert command(["measure", "replay", model, "--constellation", repr(angle), "-o", str(out)]) == 0
     layers = {layer.name: layer.pixels for layer in read_exr(out).layers}
     assert "residual" not in layers
-    view = views((), angles=[angle])[0]
+    view = views((), angles=[angle], size=SIZE)[0]
     truth = sum(render(ghost, view) for ghost in PLANTED)
     assert np.sqrt(((layers["beauty"][..., 1] - truth) ** 2).mean()) < 0.02 * np.sqrt((truth**2).mean())
     assert command(["measure", "report", str(folder)]) == 0
     page = (folder / "report.html").read_text()
     assert all(f"<h2>{title}</h2>" in page for title in ("Replay", "Ghosts", "Tracks"))
     capsys.readouterr()
-    assert command(["predict", model, "--samples", "12", "--json"]) == 0
+    assert command(["predict", model, "--samples", "5", "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
     assert max(told["statistics"]["mean"]["values"]) > 0.0
     # asked for, what is left is learned for what is kept, and dropped again
@@ -70,10 +72,10 @@ def test_the_file_is_small_and_every_command_takes_it(folder, capsys, monkeypatc
             return real(self, make)
 
         patch.setattr(Journal, "step", stopping)
-        assert command(["measure", "compress", str(folder), "--every", "2"]) == 130
+        assert command(["measure", "compress", str(folder)]) == 130
     capsys.readouterr()
     assert (folder / "compress-residual.journal").read_text().count("\n") == 3
-    assert command(["measure", "compress", str(folder), "--every", "2"]) == 0
+    assert command(["measure", "compress", str(folder)]) == 0
     assert capsys.readouterr().out.endswith(", ghosts as before\n")
     assert made("measure", "compress", str(folder)) == [True]
     assert not (folder / "compress-residual.journal").exists()

@@ -205,7 +205,7 @@ def test_what_stands_in_front_hides_the_light_where_its_image_is(project, tmp_pa
     matte[row - 6 : row + 6, column - 6 : column + 6] = shade
     Image.fromarray(matte).save(tmp_path / "matte.png")
     hidden = render_measured(project.replace(holdout=Holdout(image=str(tmp_path / "matte.png"))))
-    assert hidden.layers[0].pixels == pytest.approx(part * told.layers[0].pixels, rel=1e-5)
+    np.testing.assert_allclose(hidden.layers[0].pixels, part * told.layers[0].pixels, rtol=1e-5, atol=1e-12)
     assert any("hides every light" in remark for remark in hidden.remarks) == (part == 0.0)
 
 

@@ -1,22 +1,20 @@
 """What must not change a model: constellations left out, ghosts' order, where a fit begins, how the camera is held."""
 
+from typing import NamedTuple
+
 import numpy as np
 import pytest
-from planted_run import GHOSTS, LARGEST, SIZE, shape, views
+from planted_run import FOCAL, GHOSTS, LARGEST, SIZE, shape, views, write
 
-from flarewright.io.merged import read_run, write_frame, write_run
+from flarewright.io.merged import read_run
 from flarewright.measure.fit import render
 from flarewright.measure.found import Found
 from flarewright.measure.replay import replay
 from flarewright.measure.settle import to_model
 from flarewright.measure.stages import find_ghosts, fit_ghosts
-from flarewright.model.capture import FrameInfo, MergedFrame, MergedRun
 from flarewright.model.ghost_model import AberrationGhost, GhostModel
 
 ANGLES = np.linspace(2.0, LARGEST, 12)
-FOCAL = 900.0
-# they stay in the picture also where it is lower than wide
-PLANTED = (GHOSTS[1], GHOSTS[2])
 # some over others: 62 over 55, 105 over 90, -100 over -110 and -75, and that over -40
 CROWD = (
     *GHOSTS,
@@ -31,30 +29,59 @@ LOOKED_AT = (4.0, 11.0, 20.0)
 BEGUN_ELSEWHERE = 0.015
 
 
-def write(folder, planted=PLANTED, *, roll_deg=0.0, seed=0) -> MergedRun:
-    """Write a merged run of planted ghosts, the camera turned about its axis."""
-    (folder / "frames").mkdir(parents=True)
-    infos = []
-    for k, view in enumerate(views(planted, angles=ANGLES, roll_deg=roll_deg, seed=seed)):
-        x, y, cosine, sine, _ = (float(each) for each in view.frame)
-        along = FOCAL * float(np.tan(np.radians(ANGLES[k])))
-        info = FrameInfo(
-            file=f"frames/{k:03d}.exr", constellation_deg=float(ANGLES[k]), nominal_deg=float(ANGLES[k]),
-            roll_deg=roll_deg, nominal_roll_deg=roll_deg, light_px=(x + along * cosine, y - along * sine),
-            axis_px=(x, y),
-        )  # fmt: skip
-        write_frame(folder, MergedFrame(info, view.pixels, view.variance))
-        infos.append(info)
-    run = MergedRun(size_px=SIZE, frames=tuple(infos), axis_px=(x, y), px_per_rad=FOCAL)
-    write_run(folder, run)
-    return run
+class Planted(NamedTuple):
+    """A merged run of two ghosts that stay in the picture, some of its constellations, and ghosts to find at most."""
+
+    size: tuple[int, int]
+    angles: np.ndarray
+    every: int
+    most: int
+
+    def write(self, folder, **told):
+        return write(folder, PLANTED, angles=self.angles, size=self.size, **told)
+
+    def fitted(self, folder, run):
+        """Return the ghosts as found and as fitted, without what is left beside them."""
+        rough = find_ghosts(folder, run, every=self.every, most=self.most)
+        assert len(rough.ghosts) == 2
+        return rough, fit_ghosts(folder, run, rough, every=self.every, rest=False)
 
 
-def test_what_is_left_out_is_not_read(tmp_path):
+# in the large pictures they stay also where these are lower than wide
+PLANTED = GHOSTS[1:3]
+SMALL_RUN = Planted((160, 106), np.linspace(2.0, LARGEST, 9), every=2, most=2)
+LARGE_RUN = Planted(SIZE, ANGLES, every=1, most=60)
+BOTH = [pytest.param(SMALL_RUN, id="small"), pytest.param(LARGE_RUN, marks=pytest.mark.slow, id="large")]
+
+
+@pytest.fixture(scope="module")
+def fitted(request, tmp_path_factory):
+    """Return what was planted, the folder of its run, the run, and the ghosts found and fitted.
+
+    The folder has no frames of the constellations that are left out.
+    """
+    folder = tmp_path_factory.mktemp("run")
+    run = request.param.write(folder)
+    for k, frame in enumerate(run.frames):
+        if k % request.param.every:
+            (folder / frame.file).unlink()
+    return request.param, folder, run, *request.param.fitted(folder, run)
+
+
+@pytest.mark.parametrize("fitted", BOTH[:1], indirect=True)
+def test_what_is_left_out_is_not_read(fitted):
+    """Nothing was there to be read."""
+    planted, folder, run, _, model = fitted
+    assert [(folder / frame.file).exists() for frame in run.frames] == [k % 2 == 0 for k in range(planted.angles.size)]
+    assert len(model.ghosts) == 2
+
+
+@pytest.mark.slow
+def test_what_is_left_out_changes_nothing(tmp_path):
     whole, half = tmp_path / "whole", tmp_path / "half"
     models = []
     for folder in (whole, half):
-        run = write(folder)
+        run = LARGE_RUN.write(folder)
         if folder is half:
             for frame in run.frames[1::2]:
                 (folder / frame.file).unlink()
@@ -64,12 +91,13 @@ def test_what_is_left_out_is_not_read(tmp_path):
     assert models[0].model_dump_json() == models[1].model_dump_json()
 
 
-def test_ghosts_in_another_order_give_the_same_replay(tmp_path):
-    run = write(tmp_path)
-    rough = find_ghosts(tmp_path, run)
-    assert len(rough.ghosts) == 2
-    one = fit_ghosts(tmp_path, run, rough)
-    other = fit_ghosts(tmp_path, run, rough.replace(ghosts=rough.ghosts[::-1]))
+@pytest.mark.parametrize("fitted", BOTH, indirect=True)
+def test_ghosts_in_another_order_give_the_same_replay(fitted):
+    planted, folder, run, rough, one = fitted
+    # without what is left beside the ghosts, which would make up for any difference
+    other = fit_ghosts(folder, run, rough.replace(ghosts=rough.ghosts[::-1]), every=planted.every, rest=False)
+    # the brightest comes first whatever was told, so nothing is summed in another order
+    assert other.model_dump_json() == one.model_dump_json()
     for angle in LOOKED_AT:
         first, second = (replay(model, angle)[0].pixels for model in (one, other))
         assert np.sqrt(((first - second) ** 2).mean()) < 1e-3 * np.sqrt((first**2).mean())
@@ -91,7 +119,7 @@ def disturbed(ghost: AberrationGhost, rng: np.random.Generator) -> AberrationGho
 @pytest.mark.slow
 def test_a_crowd_in_another_order_or_begun_elsewhere_gives_the_same_replay(tmp_path):
     """Nine ghosts, some over others: order changes nothing, and where they begin as little as noise."""
-    run = write(tmp_path, CROWD)
+    run = write(tmp_path, CROWD, angles=ANGLES)
     planted = to_model([Found((one,) * 3, 0, ANGLES.size - 1) for one in CROWD], views((), angles=ANGLES))
     rough = GhostModel(
         size_px=SIZE, axis_px=run.axis_px, focal_px=FOCAL, largest_deg=LARGEST,
@@ -124,14 +152,19 @@ def test_a_crowd_in_another_order_or_begun_elsewhere_gives_the_same_replay(tmp_p
     assert apart(one, other) < BEGUN_ELSEWHERE
 
 
-@pytest.mark.parametrize("roll_deg", [90.0, 205.0])
-def test_a_camera_that_is_rolled_measures_the_same_ghosts(tmp_path, roll_deg):
-    models = []
-    for k, roll in enumerate((0.0, roll_deg)):
-        folder = tmp_path / f"{k}"
-        run = write(folder, roll_deg=roll, seed=k)
-        assert read_run(folder) == run
-        models.append(fit_ghosts(folder, run, find_ghosts(folder, run)))
+@pytest.mark.parametrize(
+    ("fitted", "roll_deg"),
+    [
+        pytest.param(SMALL_RUN, 205.0, id="small"),
+        *(pytest.param(LARGE_RUN, roll, marks=pytest.mark.slow) for roll in (90.0, 205.0)),
+    ],
+    indirect=["fitted"],
+)
+def test_a_camera_that_is_rolled_measures_the_same_ghosts(fitted, tmp_path, roll_deg):
+    planted, *_, straight = fitted
+    run = planted.write(tmp_path, roll_deg=roll_deg, seed=1)
+    assert read_run(tmp_path) == run
+    models = straight, planted.fitted(tmp_path, run)[1]
     level, rolled = ([each.green for each in model.ghosts] for model in models)
     assert len(level) == len(rolled) == 2
     for one, other in zip(level, rolled, strict=True):

@@ -4,12 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from planted_run import GHOSTS, NOISE, SIZE, shape, views
+from planted_run import GHOSTS, LARGEST, NOISE, SIZE, shape, views
 
 from flarewright.measure.pursuit import SCORE, pursue
 from flarewright.measure.specks import specks
 
 SPECK = shape(70.0, 1.1, 6.0, bend=-5.0)
+FEW = np.linspace(1.0, LARGEST, 10)
 
 
 def everywhere(shown):
@@ -34,14 +35,14 @@ def test_neither_rims_nor_noise_are_specks(ghosts):
 
 
 def test_where_nothing_was_measured_there_is_none():
-    shown = views((SPECK,))
+    shown = views((SPECK,), angles=FEW[:3])
     hidden = [np.zeros(view.pixels.shape[:2], bool) for view in shown]
     assert specks(shown, [view.pixels[..., 1] for view in shown], hidden) == []
 
 
-def test_a_speck_is_fitted_as_it_is():
-    shown = views((*GHOSTS, SPECK))
-    found = pursue(shown, everywhere(shown), most=8)
+def test_a_speck_is_fitted_as_it_is(no_lunes):
+    shown = views((*GHOSTS[1:3], SPECK), angles=FEW)
+    found = pursue(shown, everywhere(shown), most=3)
     best = min(found, key=lambda ghost: abs(ghost.shapes[1].numbers[0] - 70.0))
     numbers = best.shapes[1].numbers
     assert numbers[0] == pytest.approx(70.0, abs=0.3)
@@ -50,11 +51,11 @@ def test_a_speck_is_fitted_as_it_is():
     assert (best.first, best.last) == (0, len(shown) - 1)
 
 
-def test_a_speck_is_fitted_amid_what_nobody_explains():
+def test_a_speck_is_fitted_amid_what_nobody_explains(no_lunes):
     """All around it lies more than it has; a fit that looked there ran off to that, or explained too little of it."""
     y, x = np.mgrid[: SIZE[1], : SIZE[0]]
     unknown = (20.0 * NOISE * np.sin(x / 5.0) * np.cos(y / 4.0))[..., None]
-    planted = views((shape(70.0, 1.1, 1.0, bend=-5.0),))
+    planted = views((shape(70.0, 1.1, 1.0, bend=-5.0),), angles=FEW)
     shown = [replace(view, pixels=(view.pixels + unknown).astype(np.float32)) for view in planted]
     numbers = pursue(shown, everywhere(shown), most=1)[0].shapes[1].numbers
     assert numbers[0] == pytest.approx(70.0, abs=0.5)

@@ -24,7 +24,7 @@ from flarewright.measure.views import View
 from flarewright.model.ghost_model import GhostModel
 from flarewright.model.sprite import Sprite, packed
 
-ANGLES = np.linspace(1.0, LARGEST, 15)
+ANGLES = np.linspace(1.0, LARGEST, 10)
 
 
 def sprite(pictures, **changes):

@@ -2,30 +2,33 @@
 
 import json
 import os
+from shutil import copytree
 
 import pytest
-from planted_run import GHOSTS, SIZE
-from test_stages import FOCAL, write
+from planted_run import FOCAL, SMALL, write_small
 
 from flarewright.cli.app import run as command
 from flarewright.cli.measure_stages import STAGES, run_stages
 from flarewright.errors import OutputError
 from flarewright.io.ghost_model_file import read_ghost_model, write_ghost_model
 from flarewright.io.merged import read_run, write_run
-from flarewright.measure import stages
+from flarewright.measure import rest_fit, stages
 from flarewright.measure.notes import note
 from flarewright.model.capture import CameraNoise
 from flarewright.model.ghost_model import GhostModel
 
+pytestmark = pytest.mark.usefixtures("no_lunes")
+
 
 def test_only_what_has_changed_is_done_again(tmp_path, capsys, monkeypatch):
-    write(tmp_path, ())
+    write_small(tmp_path, ())
     done: list[str] = []
     model = GhostModel(
-        size_px=SIZE, axis_px=(9.0, 9.0), focal_px=FOCAL, largest_deg=20.0, constellation_deg=(0.0, 20.0)
+        size_px=SMALL, axis_px=(9.0, 9.0), focal_px=FOCAL, largest_deg=20.0, constellation_deg=(0.0, 20.0)
     )
     for stage in ("find", "fit"):
         monkeypatch.setattr(stages, f"{stage}_ghosts", lambda *_, stage=stage, **__: done.append(stage) or model)
+    monkeypatch.setattr(rest_fit, "with_rest", lambda model, *_: model)
 
     def kept(*arguments: str) -> dict[str, bool]:
         facts = {}
@@ -68,36 +71,35 @@ def test_only_what_has_changed_is_done_again(tmp_path, capsys, monkeypatch):
     assert kept() == fresh
 
 
-def test_a_light_that_is_told_later_is_written_into_what_was_made(tmp_path):
-    write(tmp_path, GHOSTS[1:2])
-    run_stages(tmp_path, STAGES, 2, None, None, False)
-    dark = {name: read_ghost_model(tmp_path / name) for name in ("found.json", "model.json", "compact.json")}
-    run = read_run(tmp_path)
-    write_run(tmp_path, run.replace(camera=CameraNoise(luminance_cd_m2=2e6, solid_angle_sr=1e-5)))
-    facts = run_stages(tmp_path, STAGES, 2, None, None, False)
+def test_a_light_that_is_told_later_is_written_into_what_was_made(staged, tmp_path):
+    folder = copytree(staged.folder, tmp_path / "run")
+    dark = {name: read_ghost_model(folder / name) for name in ("found.json", "model.json", "compact.json")}
+    run = read_run(folder)
+    write_run(folder, run.replace(camera=CameraNoise(luminance_cd_m2=2e6, solid_angle_sr=1e-5)))
+    facts = run_stages(folder, STAGES, 1, None, None, False)
     assert [facts[stage]["kept"] for stage in STAGES] == [True] * 4
     for name, before in dark.items():
-        now = read_ghost_model(tmp_path / name)
+        now = read_ghost_model(folder / name)
         assert (now.reference.luminance_cd_m2, now.reference.solid_angle_sr) == (2e6, 1e-5)
         assert now.replace(reference=before.reference) == before
     # what a person has written into a model stays where the run does not tell it
-    write_run(tmp_path, run)
-    run_stages(tmp_path, STAGES, 2, None, None, False)
-    assert read_ghost_model(tmp_path / "compact.json").reference.luminance_cd_m2 == 2e6
+    write_run(folder, run)
+    run_stages(folder, STAGES, 1, None, None, False)
+    assert read_ghost_model(folder / "compact.json").reference.luminance_cd_m2 == 2e6
 
 
-def test_what_is_left_beside_ghosts_is_learned_once(tmp_path):
+def test_what_is_left_beside_ghosts_is_learned_once(staged, tmp_path):
     """A fit on the way to the small model leaves it out; asked for by itself it has it, and no later stage is stale."""
-    write(tmp_path, GHOSTS[1:2])
+    folder, first = copytree(staged.folder, tmp_path / "run"), staged.facts
 
     def kept(*some: str) -> list[bool]:
-        facts = run_stages(tmp_path, some, 2, None, None, False)
+        facts = run_stages(folder, some, 1, None, None, False)
         return [facts[stage]["kept"] for stage in some]
 
     def whole() -> list[bool]:
-        return [bool(read_ghost_model(tmp_path / f"{name}.json").sprites) for name in ("model", "compact")]
+        return [bool(read_ghost_model(folder / f"{name}.json").sprites) for name in ("model", "compact")]
 
-    assert kept(*STAGES) == [False] * 4
+    assert [first[stage]["kept"] for stage in STAGES] == [False] * 4
     assert whole() == [False, True]
     assert kept("fit") == [True]
     assert whole() == [True, True]
@@ -106,11 +108,11 @@ def test_what_is_left_beside_ghosts_is_learned_once(tmp_path):
 
 
 def test_corrections_hold_until_others_are_given(tmp_path, capsys, monkeypatch):
-    write(tmp_path, ())
+    write_small(tmp_path, ())
     (tmp_path / "captures.csv").write_text("")
     told = []
     model = GhostModel(
-        size_px=SIZE, axis_px=(9.0, 9.0), focal_px=FOCAL, largest_deg=20.0, constellation_deg=(0.0, 20.0)
+        size_px=SMALL, axis_px=(9.0, 9.0), focal_px=FOCAL, largest_deg=20.0, constellation_deg=(0.0, 20.0)
     )
     monkeypatch.setattr(stages, "find_ghosts", lambda *_, **given: told.append(given) or model)
     run = ["measure", "run", str(tmp_path / "captures.csv"), "-o", str(tmp_path), "--stages", "find", "--json"]

@@ -2,30 +2,42 @@
 
 import json
 
+import numpy as np
 import pytest
-from planted_run import GHOSTS
+from planted_run import LARGEST, SMALL, SMALL_GHOSTS, write_small
 from test_compact import model_of
-from test_stages import write
 
 from flarewright.cli.app import run as command
+from flarewright.cli.measure_report import _of_another_model
 from flarewright.io.ghost_model_file import read_ghost_model, read_tracks, write_ghost_model
 from flarewright.measure.compact import numbers_in
 from flarewright.model.ghost_model import BezierGhost
 
+pytestmark = pytest.mark.usefixtures("no_lunes")
+
+
+# three of them are a third
+ANGLES = np.linspace(2.0, LARGEST, 9)
+
+
+def written(folder, count, names):
+    write_small(folder, SMALL_GHOSTS[:count], angles=ANGLES)
+    write_ghost_model(folder / "model.json", model_of(SMALL_GHOSTS[:count], names, SMALL))
+    return folder
+
 
 @pytest.fixture
 def folder(tmp_path):
-    write(tmp_path, GHOSTS[:2])
-    write_ghost_model(tmp_path / "model.json", model_of(GHOSTS[:2], "ab"))
-    return tmp_path
+    return written(tmp_path, 2, "ab")
 
 
 def test_track_and_compress_write_small_files_and_keep_them(folder, capsys):
-    for stage, file, kept in (("track", "tracks.json", False), ("compress", "compact.json", False)):
-        assert command(["measure", stage, str(folder), "--every", "2", "--json"]) == 0
+    stages = ["track"], ["compress", "--no-residual"]
+    for (stage, *more), file in zip(stages, ("tracks.json", "compact.json"), strict=True):
+        assert command(["measure", stage, str(folder), "--every", "2", *more, "--json"]) == 0
         told = json.loads(capsys.readouterr().out)[stage]
         assert told["ghosts"] == 2
-        assert told["kept"] is kept
+        assert told["kept"] is False
         assert told["file"].endswith(file)
     tracks = read_tracks(folder / "tracks.json")
     assert [len(one.lives) for one in tracks.ghosts] == [1, 1]
@@ -33,8 +45,8 @@ def test_track_and_compress_write_small_files_and_keep_them(folder, capsys):
     assert small.schema_version == 1
     assert all(any(one.green.uncertainty) for one in small.ghosts)
     assert numbers_in(small) <= numbers_in(read_ghost_model(folder / "model.json")) + 3
-    for stage in ("track", "compress"):
-        assert command(["measure", stage, str(folder), "--every", "2"]) == 0
+    for stage, *more in stages:
+        assert command(["measure", stage, str(folder), "--every", "2", *more]) == 0
         assert "as before" in capsys.readouterr().out
     assert command(["measure", "report", str(folder)]) == 0
     page = (folder / "report.html").read_text()
@@ -47,13 +59,12 @@ def test_track_and_compress_write_small_files_and_keep_them(folder, capsys):
 
 
 def test_one_ghost_is_told_as_one(tmp_path, capsys):
-    write(tmp_path, GHOSTS[:1])
-    write_ghost_model(tmp_path / "model.json", model_of(GHOSTS[:1], "a"))
+    written(tmp_path, 1, "a")
     assert command(["measure", "track", str(tmp_path), "--every", "2"]) == 0
     assert "tracks.json: 1 ghost, 1 life\n" in capsys.readouterr().out
     assert command(["measure", "report", str(tmp_path)]) == 0
-    assert "report.html: 12 frames, 1 ghost\n" in capsys.readouterr().out
-    assert "12 frames of 240 x 160 pixels, the light seen in 12; 1 ghost" in (tmp_path / "report.html").read_text()
+    assert "report.html: 9 frames, 1 ghost\n" in capsys.readouterr().out
+    assert "9 frames of 120 x 80 pixels, the light seen in 9; 1 ghost" in (tmp_path / "report.html").read_text()
     assert "degrees, 1 ghost in the picture" in (tmp_path / "report.html").read_text()
 
 
@@ -77,7 +88,7 @@ def test_mistakes_are_told_in_a_sentence(folder, tmp_path_factory, capsys):
     (folder / "tracks.json").write_text("{")
     assert "is not valid JSON" in told(capsys, "measure", "compress", folder)
     write_ghost_model(folder / "model.json", model.replace(size_px=(99, 98)))
-    assert "fitted to pictures of 99x98 pixels and the frames have 240x160" in told(capsys, "measure", "track", folder)
+    assert "fitted to pictures of 99x98 pixels and the frames have 120x80" in told(capsys, "measure", "track", folder)
     bezier = BezierGhost(name="z", numbers=((1.0,),) * 19, visible_deg=(0.0, 9.0))
     write_ghost_model(folder / "model.json", model.replace(ghosts=(bezier,)))
     assert "a Bezier ghost has its numbers over the constellation already" in told(capsys, "measure", "track", folder)
@@ -96,7 +107,8 @@ def test_a_file_of_another_version_is_told(folder, capsys):
 
 def test_what_is_of_an_earlier_model_is_neither_compressed_nor_reported(folder, capsys):
     for stage in ("track", "compress"):
-        assert command(["measure", stage, str(folder), "--every", "3"]) == 0
+        more = ["--no-residual"] if stage == "compress" else []
+        assert command(["measure", stage, str(folder), "--every", "3", *more]) == 0
     # another model whose ghosts have the same names
     model = read_ghost_model(folder / "model.json")
     swapped = [ghost.replace(name={"a": "b", "b": "a"}[ghost.name]) for ghost in model.ghosts]
@@ -110,8 +122,9 @@ def test_what_is_of_an_earlier_model_is_neither_compressed_nor_reported(folder, 
         assert command(["measure", "report", str(folder), "--json", *more]) == 0
         return json.loads(capsys.readouterr().out)["remarks"]
 
+    all_of_them = remarks()
     for name in ("compact.json", "tracks.json"):
-        assert any(f"{name} was made from another model.json and is left out" in remark for remark in remarks())
+        assert any(f"{name} was made from another model.json and is left out" in remark for remark in all_of_them)
     assert "<h2>Tracks</h2>" not in (folder / "report.html").read_text()
     # who chooses it knows
     assert remarks("--model", str(folder / "compact.json")) == []
@@ -124,7 +137,7 @@ def test_what_is_of_an_earlier_model_is_neither_compressed_nor_reported(folder, 
     assert command(["measure", "track", str(folder), "--every", "2"]) == 0
     assert command(["measure", "fit", str(folder), "--every", "3"]) == 0
     assert read_ghost_model(folder / "model.json").sprites
-    capsys.readouterr()
-    assert remarks() == []
+    assert _of_another_model(folder) == ([], [])
     write_ghost_model(folder / "found.json", read_ghost_model(folder / "found.json").replace(remarks=("by hand",)))
-    assert remarks() == [f"{folder / 'model.json'} was made from another found.json; flarewright measure fit renews it"]
+    told_of = [f"{folder / 'model.json'} was made from another found.json; flarewright measure fit renews it"]
+    assert _of_another_model(folder) == ([], told_of)

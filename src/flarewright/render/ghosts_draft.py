@@ -53,10 +53,11 @@ def draw_draft(
         return
     packed, opening = shot.packed, shot.opening
     steps, view, axes = _steps(shot, paths)
+    # each other layout in memory would be another kernel to compile
+    colors = np.ascontiguousarray(draft_colors(shot, paths) if colors is None else colors)
     draw_matrix_ghosts(
         *steps, packed.n_gap, packed.reflectance, packed.sensor_z, *view, opening.edges, opening.radius,
-        opening.levels, axes, shot.to_pixels - [0.0, first_row, 0.0, 0.0], shot.gain,
-        draft_colors(shot, paths) if colors is None else colors, differences,
+        opening.levels, axes, shot.to_pixels - [0.0, first_row, 0.0, 0.0], shot.gain, colors, differences,
     )  # fmt: skip
 
 

@@ -346,7 +346,7 @@ def _drawn_in_few(
         draw_bundle(
             data, whole.pupil, whole.triangles, node_densities(data, whole.pupil, whole.triangles),
             path.stop_crossings, opening.blades, opening.levels, shot.incidence.axes, to_pixels, shot.gain,
-            rgb, plane, whole.halves,
+            np.ascontiguousarray(rgb), plane, whole.halves,
         )  # fmt: skip
     return True
 
