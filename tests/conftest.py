@@ -17,6 +17,8 @@ sys.path[:0] = [str(HERE / part) for part in ("physics", "design", "measure", "p
 _sources = sorted((HERE.parent / "src" / "flarewright" / "kernels").rglob("*.py"))
 _digest = hashlib.sha256(b"".join(path.read_bytes() for path in _sources)).hexdigest()[:16]
 os.environ.setdefault("NUMBA_CACHE_DIR", str(Path(tempfile.gettempdir()) / f"flarewright-kernels-{_digest}"))
+# as for the command line: the program's own threads share the work, and others beside them would spin
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 # what a command lacks is compiled by the test's process, once for all; tests/contracts has helpers (docs/adr/0007)
 os.environ.setdefault("FLAREWRIGHT_HELPER", "1")
 

@@ -145,6 +145,8 @@ class Copy:
     def __init__(self, root: Path, folder: Path) -> None:
         self.tree = folder / "checkout"
         self.cache = folder / "kernels"
+        # tests that fail without any fault, and prove nothing
+        self.broken: list[str] = []
         listed = ["git", "-C", str(root), "ls-files", "-co", "--exclude-standard", "-z"]
         for name in filter(None, subprocess.check_output(listed).decode().split("\0")):
             if (root / name).is_file():
@@ -180,6 +182,7 @@ class Copy:
         results = self.tree.parent / "pytest-cache"
         shutil.rmtree(results, ignore_errors=True)
         command = [sys.executable, "-m", "pytest", "--tb=no", "-o", f"cache_dir={results}", *words]
+        command += [word for test in self.broken for word in ("--deselect", test)]
         with self.seeded(faults) as cache:
             environment = {**os.environ, "PYTHONPATH": str(self.tree / "src"), "NUMBA_CACHE_DIR": str(cache)}
             environment.pop("FLAREWRIGHT_CORPUS", None)
@@ -225,28 +228,15 @@ def by_named_tests(faults: Sequence[Fault], copies: Sequence[Copy], keep: Keep) 
 
 
 def by_whole_suite(faults: Sequence[Fault], copy: Copy, keep: Keep) -> None:
-    """Run all fast tests with many faults at once, and find out for each test that fails which fault it catches.
-
-    That is repeated without the faults that were caught until every test passes: no test catches what then remains.
-    """
-    remaining = list(faults)
-    while remaining:
+    """Run all fast tests with many faults at once, then those that fail with each fault alone."""
+    failed = copy.failing(faults, [], SUITE_TIMEOUT_S)
+    print(f"all fast tests with {len(faults)} faults at once: {len(failed)} fail", flush=True)
+    for fault in faults if failed else ():
         started = time.perf_counter()
-        failed = copy.failing(remaining, [], SUITE_TIMEOUT_S)
-        print(f"all fast tests with {len(remaining)} faults at once: {len(failed)} fail", flush=True)
-        if not failed:
-            break
-        caught = {}
-        for fault in remaining:
-            alone = copy.failing([fault], ["-n", "0", "-x", *failed], TIMEOUT_S)
-            if alone:
-                caught[fault.id] = Verdict(True, alone[0], round(time.perf_counter() - started, 1))
-                print(f"  {fault.id}: caught by {alone[0]}", flush=True)
-        keep(caught)
-        if not caught:
-            print(f"  no single fault makes these fail: {failed[:5]}", flush=True)
-            break
-        remaining = [fault for fault in remaining if fault.id not in caught]
+        alone = copy.failing([fault], ["-n", "0", "-x", *failed], TIMEOUT_S)
+        if alone:
+            keep({fault.id: Verdict(True, alone[0], round(time.perf_counter() - started, 1))})
+            print(f"  {fault.id}: caught by {alone[0]}", flush=True)
 
 
 def run(asked: argparse.Namespace) -> int:
@@ -266,6 +256,11 @@ def run(asked: argparse.Namespace) -> int:
 
     with tempfile.TemporaryDirectory(prefix="seeded-faults-") as folder:
         copies = [Copy(asked.checkout, Path(folder) / str(number)) for number in range(asked.jobs)]
+        broken = copies[0].failing([], [], SUITE_TIMEOUT_S)
+        if broken:
+            print(f"left out, for they fail without any fault: {', '.join(broken)}", flush=True)
+        for copy in copies:
+            copy.broken = broken
         by_named_tests([fault for fault in faults if fault.id not in verdicts], copies, keep)
         if not asked.named_only:
             by_whole_suite([fault for fault in faults if not verdicts[fault.id].caught], copies[0], keep)

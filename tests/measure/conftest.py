@@ -1,17 +1,10 @@
 """One run of the synthetic camera, merged once for all tests of this folder."""
 
 import json
-import os
-import sys
 from collections.abc import Iterator
-from functools import cache
-
-import pytest
-
-# as for the command line: the program's own threads share the work, and others beside them would spin
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
+import pytest
 from measured_run import SETUP, Measured, Staged
 from planted_run import LARGEST, write_small
 from synthetic_camera import make
@@ -61,22 +54,4 @@ def no_lunes() -> Iterator[None]:
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(pursuit, "_lunes", lambda *_: [])
-        yield
-
-
-@cache
-def built(app):
-    return built.as_ever(app)
-
-
-@pytest.fixture(autouse=True, scope="module")
-def _commands_built_once() -> Iterator[None]:
-    """Build the command line once: Typer builds all commands again at every call, which takes longer than most."""
-    typer = sys.modules.get("typer.main")
-    if typer is None:
-        yield
-        return
-    with pytest.MonkeyPatch.context() as patch:
-        built.as_ever = typer.get_command
-        patch.setattr(typer, "get_command", built)
         yield
