@@ -185,6 +185,8 @@ class Copy:
         command += [word for test in self.broken for word in ("--deselect", test)]
         with self.seeded(faults) as cache:
             environment = {**os.environ, "PYTHONPATH": str(self.tree / "src"), "NUMBA_CACHE_DIR": str(cache)}
+            # without bytecode each process would compile all sources again
+            environment.pop("PYTHONDONTWRITEBYTECODE", None)
             environment.pop("FLAREWRIGHT_CORPUS", None)
             try:
                 ended = subprocess.run(

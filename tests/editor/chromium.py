@@ -61,12 +61,16 @@ class Editor:
             self.process.stderr.close()
 
 
+# a hang is not a slow machine: the first page waits for kernels to be compiled
+PATIENCE_MS = 180_000
+
+
 @contextmanager
 def browser():
     from playwright.sync_api import sync_playwright
 
     with sync_playwright() as play:
-        found = play.chromium.launch(executable_path=chromium(), args=FLAGS)
+        found = play.chromium.launch(executable_path=chromium(), args=FLAGS, timeout=PATIENCE_MS)
         yield found
         found.close()
 
@@ -76,6 +80,7 @@ class Tab:
 
     def __init__(self, page, editor):
         self.page, self.editor = page, editor
+        page.set_default_timeout(PATIENCE_MS)
         self.said, self.asked = [], []
         page.on("console", lambda message: message.type == "error" and self.said.append(message.text))
         page.on("pageerror", lambda error: self.said.append(str(error)))
@@ -89,7 +94,7 @@ class Tab:
     def js(self, expression):
         return self.page.evaluate(expression)
 
-    def until(self, expression, timeout_s=60.0):
+    def until(self, expression, timeout_s=PATIENCE_MS / 1000.0):
         self.page.wait_for_function(expression, timeout=1000.0 * timeout_s)
 
     def rest(self):
@@ -151,7 +156,7 @@ class Tab:
 def download(tab, entry, path):
     """Export as a person would."""
     tab.page.click("#export")
-    with tab.page.expect_download(timeout=60000) as waiting:
+    with tab.page.expect_download(timeout=PATIENCE_MS) as waiting:
         tab.page.click(f"[role=menuitem]:has-text('{entry}')")
     waiting.value.save_as(path)
     return path

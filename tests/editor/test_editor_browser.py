@@ -455,7 +455,7 @@ def test_annotate_solve_accept(tab, tmp_path):
     tab.page.press("input[name=seconds]", "Enter")
     tab.page.click("#solve")
     tab.until("flarewright.state.solve.running")
-    tab.until("!flarewright.state.solve.running", 120.0)
+    tab.until("!flarewright.state.solve.running")
     count = len(tab.state()["solve"]["found"])
     assert 1 <= count <= 5
     assert tab.page.locator(".candidates img").count() == count

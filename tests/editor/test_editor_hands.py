@@ -65,12 +65,12 @@ def test_undo_takes_back_what_was_asked_for_last(tab):
         tab.page.wait_for_timeout(30)
     tab.page.keyboard.up("ArrowRight")
     tab.page.keyboard.press("Control+z")
-    tab.until("flarewright.state.redo === 'Move the light' && !flarewright.under.way", 20.0)
+    tab.until("flarewright.state.redo === 'Move the light' && !flarewright.under.way")
     tab.rest()
     assert tab.state()["lights"][0]["field_deg"] == before
     assert tab.state()["undo"] == ""
     tab.page.keyboard.press("Control+Shift+z")
-    tab.until("flarewright.state.undo === 'Move the light'", 20.0)
+    tab.until("flarewright.state.undo === 'Move the light'")
     # nor is any of them lost
     assert tab.state()["lights"][0]["field_deg"][0] == pytest.approx(before[0] + 2.0)
 
