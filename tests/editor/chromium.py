@@ -28,6 +28,8 @@ class Editor:
     def start(self):
         # the tests' own kernels: they are compiled already
         environment = {**os.environ, "FLAREWRIGHT_STATE": str(self.state), "PYTHONUNBUFFERED": "1"}
+        # the editor compiles with helpers, as a user's does (tests/conftest.py has none)
+        environment.pop("FLAREWRIGHT_HELPER", None)
         if "site-packages" not in str(__import__("flarewright").__file__):
             environment["PYTHONPATH"] = os.pathsep.join([str(SRC), environment.get("PYTHONPATH", "")]).rstrip(
                 os.pathsep
