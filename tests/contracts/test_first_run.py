@@ -641,46 +641,8 @@ def test_a_linked_kernel_says_what_numba_alone_says(monkeypatch):
 
 @pytest.mark.slow
 def test_linked_kernels_say_what_numba_alone_says():
-    # in a process of its own: what the compiler makes depends on what it has made before
-    code = """
-from math import sqrt
-import numpy as np
-from numba import njit
-from numba.core.codegen import JITCodeLibrary
-from flarewright.kernels import _jit
-
-alone = []
-finished = JITCodeLibrary._finalize_specific
-
-def count(library):
-    alone.append(library.name)
-    return finished(library)
-
-def folded(x, k):
-    if k == 0:
-        raise ValueError("nothing left")
-    return sqrt(x) + np.float64(k)
-
-def outer_of(step):
-    def outer(values):
-        total = 0.0
-        for k in range(len(values)):
-            total += step(values[k], k + 1)
-        return total
-    return outer
-
-JITCodeLibrary._finalize_specific = count
-values = np.linspace(0.0, 3.0, 40)
-ours = _jit.for_python(_jit.inner(folded))
-linked = njit(outer_of(_jit.inner(folded)))(values)
-print(sum("folded" in name for name in alone))
-plain = njit(outer_of(njit(folded)))(values)
-print(sum("folded" in name for name in alone))
-print(linked == plain, ours(4.0, 3))
-try:
-    ours(4.0, 0)
-except ValueError as error:
-    print(error)
-"""
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.splitlines() == ["0", "1", "True 5.0", "nothing left"]
+    """What the compiler makes depends on what it has made before, so the same test runs in a process of its own."""
+    test = f"{__file__}::{test_a_linked_kernel_says_what_numba_alone_says.__name__}"
+    words = [sys.executable, "-m", "pytest", "-n", "0", "-p", "no:cacheprovider", test]
+    done = subprocess.run(words, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout
