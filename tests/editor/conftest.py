@@ -102,9 +102,12 @@ def tab(chrome, tmp_path):
 
     editor = Editor(tmp_path / "state")
     context = chrome.new_context(viewport={"width": 1280, "height": 720}, accept_downloads=True)
-    yield (opened := Tab(context.new_page(), editor))
-    context.close()
-    editor.end()
+    try:
+        yield (opened := Tab(context.new_page(), editor))
+    finally:
+        # also where the page did not open: an editor left alone goes on for ever
+        context.close()
+        editor.end()
     # the browser tells of every answer 400 by itself; the page told it in words
     assert [said for said in opened.said if "400" not in said] == []
     # no request leaves the machine
