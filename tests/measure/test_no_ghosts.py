@@ -11,7 +11,7 @@ from flarewright.cli.app import run as command
 from flarewright.io.ghost_model_file import read_ghost_model
 
 SETUP = Setup(size_px=(180, 120), angles_deg=tuple(3.0 * k for k in range(8)), pitch_deg=0.3, axis_offset_px=(2, -1))
-FEW = replace(SETUP, size_px=(120, 80), angles_deg=(0.0, 6.0, 12.0, 18.0, 24.0))
+FEW = replace(SETUP, size_px=(120, 80), angles_deg=(0.0, 5.0, 10.0, 15.0, 20.0, 25.0))
 # the light goes no farther than a third of the picture's width
 NEAR = replace(
     SETUP, lens="double-gauss-tronnier", size_px=(240, 160), angles_deg=tuple(1.0 * k for k in range(14)), seed=0

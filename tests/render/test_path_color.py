@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from flarewright.kernels.trace import ALIVE, REL, STOP_X
-from flarewright.model import Camera, Everywhere, Light, Project, Quality, QuarterWave
+from flarewright.kernels.trace import ALIVE, REL, STOP_X, WEIGHT
+from flarewright.model import Camera, Everywhere, Light, Lines, Project, Quality, QuarterWave
 from flarewright.optics.bundle import Bundle
+from flarewright.optics.pack import pack_lens, resolve_coatings
+from flarewright.optics.paraxial import first_order
 from flarewright.optics.paths import direct_path, ghost_path
 from flarewright.render.canvas import blank, merge
-from flarewright.render.ghosts_final import draw_final, find_final
-from flarewright.render.path_color import direct_flux, seen_of, spread_rays, traced_bend
+from flarewright.render.ghosts_final import _between, draw_final, find_final
+from flarewright.render.path_color import direct_flux, direct_spectrum, seen_of, spread_rays, traced_spectrum
 from flarewright.render.prepare import load_lens, settle
 from flarewright.render.shot import make_opening, make_shots
 
@@ -18,10 +20,10 @@ FILM = Everywhere(coating=QuarterWave(center_wavelength_nm=550.0))
 SIZE = (160, 90)
 
 
-def shot_of(lens: str, field: tuple[float, float], **quality):
+def shot_of(lens: str, field: tuple[float, float], *, light: Light | None = None, **quality):
     project = Project(
         lens=lens,
-        lights=(Light(field_deg=field),),
+        lights=(light or Light(field_deg=field),),
         camera=Camera(size_px=SIZE),
         quality=Quality(**quality),
         coating=FILM,
@@ -72,7 +74,7 @@ def test_a_bundle_without_a_triangle_has_no_rays():
     empty = Bundle(bundle.path, bundle.pupil, bundle.triangles[:0], bundle.traced, 1)
     _, shot = shot_of("tessar-brendel", (8.0, 5.0))
     assert spread_rays(empty, (0,), seen_of(shot, shot.to_pixels), 12).size == 0
-    assert traced_bend(shot, bundle.path, empty, shot.to_pixels) is None
+    assert traced_spectrum(shot, bundle.path, empty, shot.to_pixels) is None
 
 
 def test_rays_beside_the_picture_are_not_seen():
@@ -97,19 +99,34 @@ def test_a_faint_ghost_keeps_its_flux_where_only_its_rim_is_in_the_picture():
         assert np.abs(few - sums[0]).max() < 0.05 * np.abs(sums[0]).max()
 
 
-def test_bare_glass_and_single_wavelengths_do_not_bend():
-    _, coated = shot_of("tessar-brendel", (8.0, 5.0), wavelengths=7)
-    assert coated.curves is not None
-    assert shot_of("tessar-brendel", (8.0, 5.0), wavelengths=1)[1].curves is None
-    assert shot_of("tessar-brendel", (8.0, 5.0), wavelengths=7, bridge=False)[1].curves is None
-    assert traced_bend(shot_of("tessar-brendel", (8.0, 5.0), wavelengths=1)[1], None, None, None) is None
+def test_colours_are_integrated_unless_wavelengths_stand_for_themselves():
+    for count in (1, 3, 7):
+        assert shot_of("tessar-brendel", (8.0, 5.0), wavelengths=count)[1].curves is not None
+    alone = shot_of("tessar-brendel", (8.0, 5.0), wavelengths=7, bridge=False)[1]
+    assert alone.curves is None
+    assert traced_spectrum(alone, None, None, None) is None
+    lines = Light(field_deg=(8.0, 5.0), spectrum=Lines(lines=((480.0, 1.0), (589.3, 2.0))))
+    assert shot_of("tessar-brendel", (8.0, 5.0), light=lines)[1].curves is None
+
+
+def test_interpolated_rays_keep_the_mean_and_follow_both_wavelengths():
+    """Between a dark wavelength and a bright one: relative to the mean a ray lies half way between."""
+    short, long = np.zeros((2, STOP_X + 2)), np.zeros((2, STOP_X + 2))
+    short[:, ALIVE] = long[:, ALIVE] = 1.0
+    short[:, WEIGHT], long[:, WEIGHT] = [0.5e-3, 1.5e-3], [1.2, 0.8]
+    data = _between(short, long, 0.5, (1e-3, 1.0))
+    np.testing.assert_allclose(data[:, WEIGHT], 0.5005 * np.array([0.85, 1.15]))
+    np.testing.assert_allclose(_between(short, long, 0.5)[:, WEIGHT], 0.5 * (short + long)[:, WEIGHT])
 
 
 def test_the_direct_light_follows_its_films():
-    """Between two wavelengths around the film's best the lens passes more than either."""
+    """At the traced wavelengths and between them the lens passes the product of 1 - R of its surfaces."""
     lens = load_lens("tessar-brendel")
     _, shot = shot_of("tessar-brendel", (0.0, 0.0), wavelengths=5)
     nodes = shot.packed.wavelengths_nm
-    (flux,) = direct_flux(shot, lens, [np.ones(5)], np.array([*nodes, 0.5 * (nodes[1] + nodes[2])]))
-    np.testing.assert_allclose(flux[:-1], 1.0, atol=1e-3)
-    assert flux[-1] > 1.003
+    fine = np.array([*nodes, 0.5 * (nodes[1] + nodes[2])])
+    (flux,) = direct_flux([shot], lens, [direct_spectrum(shot, lens).carried], fine)
+    exact = pack_lens(lens, first_order(lens), resolve_coatings(lens, FILM), fine)
+    expected = np.prod(1.0 - exact.reflectance[:, :, -1], axis=1)
+    np.testing.assert_allclose(flux, expected, rtol=2e-4)
+    assert flux[-1] > 1.003 * flux[1:3].mean()

@@ -141,7 +141,9 @@ def test_variance_is_that_of_repeated_renders():
 
 def test_spectrum_in_fine_steps_or_as_final_traces_it():
     fine, coarse = (render(project(bridge=bridge, reference_samples=2 * BATCH)) for bridge in (True, False))
-    assert len(fine.summary["reference"]["wavelengths_nm"]) == 62
+    sampled = np.array(fine.summary["reference"]["wavelengths_nm"])
+    assert np.diff(sampled) == pytest.approx(5.0)
+    assert sampled[0] < 365.0 < 775.0 < sampled[-1]
     assert coarse.summary["reference"]["wavelengths_nm"] == coarse.summary["wavelengths_nm"]
 
 

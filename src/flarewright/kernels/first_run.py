@@ -60,9 +60,9 @@ ROOTS = {
     ),
     "path matrices": ("matrix.path_matrices", "i8[::1], i8[::1], f8[::1], f8[::1], f8[::1], f8, f8[:,:,::1]", 0.1),
     "row sums": ("raster.sum_rows", "f8[:,:,::1], f4[:,:,::1]", 0.1),
-    "mirrors": (
-        "matrix.mirror_squares",
-        "i8[::1], i8[::1], i8[::1], i8[::1], f8[::1], none, f8[::1], f8[::1], f8, f8, f8, f8, f8, f8, f8[:,::1]",
+    "matrix angles": (
+        "matrix.matrix_squares",
+        "i8[::1], i8[::1], i8[::1], i8[::1], f8[::1], none, f8[::1], f8[::1], f8, f8, f8, f8, f8, f8, f8[::1]",
         0.6,
     ),
     "blade wings": (
@@ -78,9 +78,9 @@ ROOTS = {
         "i8[::1], i8[::1], f8[::1], f8[::1], f8[::1], f8[::1], f8, f8, f8, f8[::1], f8[::1], f8[:,:,::1]",
         0.3,
     ),
-    "seen": ("standing.seen_rays", "f8[:,::1], f8, f8[:,::1], f8, f8", 0.2),
+    "seen": ("standing.seen_rays", "f8[:,::1], f8, f8[:,::1], f8[:,::1], f8[:,::1], f8, f8", 0.2),
     "standing": ("standing.standing_rays", "f8[:,::1], i8[:,::1], b1[::1], i8, i8", 0.2),
-    "traced mirrors": (
+    "traced angles": (
         "standing.traced_squares",
         "i8[::1], i8[::1], f8[::1], f8[::1], f8[::1], f8[::1], f8, f8, f8, f8[::1], f8[::1], f8[:,::1]",
         0.7,
@@ -100,11 +100,10 @@ ROOTS = {
     ),
     "shifts": ("standing.wide_shift", "f8[:,::1], f8[:,::1], f8, f8, f8", 0.3),
     "path curves": (
-        "path_curves.multiply_mirrors",
-        "f8[:,:,::1], f8[:,::1], i8[:,::1], i8[::1], f8[:,:,::1], f8[:,::1]",
-        0.4,
+        "path_curves.multiply_steps",
+        "f8[:,:,::1], i8[::1], i8[::1], i8[::1], f8[:,::1], f8[:,::1]",
+        0.3,
     ),
-    "bends": ("path_curves.compare_with_lines", "f8[:,::1], f8[:,::1], f8[:,::1], f8, f8[:,::1]", 0.3),
     "scatter": (
         "scatter.gather_scatter",
         "f8[::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[:,::1], f8, UniTuple(i8, 4), f8[:,:,::1], f8[:,::1], "
@@ -126,7 +125,7 @@ KIN = {
     "measure": ("draw", 0.5),
     "densities": ("draw", 0.1),
     "ghosts' light": ("matrices", 0.8),
-    "mirrors": ("matrices", 0.3),
+    "matrix angles": ("matrices", 0.3),
     "path matrices": ("matrices", 0.1),
 }
 # what a helper loses to its own start

@@ -160,11 +160,11 @@ def _meridians(rows, actions, curvature, curvature_x, z_vertex, n_gap, sensor_z,
 
 
 @compiled
-def mirror_squares(
+def matrix_squares(
     rows, actions, starts, crossings, curvature, curvature_x, z_vertex, n_gap, sensor_z,
     entrance, slope, slope_x, nearness, iris_radius, squares,
 ):  # fmt: skip
-    """Tell at which angles the rays that `draw_matrix_ghosts` takes colours from meet their mirrors.
+    """Compute at which angles the rays that `draw_matrix_ghosts` takes colours from meet the surfaces.
 
     Parameters
     ----------
@@ -173,10 +173,9 @@ def mirror_squares(
     n_gap : ndarray, shape (K + 1,)
     sensor_z, entrance, slope, slope_x, nearness, iris_radius : float
         As there.
-    squares : ndarray, shape (P, M)
-        Filled with the squared sine on the side of the lower index at each mirror of each path.
+    squares : ndarray, shape (steps,)
+        Filled with the squared sine on the side of the lower index at each step of each path (`paraxial_sines`).
     """
-    each = np.empty(rows.size)
     to_stop = np.empty((MOST_CROSSINGS, 2, 2))
     across = to_stop if curvature_x is None else np.empty((MOST_CROSSINGS, 2, 2))
     for p in range(starts.size - 1):
@@ -189,13 +188,8 @@ def mirror_squares(
         beside = 0.0 if curvature_x is None else _centre(across, slope_x, iris_radius, entrance)
         paraxial_sines(
             path_rows, path_actions, curvature, curvature_x, z_vertex, n_gap,
-            centre, slope + nearness * centre, beside, slope_x + nearness * beside, each,
+            centre, slope + nearness * centre, beside, slope_x + nearness * beside, squares[starts[p] : starts[p + 1]],
         )  # fmt: skip
-        mirror = 0
-        for step in range(path_rows.size):
-            if path_actions[step] == REFLECT:
-                squares[p, mirror] = each[step]
-                mirror += 1
 
 
 @compiled

@@ -5,6 +5,8 @@ from math import sqrt
 import numpy as np
 
 from ._jit import borrowing, compiled
+from .bend import ray_from_near
+from .clip import blade_value
 from .trace import ALIVE, REFLECT, REL, STOP_X, X, Y, hit_rays
 
 
@@ -30,16 +32,32 @@ def landed(place, x, y):
     return place[0, 0] + place[0, 1] * x + place[0, 2] * y, place[1, 0] + place[1, 1] * x + place[1, 2] * y
 
 
+@borrowing
+def within_blades(rays, k, blades, axes):
+    """Tell whether a ray crosses the stop within the blades, each time; `axes` as in `kernels.clip.clip_triangle`."""
+    for column in range(STOP_X, rays.shape[1], 2):
+        x, y = rays[k, column], rays[k, column + 1]
+        u, v = x * axes[0, 0] + y * axes[1, 0], x * axes[0, 1] + y * axes[1, 1]
+        for b in range(blades.shape[0]):
+            if blade_value(blades, b, u, v) > 0.0:
+                return False
+    return True
+
+
 @compiled
-def seen_rays(rays, iris_radius, place, width, height):
-    """Tell which rays meet no rim, cross the stop in the circle around the iris, and land in the picture.
+def seen_rays(rays, iris_radius, blades, axes, place, width, height):
+    """Tell which rays meet no rim, cross the stop within the iris, and land in the picture.
 
     Parameters
     ----------
     rays : ndarray, shape (N, 5 + 2 C)
         As `kernels.trace.trace_lanes` fills them.
     iris_radius : float
-        mm.
+        Of the circle around the iris, mm.
+    blades : ndarray, shape (B, 4)
+        Edges of the iris in the upright frame (`optics.iris.blade_edges`).
+    axes : ndarray, shape (2, 2)
+        Upright x, y of the meridional x axis and of the meridional y axis.
     place : ndarray, shape (2, 3)
         Column and row of x = y = 0 on the sensor, and how they grow with x and with y, pixels per mm.
     width, height : float
@@ -53,7 +71,7 @@ def seen_rays(rays, iris_radius, place, width, height):
     everywhere = width == np.inf
     for k in range(rays.shape[0]):
         seen[k] = False
-        if not passes(rays, k, iris_radius):
+        if not (passes(rays, k, iris_radius) and within_blades(rays, k, blades, axes)):
             continue
         x, y = rays[k, X], rays[k, Y]
         column, row = landed(place, x, y)
@@ -104,52 +122,72 @@ def standing_rays(pupil, triangles, passing, step, count):
 
 @compiled
 def traced_squares(rows, actions, curvature, conic, z_vertex, n_gap, sensor_z, tilt, nearness, px, py, squares):
-    """Tell at which angles rays meet the mirrors of a path.
+    """Compute at which angles rays meet the surfaces of a path.
 
     Parameters
     ----------
     rows ... py
         As in `kernels.trace.hit_rays`.
-    squares : ndarray, shape (N, M)
-        Filled, from the first row on, with the squared sines on the side of the lower index; 1 under total reflection.
+    squares : ndarray, shape (N, S)
+        Filled, from the first row on, with the squared sine on the side of the lower index at every step: 1 under total
+        reflection, 0 at the stop and where light goes straight on.
 
     Returns
     -------
     int
-        How many rows are filled: rays that end tell nothing.
+        How many rows are filled: rays that end early have none.
 
     Notes
     -----
-    A mirror turns a ray's direction by twice the cosine along its normal: |d' - d| = 2 cos.
+    A mirror turns a unit direction by twice the cosine: |d' - d| = 2 cos. A refraction changes n d along the normal
+    alone (Snell's law as vectors), so n d - n' d' is the normal.
     """
     steps = rows.shape[0]
     hits = np.empty((px.shape[0], steps + 2, 3))
     hit_rays(rows, actions, curvature, conic, z_vertex, n_gap, sensor_z, tilt, nearness, px, py, hits)
+    before, behind = np.empty(3), np.empty(3)
     count = 0
     for k in range(px.shape[0]):
         if not np.isfinite(hits[k, steps + 1, 0] + hits[k, steps + 1, 1]):
             continue
-        mirror = 0
+        forward = True
         for step in range(steps):
-            if actions[step] != REFLECT:
+            row = rows[step]
+            n_in, n_out = (n_gap[row], n_gap[row + 1]) if forward else (n_gap[row + 1], n_gap[row])
+            reflects = actions[step] == REFLECT
+            squares[count, step] = 0.0
+            if reflects:
+                forward = not forward
+            elif n_in == n_out:
                 continue
-            # unit vectors to the mirror and away from it
             one, other = 0.0, 0.0
             for axis in range(3):
                 at = hits[k, step + 1, axis]
-                one += (at - hits[k, step, axis]) ** 2
-                other += (hits[k, step + 2, axis] - at) ** 2
+                before[axis], behind[axis] = at - hits[k, step, axis], hits[k, step + 2, axis] - at
+                one += before[axis] ** 2
+                other += behind[axis] ** 2
+            if step == 0:
+                # the plane of the first vertex may lie behind a concave front, or touch it
+                before[0], before[1], before[2], _ = ray_from_near(tilt, nearness, px[k], py[k])
+                one = before[0] ** 2 + before[1] ** 2 + before[2] ** 2
+            if one == 0.0 or other == 0.0:
+                continue
             one, other = 1.0 / sqrt(one), 1.0 / sqrt(other)
-            turned = 0.0
-            for axis in range(3):
-                at = hits[k, step + 1, axis]
-                turned += ((hits[k, step + 2, axis] - at) * other - (at - hits[k, step, axis]) * one) ** 2
-            n_in, n_out = n_gap[rows[step]], n_gap[rows[step] + 1]
-            if mirror % 2 == 1:
-                n_in, n_out = n_out, n_in
-            ratio = max(n_in / n_out, 1.0)
-            squares[count, mirror] = min(max((1.0 - 0.25 * turned) * ratio * ratio, 0.0), 1.0)
-            mirror += 1
+            if reflects:
+                turned = 0.0
+                for axis in range(3):
+                    turned += (behind[axis] * other - before[axis] * one) ** 2
+                ratio = max(n_in / n_out, 1.0)
+                square = (1.0 - 0.25 * turned) * ratio * ratio
+            else:
+                normal, along = 0.0, 0.0
+                for axis in range(3):
+                    incoming, outgoing = before[axis] * one, behind[axis] * other
+                    across = n_in * incoming - n_out * outgoing
+                    normal += across * across
+                    along += across * (incoming if n_in < n_out else outgoing)
+                square = 1.0 - along * along / normal if normal > 0.0 else 0.0
+            squares[count, step] = min(max(square, 0.0), 1.0)
         count += 1
     return count
 

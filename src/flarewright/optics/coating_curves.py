@@ -1,8 +1,8 @@
 """What coatings do to a path's light between the traced wavelengths.
 
-A coating's reflectance bends with the wavelength: a single film's is near 0 in the middle of the spectrum. A picture
-that is traced at a few wavelengths and joins them by straight lines makes such ghosts too bright. Films cost nothing
-to compute, rays do; so the spectrum is weighted by how the path's R and T bend between the wavelengths of its rays.
+A coating's reflectance bends with the wavelength: a single film's is near 0 in the middle of the spectrum, a broadband
+stack's rises steeply at the ends. Rays are expensive, films are not. So rays are traced at a few wavelengths, each with
+the mean reflectances of the band that it stands for, and a path's colour is integrated over all wavelengths.
 """
 
 from __future__ import annotations
@@ -14,45 +14,97 @@ from functools import cached_property, lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernels.path_curves import compare_with_lines, multiply_mirrors
+from ..kernels.path_curves import multiply_steps
 from ..kernels.standing import traced_squares
-from ..model import Coating, Lens, Stop
+from ..model import Coating, Lens, Medium, Stop
+from ..model.light import Spectrum
 from .coatings import film_stack, stack_reflectance
-from .pack import PackedLens, SensorMirror
+from .dispersion import refractive_index
+from .pack import REFLECTANCE_SAMPLES, PackedLens, SensorMirror
 from .paraxial import D_LINE_NM, gap_indices
 from .paths import LightPath
+from .spectrum import VISIBLE_NM, band_shares
 
 Floats = NDArray[np.float64]
+# media in front and behind, indices and thicknesses of films in nm
+_Surface = tuple[Medium | None, Medium | None, tuple[float, ...], tuple[float, ...]]
 
-# visible light, in steps that a curved dip of a film does not notice
-CURVE_NM = np.arange(375.0, 736.0, 2.5)
-# entries against the squared sine; R of films is nearly linear in it
-SQUARES = 33
-# a path that is dark at two neighbouring wavelengths tells nothing about its colour between them
-MOST_BEND = 4.0
+STEP_NM = 2.5
+CURVE_NM = np.arange(VISIBLE_NM[0], VISIBLE_NM[1] + 0.5 * STEP_NM, STEP_NM)
+"""Wavelengths at which colours of coatings are integrated."""
 
-__all__ = ["CURVE_NM", "CoatingCurves", "bends", "coating_curves", "mirror_squares_traced", "passed"]
+COSINES = 65
+"""Entries of a curve against the cosine of incidence; R is linear between them within 6e-5 up to 60 degrees."""
+
+__all__ = [
+    "COSINES",
+    "CURVE_NM",
+    "BandCurves",
+    "CoatingCurves",
+    "PathSpectrum",
+    "band_curves",
+    "coating_curves",
+    "joined_steps",
+    "path_spectra",
+    "step_squares",
+]
 
 
-@dataclass(frozen=True)
+# compared by identity: whoever asks for the same coatings again gets the same object (`_stacked`)
+@dataclass(frozen=True, eq=False)
 class CoatingCurves:
     """Reflectances of a lens' surfaces over the wavelengths.
 
     Attributes
     ----------
-    reflectance : ndarray, shape (K, SQUARES, L)
-        R of each row against the squared sine on the side of the lower index, uniform over [0, 1], at `CURVE_NM`.
-    log_transmittance : ndarray, shape (K, L)
-        log(1 - R) at normal incidence.
+    reflectance : ndarray, shape (K, COSINES, L)
+        R of each row against the cosine on the side of the lower index, uniform over [0, 1], at `CURVE_NM`.
     """
 
     reflectance: Floats
-    log_transmittance: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class BandCurves:
+    """The same, and the means over the bands that some traced wavelengths stand for.
+
+    Attributes
+    ----------
+    reflectance : ndarray, shape (K, COSINES, L + W)
+        As in `CoatingCurves`, then the means over the band of each traced wavelength.
+    """
+
+    reflectance: Floats
 
     @cached_property
-    def log_through(self) -> Floats:
-        """Sum of `log_transmittance` over all rows before each, shape (K + 1, L): a leg between two is a difference."""
-        return np.concatenate([np.zeros((1, len(CURVE_NM))), np.cumsum(self.log_transmittance, axis=0)])
+    def tables(self) -> Floats:
+        """Means over the bands as `PackedLens.reflectance` holds them, shape (W, K, REFLECTANCE_SAMPLES)."""
+        means = np.ascontiguousarray(np.moveaxis(self.reflectance[:, :, len(CURVE_NM) :], 2, 0))
+        place = np.linspace(0.0, COSINES - 1.0, REFLECTANCE_SAMPLES)
+        cell = np.minimum(place.astype(np.intp), COSINES - 2)
+        low, high = means[:, :, cell], means[:, :, cell + 1]
+        finer: Floats = low + (place - cell) * (high - low)
+        return finer
+
+
+@dataclass(frozen=True)
+class PathSpectrum:
+    """What paths let pass, and what their traced rays carry of it.
+
+    Attributes
+    ----------
+    passed : ndarray, shape (L,) or (P, L)
+        Part of the light that passes, at `CURVE_NM`.
+    carried : ndarray, shape (W,) or (P, W)
+        The same with the means of the bands that the traced wavelengths stand for.
+    """
+
+    passed: Floats
+    carried: Floats
+
+    def of(self, path: int) -> PathSpectrum:
+        """Return that of one path."""
+        return PathSpectrum(self.passed[path], self.carried[path])
 
 
 def coating_curves(
@@ -72,104 +124,105 @@ def coating_curves(
     -------
     CoatingCurves or None
         None where no row has a film: bare glass reflects almost alike at all wavelengths.
-
-    Notes
-    -----
-    The glass has its index at the d line throughout: dispersion changes R slowly, which straight lines between the
-    traced wavelengths follow.
     """
     n_d = gap_indices(lens, D_LINE_NM)
-    rows: list[Floats] = []
-    coated = False
-    for k, row in enumerate(lens.rows):
-        films: tuple[tuple[float, ...], tuple[float, ...]] = ((), ())
-        if not isinstance(row, Stop):
-            films = film_stack(coatings[k], n_d[k], n_d[k + 1])
-            coated |= bool(films[0])
-        rows.append(_curves(float(n_d[k]), float(n_d[k + 1]), *films))
-    if not coated:
+    films = [
+        ((), ()) if isinstance(row, Stop) else film_stack(coatings[k], n_d[k], n_d[k + 1])
+        for k, row in enumerate(lens.rows)
+    ]
+    if not any(indices for indices, _ in films):
         return None
+    surfaces: list[_Surface] = []
+    front: Medium | None = None
+    for row, (indices, thicknesses_nm) in zip(lens.rows, films, strict=True):
+        # the stop is a plane in a gap
+        back = front if isinstance(row, Stop) else row.medium
+        surfaces.append((front, back, indices, thicknesses_nm))
+        front = back
+    return _stacked(tuple(surfaces), None if sensor is None else sensor.reflectance)
+
+
+# every frame of a sequence asks for the same
+@lru_cache(maxsize=16)
+def _stacked(surfaces: tuple[_Surface, ...], sensor: float | None) -> CoatingCurves:
+    rows = [_curves(*surface) for surface in surfaces]
     if sensor is not None:
-        rows.append(np.full_like(rows[0], sensor.reflectance))
-    reflectance = np.stack(rows)
-    return CoatingCurves(reflectance, np.log(np.maximum(1.0 - reflectance[:, 0], 1e-9)))
+        rows.append(np.full_like(rows[0], sensor))
+    return CoatingCurves(np.stack(rows))
 
 
 @lru_cache(maxsize=512)
-def _curves(n_front: float, n_back: float, indices: tuple[float, ...], thicknesses_nm: tuple[float, ...]) -> Floats:
-    """R of one surface, shape (SQUARES, L)."""
-    if n_front > n_back:
-        n_front, n_back = n_back, n_front
+def _curves(
+    front: Medium | None, back: Medium | None, indices: tuple[float, ...], thicknesses_nm: tuple[float, ...]
+) -> Floats:
+    """R of one surface, shape (COSINES, L)."""
+    if front == back and not indices:
+        return np.zeros((COSINES, len(CURVE_NM)))
+    if refractive_index(front, D_LINE_NM) > refractive_index(back, D_LINE_NM):
+        front, back = back, front
         indices, thicknesses_nm = indices[::-1], thicknesses_nm[::-1]
-    shape = (SQUARES, len(CURVE_NM))
-    if n_front == n_back and not indices:
-        return np.zeros(shape)
-    cos_low = np.sqrt(1.0 - np.arange(SQUARES) / (SQUARES - 1))[:, None]
-    wave_nm = CURVE_NM if indices else np.array([D_LINE_NM])
-    curves = stack_reflectance(n_front, n_back, indices, thicknesses_nm, wave_nm, cos_low)
-    return np.broadcast_to(curves, shape)
+    low, high = (np.broadcast_to(refractive_index(one, CURVE_NM), CURVE_NM.shape) for one in (front, back))
+    cosine = np.linspace(0.0, 1.0, COSINES)[:, None]
+    return stack_reflectance(low, high, indices, thicknesses_nm, CURVE_NM, cosine)
 
 
-def passed(curves: CoatingCurves, paths: Sequence[LightPath], squares: Floats) -> Floats:
-    """Multiply R and T along paths, over the wavelengths.
+@lru_cache(maxsize=16)
+def band_curves(curves: CoatingCurves, spectrum: Spectrum, wavelengths_nm: tuple[float, ...]) -> BandCurves:
+    """Average coatings over the bands that traced wavelengths stand for.
 
     Parameters
     ----------
     curves : CoatingCurves
-    paths : sequence of LightPath
-        All with the same number M of mirrors.
-    squares : ndarray, shape (P, N, M)
-        Of N rays of each path: the squared sines on the side of the lower index at its mirrors.
-
-    Returns
-    -------
-    ndarray, shape (P, L)
-        The mean over the rays, at `CURVE_NM`.
-
-    Notes
-    -----
-    Mirrors reflect at the rays' angles; the many surfaces that are passed, whose part in the colour is small, transmit
-    as at normal incidence.
-    """
-    mirrors = np.array([path.mirrors for path in paths], dtype=np.int64).reshape(len(paths), -1)
-    ends = np.array([path.rows[-1] + 1 for path in paths], dtype=np.int64)
-    through = np.empty((len(paths), len(CURVE_NM)))
-    multiply_mirrors(curves.reflectance, curves.log_through, mirrors, ends, np.ascontiguousarray(squares), through)
-    return through
-
-
-def bends(through: Floats, traced_nm: Floats) -> Floats:
-    """Compare what paths pass with straight lines between the traced wavelengths.
-
-    Parameters
-    ----------
-    through : ndarray, shape (P, L)
-        From `passed`.
-    traced_nm : ndarray, shape (W,)
+    spectrum : Spectrum
+        Of the light: a band's mean is weighted by what the eye sees of it.
+    wavelengths_nm : tuple of float
         Rising.
 
     Returns
     -------
-    ndarray, shape (P, L)
-        What the straight lines must be multiplied by, at `CURVE_NM`; 1 at the traced wavelengths, up to the step of
-        the table.
+    BandCurves
+
+    Notes
+    -----
+    A film may leave nothing of a path at one wavelength and much beside it. Rays that carry the band's means carry
+    light wherever the band has some, so that their weights can be set right (`PathSpectrum`).
     """
-    at_traced, joined = _straight(tuple(traced_nm))
-    bend = np.empty_like(through)
-    compare_with_lines(through, at_traced, joined, MOST_BEND, bend)
-    return bend
+    shares = band_shares(spectrum, wavelengths_nm, CURVE_NM)
+    return BandCurves(np.concatenate([curves.reflectance, curves.reflectance @ shares.T], axis=2))
 
 
+# a moving hand asks for the same ones again and again
 @lru_cache(maxsize=64)
-def _straight(traced_nm: tuple[float, ...]) -> tuple[Floats, Floats]:
-    """Return what reads curves at the traced wavelengths, shape (L, W), and what joins these by lines, (W, L)."""
-    at_traced = np.stack([np.interp(traced_nm, CURVE_NM, row) for row in np.eye(len(CURVE_NM))])
-    joined = np.stack([np.interp(CURVE_NM, traced_nm, row) for row in np.eye(len(traced_nm))])
-    return at_traced, joined
+def joined_steps(paths: tuple[LightPath, ...]) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    """Join the rows and the actions of paths, shape (steps,) each; and where each path begins, shape (P + 1,)."""
+    starts = np.cumsum([0, *(len(path.rows) for path in paths)])
+    steps = np.concatenate([path.steps for path in paths], axis=1)
+    return steps[0], steps[1], starts
 
 
-def mirror_squares_traced(packed: PackedLens, path: LightPath, tilt: float, points: Floats) -> Floats:
-    """Tell at which angles real rays meet the mirrors of a path.
+def path_spectra(curves: BandCurves, paths: Sequence[LightPath], squares: Floats) -> PathSpectrum:
+    """Multiply R and T along paths, over the wavelengths.
+
+    Parameters
+    ----------
+    curves : BandCurves
+    paths : sequence of LightPath
+    squares : ndarray, shape (N, steps)
+        Of N rays of each path: the squared sines on the side of the lower index at the steps of all paths, one path
+        after another (`step_squares`, `kernels.matrix.matrix_squares`).
+
+    Returns
+    -------
+    PathSpectrum
+        Of all paths: means over the rays.
+    """
+    through = np.empty((len(paths), curves.reflectance.shape[2]))
+    multiply_steps(curves.reflectance, *joined_steps(tuple(paths)), np.ascontiguousarray(squares), through)
+    return PathSpectrum(through[:, : len(CURVE_NM)], through[:, len(CURVE_NM) :])
+
+
+def step_squares(packed: PackedLens, path: LightPath, tilt: float, points: Floats) -> Floats:
+    """Compute at which angles real rays meet the surfaces of a path.
 
     Parameters
     ----------
@@ -182,12 +235,12 @@ def mirror_squares_traced(packed: PackedLens, path: LightPath, tilt: float, poin
 
     Returns
     -------
-    ndarray, shape (N, M)
-        Squared sines on the side of the lower index, at the middle traced wavelength; 1 under total reflection. Only
-        of the rays that reach the sensor's plane, so there may be fewer.
+    ndarray, shape (N, S)
+        Squared sines on the side of the lower index at every step, at the middle traced wavelength; 1 under total
+        reflection. Only of the rays that reach the sensor's plane, so there may be fewer.
     """
     n = packed.n_gap[len(packed.n_gap) // 2]
-    squares = np.empty((len(points), len(path.mirrors)))
+    squares = np.empty((len(points), len(path.rows)))
     count = traced_squares(
         path.rows, path.actions, packed.curvature, packed.form, packed.z_vertex, n, packed.sensor_z, tilt,
         packed.nearness, np.ascontiguousarray(points[:, 0]), np.ascontiguousarray(points[:, 1]), squares,

@@ -11,14 +11,14 @@ from flarewright.model import D65, Coating, Film
 
 from .coatings import film_stack, stack_reflectance
 from .color import luminance_weights
-from .spectrum import band_weights
+from .spectrum import VISIBLE_NM, band_weights
 
 Floats = NDArray[np.float64]
 
 BAND_NM = (420.0, 680.0)
 """The band over which mean reflectances of coatings are stated."""
 
-WAVELENGTHS_NM = np.arange(380.0, 781.0, 5.0)
+WAVELENGTHS_NM = np.arange(VISIBLE_NM[0], VISIBLE_NM[1] + 1.0, 5.0)
 
 
 @dataclass(frozen=True)

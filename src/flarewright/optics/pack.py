@@ -180,6 +180,7 @@ def pack_lens(
     wavelengths_nm: NDArray[np.float64],
     *,
     sensor: SensorMirror | None = None,
+    in_bands: NDArray[np.float64] | None = None,
 ) -> PackedLens:
     """Turn a complete lens into arrays.
 
@@ -194,6 +195,9 @@ def pack_lens(
     wavelengths_nm : ndarray, shape (W,)
     sensor : SensorMirror, optional
         Adds the sensor as the last row; the lens' own rows keep their numbers.
+    in_bands : ndarray, shape (W, K, M), optional
+        `PackedLens.reflectance` in the place of that at the wavelengths themselves: the means over the bands that these
+        stand for (`optics.coating_curves.BandCurves.tables`).
 
     Returns
     -------
@@ -223,7 +227,7 @@ def pack_lens(
         semi=semi,
         inv_semi=inv_semi,
         n_gap=n_gap,
-        reflectance=_reflectance(lens, coatings, n_gap, wavelengths_nm),
+        reflectance=_reflectance(lens, coatings, n_gap, wavelengths_nm) if in_bands is None else in_bands,
         wavelengths_nm=np.asarray(wavelengths_nm, dtype=np.float64),
         sensor_z=float(z[-1] + first_order.sensor_distance),
         stop_semi=first_order.stop_semi_diameter,

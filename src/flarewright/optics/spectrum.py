@@ -19,17 +19,25 @@ Floats = NDArray[np.float64]
 LAST_NM = FIRST_NM + STEP_NM * (len(Y_BAR) - 1)
 """The colour matching functions cover FIRST_NM to LAST_NM, 360 to 830 nm."""
 
+VISIBLE_NM = (360.0, 780.0)
+"""All colours are integrated from here to here: beyond, daylight has less than 1e-6 of its X, Y and Z."""
+
 _H, _C, _KB = 6.62607015e-34, 299792458.0, 1.380649e-23  # exact SI values
 
 __all__ = [
     "FIRST_NM",
     "LAST_NM",
+    "VISIBLE_NM",
+    "at_its_lines",
     "band_contents",
     "band_parts",
+    "band_shares",
     "band_weights",
     "cie_1931",
+    "hats",
     "luminance_shares",
     "planck",
+    "sampled_wavelengths",
     "spectral_power",
     "spectrum_xyz",
     "traced_wavelengths",
@@ -150,6 +158,48 @@ def traced_wavelengths(count: int, spectrum: Spectrum | None = None) -> Floats:
     return midpoints
 
 
+def sampled_wavelengths(count: int, spectrum: Spectrum | None = None) -> Floats:
+    """Return wavelengths that stand for all visible light by themselves, with nothing known between them.
+
+    Parameters
+    ----------
+    count : int
+        How many at least; no fewer than one every 5 nm.
+    spectrum : Spectrum or None
+        As in `traced_wavelengths`.
+
+    Returns
+    -------
+    ndarray, shape (N,), rising, nm
+        The midpoints of equal cells between the ends of `VISIBLE_NM`, or a spectrum's lines.
+    """
+    low, high = VISIBLE_NM
+    cells = max(count, round((high - low) / 5.0))
+    if isinstance(spectrum, Lines):
+        lines = traced_wavelengths(cells, spectrum)
+        if at_its_lines(spectrum, lines):
+            return lines
+    midpoints: Floats = low + (high - low) * (np.arange(cells) + 0.5) / cells
+    return midpoints
+
+
+def at_its_lines(spectrum: Spectrum, wavelengths_nm: ArrayLike) -> bool:
+    """Tell whether the traced wavelengths are all the light that a spectrum has.
+
+    Parameters
+    ----------
+    spectrum : Spectrum
+    wavelengths_nm : array_like, shape (N,)
+
+    Returns
+    -------
+    bool
+    """
+    if not isinstance(spectrum, Lines):
+        return False
+    return {wave for wave, power in spectrum.lines if power > 0.0} <= set(np.atleast_1d(wavelengths_nm).tolist())
+
+
 def spectrum_xyz(spectrum: Spectrum) -> Floats:
     """Tristimulus values of a light, scaled to Y = 1.
 
@@ -223,7 +273,7 @@ def band_weights(spectrum: Spectrum, wavelengths_nm: ArrayLike, colorspace: Colo
     ghost's brightness is smooth in wavelength. Lines are split between their two neighbours, not smeared.
     """
     wave, xyz = _stimulus(spectrum)
-    weights: Floats = _hats(wave, wavelengths_nm) @ xyz @ xyz_to_rgb_matrix(colorspace).T
+    weights: Floats = hats(wave, wavelengths_nm) @ xyz @ xyz_to_rgb_matrix(colorspace).T
     return weights
 
 
@@ -249,12 +299,59 @@ def band_parts(spectrum: Spectrum, wavelengths_nm: ArrayLike, colorspace: Colors
     """
     wave, xyz = _stimulus(spectrum)
     rgb = xyz @ xyz_to_rgb_matrix(colorspace).T
-    parts: Floats = np.einsum("lw,nw,wc->lnc", _hats(wave, curve_nm), _hats(wave, wavelengths_nm), rgb, optimize=True)
+    parts: Floats = np.einsum("lw,nw,wc->lnc", hats(wave, curve_nm), hats(wave, wavelengths_nm), rgb, optimize=True)
     return parts
 
 
-def _hats(wave: Floats, nodes_nm: ArrayLike) -> Floats:
-    """Piecewise-linear hats on rising nodes, constant beyond the first and the last, shape (N, len(wave))."""
+def band_shares(spectrum: Spectrum, wavelengths_nm: ArrayLike, curve_nm: ArrayLike) -> Floats:
+    """Divide the light that each traced wavelength stands for among the points of a curve.
+
+    Parameters
+    ----------
+    spectrum : Spectrum
+    wavelengths_nm : array_like, shape (N,)
+        The traced wavelengths, rising.
+    curve_nm : array_like, shape (L,)
+        As in `band_parts`.
+
+    Returns
+    -------
+    ndarray, shape (N, L)
+        Shares of X + Y + Z, which sum to 1 over L: with them a curve's mean over a band is a product. A wavelength that
+        stands for no light takes all of its band alike.
+
+    Raises
+    ------
+    FlarewrightError, ValueError
+        As `band_weights`.
+    """
+    wave, xyz = _stimulus(spectrum)
+    shares = hats(wave, wavelengths_nm) * xyz.sum(axis=1) @ hats(wave, curve_nm).T
+    dark = ~(shares.sum(axis=1) > 0.0)
+    shares[dark] = hats(np.asarray(curve_nm, dtype=np.float64), wavelengths_nm)[dark]
+    found: Floats = shares / shares.sum(axis=1, keepdims=True)
+    return found
+
+
+def hats(wave: Floats, nodes_nm: ArrayLike) -> Floats:
+    """Compute piecewise-linear hats on rising nodes, constant beyond the first and the last.
+
+    Parameters
+    ----------
+    wave : ndarray, shape (M,)
+        Where they are asked for.
+    nodes_nm : array_like, shape (N,)
+
+    Returns
+    -------
+    ndarray, shape (N, M)
+        They sum to 1 everywhere.
+
+    Raises
+    ------
+    ValueError
+        When the nodes do not rise.
+    """
     nodes = np.atleast_1d(np.asarray(nodes_nm, dtype=np.float64))
     if nodes.ndim != 1 or nodes.size == 0 or bool(np.any(np.diff(nodes) <= 0.0)):
         raise ValueError("traced wavelengths must rise")

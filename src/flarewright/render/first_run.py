@@ -40,7 +40,7 @@ def compile_for_render(project: Project, threads: int | None = None) -> None:
         names += ["draw" if iris.mask is None else "draw masked", "densities", "pixels", "double"]
         if project.quality.bridge and project.quality.wavelengths > 1:
             names += ["shifts", "seen", "standing"]
-            names += ["traced mirrors", "path curves", "bends"] if coated else []
+            names += ["traced angles", "path curves"] if coated else []
         if project.quality.ringing != "off":
             names += ["path matrices", "reached edges", "edge's part"]
             # wide open, and with lights that have a size, rings are rarely seen: what draws them is compiled when it
@@ -53,7 +53,7 @@ def compile_for_render(project: Project, threads: int | None = None) -> None:
         from .ghosts import CROWD
 
         names += ["matrices", "path matrices", "row sums"]
-        names += ["mirrors", "path curves", "bends"] if coated else []
+        names += ["matrix angles", "path curves"] if coated else []
         if len(ghost_paths(settled.lens, project.quality.paths)) * len(project.lights) >= CROWD:
             names += ["ghosts' light"]
     if project.output.starburst:

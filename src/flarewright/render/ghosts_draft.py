@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernels.matrix import draw_matrix_ghosts, mirror_squares, path_matrices, weigh_matrix_ghosts
+from ..kernels.matrix import draw_matrix_ghosts, matrix_squares, path_matrices, weigh_matrix_ghosts
 from ..kernels.raster import sum_rows
 from ..kernels.spread_marks import spread_marks
 from ..optics.color import luminance_weights
@@ -78,8 +78,8 @@ def draft_colors(shot: Shot, paths: Sequence[LightPath]) -> Floats:
     if shot.curves is None or not paths:
         return np.repeat(shot.weights(packed.wavelengths_nm)[None], len(paths), axis=0)
     steps, view, _ = _steps(shot, paths)
-    squares = np.empty((len(paths), 2))
-    mirror_squares(*steps, packed.n_gap[len(packed.n_gap) // 2], packed.sensor_z, *view, shot.opening.radius, squares)
+    squares = np.empty(len(steps[0]))
+    matrix_squares(*steps, packed.n_gap[len(packed.n_gap) // 2], packed.sensor_z, *view, shot.opening.radius, squares)
     return draft_weights(shot, paths, squares)
 
 

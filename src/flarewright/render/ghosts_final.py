@@ -20,10 +20,11 @@ from numpy.typing import NDArray
 from ..kernels.bundle import draw_bundle, measure_bundle, node_densities
 from ..kernels.lit_edge import bounded_by_iris
 from ..kernels.standing import wide_shift
-from ..kernels.trace import ALIVE
+from ..kernels.trace import ALIVE, WEIGHT
 from ..model import Quality
 from ..optics.border import mapped, points
 from ..optics.bundle import Bundle, trace_bundle, trace_grid
+from ..optics.coating_curves import PathSpectrum
 from ..optics.grating import GratingOrder, grating_orders
 from ..optics.paths import LightPath
 from ..optics.region import Region, find_region, grown, measure_region
@@ -32,7 +33,7 @@ from .art import PLAIN, Frame, PathArt
 from .canvas import DETAIL_CONTRAST, DETAILS, Canvas, Plane, blank, merge
 from .few_colors import gathered_weights
 from .grade import coarseness, finish
-from .path_color import seen_of, traced_bend
+from .path_color import seen_of, traced_spectrum
 from .shot import Shot
 from .sources import NARROW_PX, halvings, motion, spread_border
 from .spread import shape_kernel, spread_within
@@ -265,8 +266,8 @@ def draw_final(
         rough=detail + (SCREEN_ROUGH if quality.screen else 0), coarse=quality.screen,
     )  # fmt: skip
     count = len(shot.packed.wavelengths_nm)
-    bend = traced_bend(shot, path, bundle, item.to_pixels)
-    if few and _drawn_in_few(item, bundle, bend, canvas.plane(detail), to_pixels, careful=not quality.screen):
+    spectrum = traced_spectrum(shot, path, bundle, item.to_pixels)
+    if few and _drawn_in_few(item, bundle, spectrum, canvas.plane(detail), to_pixels, careful=not quality.screen):
         return
     rings, step_px, sharp = None, BRIDGE_PX, bundle
     if shot.ringing is not None and visibility >= STEP_CONTRAST:
@@ -289,6 +290,7 @@ def draw_final(
         pieces = _bridges(traced, limit, item.view_radius, scale, visibility, step_px)
     steps = [(w, k / n) for w, n in enumerate(pieces) for k in range(n)] + [(count - 1, 0.0)]
     fine_nm = np.interp([w + part for w, part in steps], np.arange(count), shot.packed.wavelengths_nm)
+    carried = None if spectrum is None else spectrum.carried
     patterns, flux = None, None
     if rings is not None:
         # as the patterns: what has no rings needs none of it
@@ -296,13 +298,15 @@ def draw_final(
 
         patterns = rings.textures(fine_nm, _seen(item, rings, bundle, traced, to_pixels, canvas, detail))
         middle = steps.index((count // 2, 0.0))
-        flux = ring_flux(shot, patterns, sharp, bundle, middle, to_pixels, canvas.size(detail))
-    for k, ((w, part), color) in enumerate(zip(steps, shot.weights(fine_nm, bend) * item.art.rgb, strict=True)):
+        flux = ring_flux(shot, patterns, sharp, bundle, middle, to_pixels, canvas.size(detail), carried)
+    for k, ((w, part), color) in enumerate(zip(steps, shot.weights(fine_nm, spectrum) * item.art.rgb, strict=True)):
         if stop is not None and stop.is_set():
             return
         if not color.any():
             continue
-        data = traced[w] if part == 0.0 else _between(traced[w], traced[w + 1], part)
+        data = traced[w]
+        if part > 0.0:
+            data = _between(data, traced[w + 1], part, (1.0, 1.0) if carried is None else (carried[w], carried[w + 1]))
         whole, data = mended(bundle, data)
         densities = node_densities(data, whole.pupil, whole.triangles)
         plane = canvas.plane(detail)
@@ -331,12 +335,12 @@ def _places(item: FinalPass, to_pixels: Floats, w: int, part: float) -> list[tup
 
 
 def _drawn_in_few(
-    item: FinalPass, bundle: Bundle, bend: Floats | None, plane: Plane, to_pixels: Floats, *, careful: bool
+    item: FinalPass, bundle: Bundle, spectrum: PathSpectrum | None, plane: Plane, to_pixels: Floats, *, careful: bool
 ) -> bool:
     """Draw a ghost whose steps of colour nobody sees at its grid's wavelengths alone, if these can stand for all."""
     shot, path, opening = item.shot, item.path, item.shot.opening
     shown = tuple(sorted(bundle.traced))
-    colors = shot.weights(shot.packed.wavelengths_nm, bend) * item.art.rgb
+    colors = shot.weights(shot.packed.wavelengths_nm, spectrum) * item.art.rgb
     seen = seen_of(shot, item.to_pixels)
     weights = gathered_weights(shot.packed, bundle, shot.incidence.tilt, colors, shown, seen, careful=careful)
     if weights is None:
@@ -443,10 +447,18 @@ def _bridges(
     return [min(max(ceil(gap * scale / step_px), 1), most) for gap in gaps]
 
 
-def _between(short: Floats, long: Floats, part: float) -> Floats:
-    """Interpolate a bundle between two wavelengths; a ray lives where both live."""
+def _between(short: Floats, long: Floats, part: float, carried: tuple[float, float] = (1.0, 1.0)) -> Floats:
+    """Interpolate a bundle between two wavelengths; a ray lives where both live.
+
+    Where coatings let pass far more at one than at the other, it is a ray's light over the mean, `carried`, that is
+    interpolated: the dark wavelength knows as much of where light goes as the bright one.
+    """
     # what a ray that ended holds may be infinite, on either side
     with np.errstate(invalid="ignore"):
         data = (1.0 - part) * short + part * long
+        if carried[0] != carried[1] and min(carried) > 0.0:
+            mean = (1.0 - part) * carried[0] + part * carried[1]
+            relative = (1.0 - part) / carried[0] * short[:, WEIGHT] + part / carried[1] * long[:, WEIGHT]
+            data[:, WEIGHT] = mean * relative
     data[:, ALIVE] = np.minimum(short[:, ALIVE], long[:, ALIVE])
     return data

@@ -17,11 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..io.mask_image import read_mask
-from ..model import Art, Iris, Light, Project
+from ..model import Art, Iris, Lens, Light, Project
 from ..optics.paths import ghost_paths
 from .art import resolve_art
 from .direct import DirectImage, defocus_mm, direct_image
 from .ghosts import render_ghosts
+from .path_color import direct_spectrum
 from .prepare import Settled, settle
 from .scatter import chosen_scatter
 from .shot import Shot, make_opening, make_shots
@@ -166,7 +167,7 @@ def _star(
     row = floor(shot.to_pixels[1] - image.position_mm[1] * shot.to_pixels[3])
     if not (-1 <= column <= width and -1 <= row <= height):
         return None
-    strength = _strength(shot, image)
+    strength = _strength(settled.lens, shot, image)
     scene = _scene(settled.project, shot.light)
     sheet = next((sheet for sheet in kept if sheet.scene == scene), None)
     if sheet is None:
@@ -194,9 +195,9 @@ def _scene(project: Project, light: Light) -> Project:
     return scene
 
 
-def _strength(shot: Shot, image: DirectImage) -> NDArray[np.float64]:
+def _strength(lens: Lens, shot: Shot, image: DirectImage) -> NDArray[np.float64]:
     """Return the light's flux in each channel."""
-    weights = shot.weights(shot.packed.wavelengths_nm)
+    weights = shot.weights(shot.packed.wavelengths_nm, direct_spectrum(shot, lens))
     return np.asarray(shot.light.intensity * image.throughput_mm2 @ weights, dtype=np.float64)
 
 

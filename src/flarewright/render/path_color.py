@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ..kernels.standing import seen_rays, standing_rays
 from ..model import Lens
 from ..optics.bundle import Bundle
-from ..optics.coating_curves import CURVE_NM, bends, mirror_squares_traced, passed
+from ..optics.coating_curves import CURVE_NM, PathSpectrum, path_spectra, step_squares
 from ..optics.paths import LightPath, direct_path
 from .shot import Shot
 
@@ -18,15 +18,15 @@ Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
 # so many rays of a bundle stand for the angles at which all of it meets the mirrors
-RAYS = 12
+RAYS = 48
 # and these are looked for among so many triangles of its grid
 TRIANGLES = 512
 
-__all__ = ["direct_bend", "direct_flux", "draft_weights", "place_of", "seen_of", "spread_rays", "traced_bend"]
+__all__ = ["direct_flux", "direct_spectrum", "draft_weights", "place_of", "seen_of", "spread_rays", "traced_spectrum"]
 
 
-def traced_bend(shot: Shot, path: LightPath, bundle: Bundle, to_pixels: Floats) -> Floats | None:
-    """Compare what a ghost's rays carry with straight lines between the traced wavelengths.
+def traced_spectrum(shot: Shot, path: LightPath, bundle: Bundle, to_pixels: Floats) -> PathSpectrum | None:
+    """Compute what coatings let pass along a ghost's rays, over the wavelengths.
 
     Parameters
     ----------
@@ -39,23 +39,30 @@ def traced_bend(shot: Shot, path: LightPath, bundle: Bundle, to_pixels: Floats) 
 
     Returns
     -------
-    ndarray, shape (L,), or None
-        What multiplies the light's spectrum (`Shot.weights`); None where nothing bends, or no ray passes.
+    PathSpectrum or None
+        For `Shot.weights`; None where no row has a film, or no ray passes.
     """
     if shot.curves is None:
         return None
-    held = sorted(bundle.traced)
-    middle = held[len(held) // 2]
-    chosen = spread_rays(bundle, (middle,), seen_of(shot, to_pixels), RAYS)
-    if chosen.size == 0:
-        chosen = spread_rays(bundle, (middle,), _seen(shot, np.zeros((2, 3)), (np.inf, np.inf)), RAYS)
-    if chosen.size == 0:
-        return None
-    squares = mirror_squares_traced(shot.packed, path, shot.incidence.tilt, bundle.pupil[chosen])
+    squares = step_squares(shot.packed, path, shot.incidence.tilt, bundle.pupil[_light_of(shot, bundle, to_pixels)])
     if len(squares) == 0:
         return None
-    bend: Floats = bends(passed(shot.curves, [path], squares[None]), shot.packed.wavelengths_nm)[0]
-    return bend
+    return path_spectra(shot.curves, [path], squares).of(0)
+
+
+def _light_of(shot: Shot, bundle: Bundle, to_pixels: Floats) -> NDArray[np.intp]:
+    """Choose rays that stand for a ghost's light: what is seen, else what passes, else what may pass."""
+    held = sorted(bundle.traced)
+    middle = held[len(held) // 2]
+    anywhere = np.zeros((2, 3)), (np.inf, np.inf)
+    looks = (seen_of(shot, to_pixels), _seen(shot, *anywhere), _seen(shot, *anywhere, blades=np.empty((0, 4))))
+    for seen in looks:
+        # a sliver of light may pass at one end of the spectrum alone
+        for w in sorted(held, key=lambda w: abs(w - middle)):
+            chosen = spread_rays(bundle, (w,), seen, RAYS)
+            if chosen.size > 0:
+                return chosen
+    return np.empty(0, dtype=np.intp)
 
 
 def spread_rays(
@@ -87,7 +94,7 @@ def spread_rays(
 
 
 def seen_of(shot: Shot, to_pixels: Floats) -> Callable[[Floats], Bools]:
-    """Tell which traced rays meet no rim, cross the stop in the circle around the iris, and land in the picture.
+    """Tell which traced rays meet no rim, cross the stop within the iris, and land in the picture.
 
     Parameters
     ----------
@@ -103,12 +110,15 @@ def seen_of(shot: Shot, to_pixels: Floats) -> Callable[[Floats], Bools]:
     return _seen(shot, place_of(shot, to_pixels), shot.size_px)
 
 
-def _seen(shot: Shot, place: Floats, size_px: tuple[float, float]) -> Callable[[Floats], Bools]:
-    """Do the same for a picture of any size, infinite too, and places as in `kernels.standing.seen_rays`."""
-    iris_radius, width, height = shot.opening.radius, float(size_px[0]), float(size_px[1])
+def _seen(
+    shot: Shot, place: Floats, size_px: tuple[float, float], blades: Floats | None = None
+) -> Callable[[Floats], Bools]:
+    """Do the same for a picture of any size, infinite too, places as in `kernels.standing.seen_rays`, other blades."""
+    opening, axes, width, height = shot.opening, shot.incidence.axes, float(size_px[0]), float(size_px[1])
+    blades = opening.blades if blades is None else blades
 
     def seen(rays: Floats) -> Bools:
-        mask: Bools = seen_rays(rays, iris_radius, place, width, height)
+        mask: Bools = seen_rays(rays, opening.radius, blades, axes, place, width, height)
         return mask
 
     return seen
@@ -134,8 +144,8 @@ def place_of(shot: Shot, to_pixels: Floats) -> Floats:
     return place
 
 
-def direct_bend(shot: Shot, lens: Lens) -> Floats | None:
-    """Do the same for light that no surface reflects.
+def direct_spectrum(shot: Shot, lens: Lens) -> PathSpectrum | None:
+    """Compute what coatings let pass of the light that no surface reflects, on the axis.
 
     Parameters
     ----------
@@ -144,21 +154,20 @@ def direct_bend(shot: Shot, lens: Lens) -> Floats | None:
 
     Returns
     -------
-    ndarray, shape (L,), or None
+    PathSpectrum or None
     """
     if shot.curves is None:
         return None
-    through = passed(shot.curves, [direct_path(lens)], np.zeros((1, 1, 0)))
-    bend: Floats = bends(through, shot.packed.wavelengths_nm)[0]
-    return bend
+    path = direct_path(lens)
+    return path_spectra(shot.curves, [path], np.zeros((1, len(path.rows)))).of(0)
 
 
-def direct_flux(shot: Shot, lens: Lens, throughputs: Sequence[Floats], fine_nm: Floats) -> Floats:
+def direct_flux(shots: Sequence[Shot], lens: Lens, throughputs: Sequence[Floats], fine_nm: Floats) -> Floats:
     """Interpolate the flux of direct lights between the traced wavelengths.
 
     Parameters
     ----------
-    shot : Shot
+    shots : sequence of Shot, N of them
     lens : Lens
     throughputs : sequence of ndarray, N of shape (W,)
         At the traced wavelengths.
@@ -168,9 +177,20 @@ def direct_flux(shot: Shot, lens: Lens, throughputs: Sequence[Floats], fine_nm: 
     -------
     ndarray, shape (N, F)
     """
-    flux: Floats = np.array([np.interp(fine_nm, shot.packed.wavelengths_nm, one) for one in throughputs])
-    bend = direct_bend(shot, lens)
-    return flux if bend is None else flux * np.interp(fine_nm, CURVE_NM, bend)
+    flux = np.empty((len(shots), len(fine_nm)))
+    # lights of one spectrum share their bands
+    spectra: dict[int, PathSpectrum | None] = {}
+    for k, (shot, throughput) in enumerate(zip(shots, throughputs, strict=True)):
+        traced_nm = shot.packed.wavelengths_nm
+        if id(shot.curves) not in spectra:
+            spectra[id(shot.curves)] = direct_spectrum(shot, lens)
+        spectrum = spectra[id(shot.curves)]
+        if spectrum is None:
+            flux[k] = np.interp(fine_nm, traced_nm, throughput)
+        else:
+            passed = np.interp(fine_nm, CURVE_NM, spectrum.passed)
+            flux[k] = np.interp(fine_nm, traced_nm, throughput / spectrum.carried) * passed
+    return flux
 
 
 def draft_weights(shot: Shot, paths: Sequence[LightPath], squares: Floats) -> Floats:
@@ -181,13 +201,12 @@ def draft_weights(shot: Shot, paths: Sequence[LightPath], squares: Floats) -> Fl
     shot : Shot
     paths : sequence of LightPath
         Of two reflections each.
-    squares : ndarray, shape (P, 2)
-        From `kernels.matrix.mirror_squares`.
+    squares : ndarray, shape (steps,)
+        From `kernels.matrix.matrix_squares`.
 
     Returns
     -------
     ndarray, shape (P, W, 3)
     """
-    assert shot.curves is not None, "nothing bends"
-    traced_nm = shot.packed.wavelengths_nm
-    return shot.weights(traced_nm, bends(passed(shot.curves, paths, squares[:, None]), traced_nm))
+    assert shot.curves is not None, "no row has a film"
+    return shot.weights(shot.packed.wavelengths_nm, path_spectra(shot.curves, paths, squares[None]))

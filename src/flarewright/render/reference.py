@@ -40,8 +40,6 @@ Progress = Callable[[float, str], None]
 SIDE = 128
 # from how few batches an error can be told
 FEWEST = 16
-# a spectrum is sampled at so many wavelengths, 5 nm apart, whatever final quality traces
-SPECTRAL_SAMPLES = 62
 # parts of area lights
 WIDEST_PART_DEG = 60.0
 # batches in work at once take no more memory than this, bytes
@@ -107,17 +105,16 @@ def spectral_shots(settled: Settled, mask: Floats | None) -> tuple[Shot, ...]:
     Returns
     -------
     tuple of Shot
-        With `quality.bridge` 5 nm apart or finer; without it the wavelengths that final quality traces, and no others.
+        With `quality.bridge` 5 nm apart or finer over all visible light; without it the wavelengths that final quality
+        traces, and no others.
     """
     project = settled.project
     quality = project.quality
-    if quality.bridge:
-        quality = quality.replace(wavelengths=max(quality.wavelengths, SPECTRAL_SAMPLES))
     if all(holdout is None for holdout in (project.holdout, *(light.holdout for light in project.lights))):
         # random directions need no parts; only what is hidden is told part by part
         quality = quality.replace(source_step_deg=WIDEST_PART_DEG)
     fine = replace(settled, project=project.replace(quality=quality))
-    return make_shots(fine, make_opening(fine, mask))
+    return make_shots(fine, make_opening(fine, mask), sampled=quality.bridge)
 
 
 def render_reference(
@@ -228,7 +225,7 @@ def _fingerprints(settled: Settled, shots: Sequence[Shot], rays: ReferenceRays) 
         "picture": [project.camera.size_px, project.camera.sensor, project.output.colorspace],
         "sensor reflectance": project.camera.sensor_reflectance,
         "scatter": None if scatter is None else scatter.model_dump(mode="json"),
-        "spectral sampling": [quality.wavelengths, quality.bridge, SPECTRAL_SAMPLES, HEROES],
+        "spectral sampling": [*packed.wavelengths_nm.tolist(), HEROES],
         "seed": [quality.seed, SIDE],
         "choice of lights met from the camera": rays.from_camera,
     }

@@ -53,16 +53,16 @@ class RingFlux:
         Column and row of the axis, pixels per mm.
     middle : float
         What the ghost is multiplied by at all wavelengths, unless it is small.
-    small : tuple of (Box, ndarray), or None
-        Of a small ghost left, top, right and bottom, pixels, and its flux without rings at the traced wavelengths,
-        shape (W,).
+    small : tuple of (Box, ndarray, ndarray), or None
+        Of a small ghost left, top, right and bottom, pixels; at the traced wavelengths, shape (W,), its flux without
+        rings over what its rays carry, and what they carry.
     """
 
     shot: Shot
     patterns: Textures
     place: Floats
     middle: float = 1.0
-    small: tuple[Box, Floats] | None = None
+    small: tuple[Box, Floats, Floats] | None = None
 
     def kept(self, k: int, at: float, whole: Bundle, data: Floats, densities: Floats) -> float:
         """Return what the ghost has to be multiplied by at the k-th drawn wavelength.
@@ -77,14 +77,16 @@ class RingFlux:
         """
         if self.small is None:
             return self.middle
-        box, fluxes = self.small
-        sharp = float(np.interp(at, np.arange(fluxes.size), fluxes))
+        box, relative, carried = self.small
+        waves = np.arange(carried.size)
+        sharp = float(np.interp(at, waves, relative) * np.interp(at, waves, carried))
         return _over(sharp, _ringed(self.shot, self.patterns, self.place, box, k, whole, data, densities))
 
 
 def ring_flux(
-    shot: Shot, patterns: Textures, sharp: Bundle, ringed: Bundle, middle: int, place: Floats, size_px: tuple[int, int]
-) -> RingFlux:
+    shot: Shot, patterns: Textures, sharp: Bundle, ringed: Bundle, middle: int, place: Floats, size_px: tuple[int, int],
+    carried: Floats | None = None,
+) -> RingFlux:  # fmt: skip
     """Compare a ghost's flux without rings and with them.
 
     Parameters
@@ -99,6 +101,8 @@ def ring_flux(
         Column and row of the axis, pixels per mm.
     size_px : tuple of int
         Of the picture.
+    carried : ndarray, shape (W,), optional
+        What rays carry at the traced wavelengths (`optics.coating_curves.PathSpectrum`); None: alike at all.
 
     Returns
     -------
@@ -117,7 +121,9 @@ def ring_flux(
         return _sharp(shot, place, box, *mended(sharp, trace_bundle(shot.packed, w, sharp, tilt)))
 
     if max(box[2] - box[0], box[3] - box[1]) <= SMALL_PX:
-        return RingFlux(shot, patterns, place, small=(box, np.array([without(w) for w in range(count)])))
+        # as `ghosts_final` interpolates the rays
+        mean = np.ones(count) if carried is None or carried.min() <= 0.0 else carried
+        return RingFlux(shot, patterns, place, small=(box, np.array([without(w) for w in range(count)]) / mean, mean))
     whole, data = mended(ringed, trace_bundle(shot.packed, count // 2, ringed, tilt))
     densities = node_densities(data, whole.pupil, whole.triangles)
     ringed_flux = _ringed(shot, patterns, place, box, middle, whole, data, densities)

@@ -20,7 +20,7 @@ from ..optics.pack import PackedLens, pack_lens
 from ..optics.paths import direct_path
 from ..optics.scatter import ScatterTables, scatter_tables
 from .direct import DirectImage
-from .path_color import direct_bend
+from .path_color import direct_spectrum
 from .prepare import Settled
 from .shot import Shot
 
@@ -199,7 +199,7 @@ def _one_light(
     chosen = np.unique(np.linspace(0, count - 1, min(count, MOST_WAVELENGTHS)).round().astype(int))
     found = gather(lens, shot, tables, [int(w) for w in chosen], points, pool)
     light = _at_all(shot.packed.wavelengths_nm, chosen, found).reshape(count, *place.shape[:2])
-    rgb = shot.weights(shot.packed.wavelengths_nm, direct_bend(shot, lens))
+    rgb = shot.weights(shot.packed.wavelengths_nm, direct_spectrum(shot, lens))
     level = light.mean(axis=0)
     brightest = float(level.max())
     if brightest <= 0.0:

@@ -16,14 +16,14 @@ from ..model.grating import SensorGrating
 from ..model.light import Spectrum
 from ..optics.border import closed
 from ..optics.bundle import Incidence, incidence, least_distance
-from ..optics.coating_curves import CURVE_NM, CoatingCurves, coating_curves
+from ..optics.coating_curves import CURVE_NM, BandCurves, PathSpectrum, band_curves, coating_curves
 from ..optics.diffraction import Soil
 from ..optics.dirt import lay_elements, rasterise
 from ..optics.iris import blade_edges, outline, transmission
 from ..optics.mask_levels import MaskLevels, mask_levels
 from ..optics.pack import PackedLens, facing, pack_lens, resolve_coatings
 from ..optics.source import parts
-from ..optics.spectrum import band_parts, band_weights, traced_wavelengths
+from ..optics.spectrum import at_its_lines, band_parts, band_weights, hats, sampled_wavelengths, traced_wavelengths
 from .prepare import Settled
 
 if TYPE_CHECKING:
@@ -101,8 +101,9 @@ class Shot:
         point.
     grating : SensorGrating or None
         What the sensor's pixels make of the light that it reflects.
-    curves : CoatingCurves or None
-        What coatings do between the traced wavelengths; None where straight lines tell that.
+    curves : BandCurves or None
+        What coatings do between the traced wavelengths, whose rays carry the means over bands; None where rays carry
+        the reflectances at the traced wavelengths, and colours between them are straight.
     """
 
     light: Light
@@ -117,7 +118,7 @@ class Shot:
     share: float = 1.0
     border: Floats | None = None
     grating: SensorGrating | None = None
-    curves: CoatingCurves | None = None
+    curves: BandCurves | None = None
 
     @property
     def gain(self) -> float:
@@ -130,17 +131,37 @@ class Shot:
         half_width = 0.5 * self.size_px[0] / self.to_pixels[2]
         return float(np.hypot(half_width, 0.5 * self.size_px[1] / self.to_pixels[3]))
 
-    def weights(self, wavelengths_nm: Floats, bend: Floats | None = None) -> Floats:
+    def weights(self, wavelengths_nm: Floats, spectrum: PathSpectrum | None = None) -> Floats:
         """Return the RGB weights of wavelengths for this light, shape (N, 3), or (P, N, 3) for P paths.
 
-        `bend`, shape (L,) or (P, L), multiplies the spectrum (`render.path_color`).
+        Parameters
+        ----------
+        wavelengths_nm : ndarray, shape (N,)
+            The traced ones, and any between them where what rays carry is interpolated.
+        spectrum : PathSpectrum, optional
+            What the path lets pass; None: what is straight between the wavelengths.
+
+        Returns
+        -------
+        ndarray
+            For each wavelength the colour of its band's light that passes, over what rays carry there.
         """
         look = self.light.spectrum, tuple(wavelengths_nm), self.colorspace
-        if bend is None:
+        if spectrum is None:
             return _weights(*look)
+        carried = carried_at(self, spectrum, wavelengths_nm)
         # not `tensordot`: its library's threads wait busily beside ours
-        weights: Floats = np.einsum("...l,lwc->...wc", bend, _parts(*look))
-        return weights
+        weights: Floats = np.einsum("...l,lwc->...wc", spectrum.passed, _parts(*look))
+        return np.divide(weights, carried[..., None], out=np.zeros_like(weights), where=carried[..., None] > 0.0)
+
+
+def carried_at(shot: Shot, spectrum: PathSpectrum, wavelengths_nm: Floats) -> Floats:
+    """Interpolate what rays carry between the traced wavelengths, shape (N,) or (P, N)."""
+    traced_nm = shot.packed.wavelengths_nm
+    if len(wavelengths_nm) == len(traced_nm):
+        return spectrum.carried
+    carried: Floats = spectrum.carried @ hats(wavelengths_nm, traced_nm)
+    return carried
 
 
 def moved(shot: Shot, slope: Floats) -> Shot:
@@ -262,13 +283,16 @@ def _straight(border: Floats) -> Floats:
     return np.column_stack([normal, offset, np.zeros(len(offset))])
 
 
-def make_shots(settled: Settled, opening: Opening) -> tuple[Shot, ...]:
+def make_shots(settled: Settled, opening: Opening, *, sampled: bool = False) -> tuple[Shot, ...]:
     """Prepare every light of a project; an area light in parts.
 
     Parameters
     ----------
     settled : Settled
     opening : Opening
+    sampled : bool
+        Whether the wavelengths stand for all light by themselves (`optics.spectrum.sampled_wavelengths`), for random
+        rays.
 
     Returns
     -------
@@ -280,21 +304,31 @@ def make_shots(settled: Settled, opening: Opening) -> tuple[Shot, ...]:
     to_pixels = np.array([width / 2.0, height / 2.0, width / sensor[0], height / sensor[1]])
     coatings = resolve_coatings(settled.lens, settled.coating)
     quality = project.quality
-    bridged = quality.bridge and quality.mode != "reference" and quality.wavelengths > 1
+    bridged = quality.bridge and quality.mode != "reference"
     curves = coating_curves(settled.lens, coatings, settled.sensor) if bridged else None
-    packs: dict[tuple[float, ...], PackedLens] = {}
+    choose = sampled_wavelengths if sampled else traced_wavelengths
+    packs: dict[tuple[object, ...], tuple[PackedLens, BandCurves | None]] = {}
     shots: list[Shot] = []
     for number, light in enumerate(project.lights):
-        wavelengths_nm = traced_wavelengths(quality.wavelengths, light.spectrum)
-        key = tuple(wavelengths_nm)
+        wavelengths_nm = choose(quality.wavelengths, light.spectrum)
+        # the lines of a spectrum are traced as they are
+        banded = curves is not None and not at_its_lines(light.spectrum, wavelengths_nm)
+        traced = tuple(wavelengths_nm.tolist())
+        key = (traced, light.spectrum if banded else None)
         if key not in packs:
-            packs[key] = pack_lens(settled.lens, settled.order, coatings, wavelengths_nm, sensor=settled.sensor)
+            bands = band_curves(curves, light.spectrum, traced) if banded and curves is not None else None
+            lens = pack_lens(
+                settled.lens, settled.order, coatings, wavelengths_nm, sensor=settled.sensor,
+                in_bands=None if bands is None else bands.tables[:, : len(settled.lens.rows)],
+            )  # fmt: skip
+            packs[key] = lens, bands
+        of_light, bands = packs[key]
         whole = []
         for part in parts(light, quality.source_step_deg):
             changes = {"field_deg": part.field_deg, "intensity": light.intensity * part.share, "holdout": None}
             point = light.replace(**changes, diameter_deg=0.0, shape=None) if light.extended else light
-            seen = _seen(settled, packs[key], number, point)
-            packed = facing(packs[key], seen.axes, seen.nearness)
+            seen = _seen(settled, of_light, number, point)
+            packed = facing(of_light, seen.axes, seen.nearness)
             whole.append(
                 Shot(
                     point,
@@ -308,7 +342,7 @@ def make_shots(settled: Settled, opening: Opening) -> tuple[Shot, ...]:
                     share=part.share,
                     border=closed(part.corners) if light.extended else None,
                     grating=project.camera.sensor_grating,
-                    curves=curves if len(wavelengths_nm) > 1 else None,
+                    curves=bands,
                 )
             )
         shots += whole if project.holdout is None and light.holdout is None else _unhidden(settled, light, whole)

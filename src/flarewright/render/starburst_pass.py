@@ -16,6 +16,7 @@ from ..model import Dirt, Iris, Layer, Lines, Starburst
 from ..optics.border import mapped, points
 from ..optics.diffraction import BladeWings, Pattern, Soil, pupil_pattern
 from ..optics.paths import direct_path
+from ..optics.spectrum import VISIBLE_NM
 from .direct import PUPIL_SPAN, DirectImage, defocus_mm, traced_pupil, traced_spot
 from .few_spectra import few_spectra
 from .many_stars import Stars, draw_stars
@@ -157,7 +158,7 @@ def _many_lights(scene: _Scene, group: list[tuple[Shot, DirectImage]], threads: 
     pixels = shot.to_pixels
     places = np.array([image.position_mm for _, image in group]) * [pixels[2], -pixels[3]] + pixels[:2]
     throughputs = [lit.light.intensity * image.throughput_mm2 for lit, image in group]
-    flux = direct_flux(shot, scene.settled.lens, throughputs, fine_nm)
+    flux = direct_flux([lit for lit, _ in group], scene.settled.lens, throughputs, fine_nm)
     colors = np.array([lit.weights(fine_nm) for lit, _ in group]) * flux[:, :, None]
     chosen, gains, fits = few_spectra(colors, max(1, len(group) // FEW_SPECTRA))
     f_number = scene.settled.order.f_number * scene.look.size
@@ -187,7 +188,7 @@ def _one_light(
     shot, image = max(parts, key=lambda pair: _flux(*pair))
     fine_nm = _diffracted_wavelengths(shot)
     throughput: Floats = np.sum([part.light.intensity * found.throughput_mm2 for part, found in parts], axis=0)
-    flux = direct_flux(shot, scene.settled.lens, [throughput], fine_nm)[0] * scene.look.intensity
+    flux = direct_flux([shot], scene.settled.lens, [throughput], fine_nm)[0] * scene.look.intensity
     if not flux.any():
         return None
     pixel = (1.0 / float(shot.to_pixels[2]), 1.0 / float(shot.to_pixels[3]))
@@ -307,4 +308,4 @@ def _diffracted_wavelengths(shot: Shot) -> Floats:
     """Return steps of 5 nm over the visible range, or the lines of a spectrum of lines."""
     if isinstance(shot.light.spectrum, Lines):
         return np.array(sorted({nm for nm, _ in shot.light.spectrum.lines}))
-    return np.arange(380.0, 781.0, DIFFRACTION_STEP_NM)
+    return np.arange(VISIBLE_NM[0], VISIBLE_NM[1] + 1.0, DIFFRACTION_STEP_NM)

@@ -61,6 +61,7 @@ def _bared(shot: Shot, grey: bool, unclipped: bool) -> Shot:
     packed = shot.packed
     if grey:
         packed = replace(packed, reflectance=np.full_like(packed.reflectance, GREY_R))
+        shot = replace(shot, curves=None)
     if unclipped:
         semi = packed.semi.copy()
         semi[packed.first_surface] = NO_RIM
