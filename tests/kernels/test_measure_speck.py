@@ -43,7 +43,7 @@ def test_what_goes_back_is_the_transpose():
 
 def test_squares_are_those_of_the_matrix_where_no_cell_comes_twice():
     cells, weights, before, part, sure = planted()
-    cells = np.argsort(np.random.default_rng(6).random((PIXELS, CELLS)), axis=1)[:, :TAPS]
+    cells = np.argsort(np.random.default_rng(6).random((PIXELS, CELLS)), axis=1)[:, :TAPS].copy()
     out = np.zeros((PICTURES, CELLS))
     square_cells(cells, weights, before, part, sure, out)
     assert np.allclose(out, (matrix(cells, weights, before, part, sure) ** 2).sum(axis=0), rtol=1e-12)

@@ -176,6 +176,8 @@ def draw_sprites(
 def samples(cells: Pixels, column: NDArray[np.float64], row: NDArray[np.float64]) -> Pixels:
     """Return a picture's light between its cells' middles, shape (N, 3); see `cubic_samples`."""
     out = np.empty((column.size, 3))
+    # each other layout in memory would be another kernel to compile
+    column, row = np.ascontiguousarray(column), np.ascontiguousarray(row)
     cubic_samples(np.ascontiguousarray(cells, dtype=np.float32), column, row, out)
     return out.astype(np.float32)
 

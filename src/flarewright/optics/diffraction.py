@@ -301,7 +301,9 @@ def _power(amplitude: Floats, reach: int) -> Floats:
     The two one-dimensional passes skip the rows of zeros and the columns beyond the core. They run in single precision
     (where NumPy has it): amplitudes err by 1e-7 of the centre's, and those at the border of the core are 1e-4 of it.
     """
-    half = np.fft.rfft(amplitude.astype(np.float32), n=FFT_SIZE, axis=1)[:, : reach + 1]
+    lit = amplitude.any(axis=1)
+    half = np.zeros((len(amplitude), reach + 1), dtype=np.complex64)
+    half[lit] = np.fft.rfft(amplitude[lit].astype(np.float32), n=FFT_SIZE, axis=1)[:, : reach + 1]
     P = np.empty((2 * reach + 1, 2 * reach + 1))
     block = 64  # columns at a time, to keep the padded transform in the cache
     for k in range(0, reach + 1, block):
@@ -313,17 +315,20 @@ def _power(amplitude: Floats, reach: int) -> Floats:
 
 
 def _undo_softening(P: Floats, y: Floats, x: Floats, spacing: float) -> None:
-    """Divide a pattern at frequencies (x, y) by sinc^4(spacing |s|), in place.
+    """Divide a pattern at frequencies (x, y) by sinc^4(spacing |s|), in place; y is symmetric about its middle.
 
     ln sinc u = -t - t^2 / 5 - 8 t^3 / 105 - ..., t = (pi u)^2 / 6; the first term is a product of the two axes, and the
     rest is a polynomial: exact to 1e-6 for u below 0.25.
     """
     t_y, t_x = (math.pi * spacing * y) ** 2 / 6.0, (math.pi * spacing * x) ** 2 / 6.0
     grow_y, grow_x = np.exp(4.0 * t_y), np.exp(4.0 * t_x)
-    for row, (t, grow) in enumerate(zip(t_y, grow_y, strict=True)):
-        both = t + t_x
+    for row in range((len(y) + 1) // 2):
+        both = t_y[row] + t_x
         rest = both * both * (0.8 + both * (32.0 / 105.0 + both * (24.0 / 175.0)))
-        P[row] *= (grow * grow_x) * (1.0 + rest * (1.0 + rest * (0.5 + rest / 6.0)))
+        factor = (grow_y[row] * grow_x) * (1.0 + rest * (1.0 + rest * (0.5 + rest / 6.0)))
+        P[row] *= factor
+        if row < len(y) // 2:
+            P[-1 - row] *= factor
 
 
 def _wings(iris: Iris, turn: float) -> FanWings | BladeWings:
