@@ -76,6 +76,7 @@ def ray_source(
     followed: tuple[float, float] = (FOLLOWED, FOLLOWED),
     scatter: ScatterTables | None = None,
     drawn: bool = True,
+    chances: Chances | None = None,
 ) -> RaySource:
     """Prepare a light for random rays.
 
@@ -95,6 +96,8 @@ def ray_source(
         What surfaces scatter of the direct light; None: nothing.
     drawn : bool
         Whether the picture takes its ghosts; they may be met from the camera instead.
+    chances : Chances, optional
+        Of this shot or of one that differs in place and intensity only.
 
     Returns
     -------
@@ -110,7 +113,7 @@ def ray_source(
     before = (
         packed.curvature, form, packed.z_vertex, packed.inv_semi, packed.n_gap, packed.reflectance,
         packed.sensor_z, (int(np.flatnonzero(packed.inv_semi == 0.0)[0]), packed.first_surface), direction, axes, box,
-        side, *spectrum_of(shot, shot.gain, seed, followed),
+        side, *spectrum_of(shot, shot.gain, seed, followed, chances),
     )  # fmt: skip
     opening = shot.opening
     behind = (light, opening.blades, opening.mask, opening.half, shot.to_pixels, shot.size_px)
@@ -122,8 +125,44 @@ def _most_bred(followed: tuple[float, float]) -> Floats:
     return np.array([max(2.0 * followed[0], MOST_BRED), MOST_BRED])
 
 
+@dataclass(frozen=True)
+class Chances:
+    """How often random rays are of each wavelength and what that makes of their colours, wherever their light stands.
+
+    Attributes
+    ----------
+    cumulative : ndarray, shape (W,)
+    rgb : ndarray, shape (W, 3)
+    over : ndarray, shape (W, 1)
+        1 over the chance; 0 where there is none.
+    luminance : ndarray, shape (3,)
+    reflected : float
+        R of the whole lens at normal incidence.
+    """
+
+    cumulative: Floats
+    rgb: Floats
+    over: Floats
+    luminance: Floats
+    reflected: float
+
+
+def chances_of(shot: Shot) -> Chances:
+    """Choose wavelengths for a shot's light: a sample is drawn as often as it colours the picture."""
+    rgb = shot.weights(shot.packed.wavelengths_nm)
+    chance = np.abs(rgb).sum(axis=1)
+    chance /= chance.sum()
+    over = np.divide(1.0, chance, out=np.zeros_like(chance), where=chance > 0.0)[:, None]
+    total = float(shot.packed.reflectance[len(rgb) // 2, :, -1].sum())
+    return Chances(np.cumsum(chance), rgb, over, luminance_weights(shot.colorspace), total)
+
+
 def spectrum_of(
-    shot: Shot, gain: float, seed: int, followed: tuple[float, float] = (FOLLOWED, FOLLOWED)
+    shot: Shot,
+    gain: float,
+    seed: int,
+    followed: tuple[float, float] = (FOLLOWED, FOLLOWED),
+    chances: Chances | None = None,
 ) -> tuple[Any, ...]:
     """Return what random rays take of wavelengths and chance, from `cumulative` to `key` of `trace_batch`.
 
@@ -134,22 +173,19 @@ def spectrum_of(
         Of a light of irradiance or radiance 1.
     seed : int
     followed : tuple of float
+    chances : Chances, optional
         As in `ray_source`.
 
     Returns
     -------
     tuple
     """
-    packed, rgb = shot.packed, shot.weights(shot.packed.wavelengths_nm)
-    # a sample is drawn as often as it colours the picture
-    chance = np.abs(rgb).sum(axis=1)
-    chance /= chance.sum()
-    over = np.divide(1.0, chance, out=np.zeros_like(chance), where=chance > 0.0)[:, None] * gain
-    # R of the whole lens at normal incidence decides how many reflections of high order are worth following
-    total = float(packed.reflectance[len(rgb) // 2, :, -1].sum())
+    known = chances_of(shot) if chances is None else chances
+    colors = known.over * gain * known.rgb
+    # R of the whole lens decides how many reflections of high order are worth following
     return (
-        np.cumsum(chance), (over * rgb) @ luminance_weights(shot.colorspace), over * rgb,
-        min(HEROES, len(rgb)), np.concatenate([np.array(followed) / max(total, 1e-9), _most_bred(followed)]),
+        known.cumulative, colors @ known.luminance, colors, min(HEROES, len(colors)),
+        np.concatenate([np.array(followed) / max(known.reflected, 1e-9), _most_bred(followed)]),
         np.array([seed & 0xFFFFFFFF, seed >> 32], dtype=np.uint64),
     )  # fmt: skip
 
@@ -167,6 +203,7 @@ def _aimed(source: RaySource, batch: int) -> Iterator[RaySource]:
     here = np.tan(np.radians(shot.light.field_deg))
     aims = AIMS if source.side % AIMS == 0 else 1
     mean = content(shot.border) / solid_angle(mapped(shot.border, np.eye(2), here))
+    chances = chances_of(shot)
     for k, offset in enumerate(_points_within(shot.border, aims * aims, rng)):
         # even radiance: by solid angle
         share = mean / (1.0 + (here + offset) @ (here + offset)) ** 1.5 / aims**2
@@ -182,6 +219,7 @@ def _aimed(source: RaySource, batch: int) -> Iterator[RaySource]:
             followed=source.followed,
             scatter=source.scatter,
             drawn=source.drawn,
+            chances=chances,
         )
 
 
