@@ -120,8 +120,9 @@ def test_both_ways_agree(name, rays, monkeypatch):
         assert np.sqrt(sums.variance("orders")[1]) < 0.05 * sums.mean("orders")[1]
 
 
-def test_the_corners_of_a_wide_picture_are_as_dark_from_both():
+def test_the_corners_of_a_wide_picture_are_as_dark_from_both(monkeypatch):
     """Light from all sides on a sensor so large that cos^4 takes a third of it: an even light's own law."""
+    monkeypatch.setattr(montecarlo, "AIMS", 4)
     lamp = light((0.0, 0.0), shape=Rectangle(size_deg=(70.0, 50.0)))
     shots = shots_of(project(lamp, camera={"sensor_mm": (150.0, 100.0)}))
     one, other = from_light(shots, side=32), from_camera(shots, count=2048)
@@ -131,7 +132,8 @@ def test_the_corners_of_a_wide_picture_are_as_dark_from_both():
         assert np.sqrt(sums.variance("orders")[0]) < 0.02 * sums.mean("orders")[0]
 
 
-def test_what_is_hidden_is_hidden_from_both(tmp_path):
+def test_what_is_hidden_is_hidden_from_both(tmp_path, monkeypatch):
+    monkeypatch.setattr(montecarlo, "AIMS", 4)
     grey = np.tile(np.linspace(0.0, 255.0, SIZE[0]).astype(np.uint8), (SIZE[1], 1))
     grey[20:28] = 0
     Image.fromarray(grey).save(tmp_path / "m.png")
@@ -195,6 +197,8 @@ def test_small_lights_are_traced_from_the_light_and_wide_ones_from_the_camera(mo
 def test_a_picture_made_from_the_camera(side, batches, resumed, tmp_path, monkeypatch):
     """The same light with a point beside it; resumed bit for bit, on any number of threads; ledger of both."""
     monkeypatch.setattr(reference, "SIDE", side)
+    if side < 128:
+        monkeypatch.setattr(montecarlo, "AIMS", 4)
     lights = (light(diameter_deg=8.0), light((-3.0, 2.0), intensity=0.2))
     limits = {"mode": "reference", "reference_samples": batches * side**2}
     made = {

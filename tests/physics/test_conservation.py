@@ -127,7 +127,7 @@ def test_turning_the_light_turns_the_ghosts(azimuth_deg, f_number):
 
 def test_a_lens_of_twice_the_size():
     """Four times the area, twice the distances; bare glass knows no wavelength."""
-    one = lens(TRIPLET, 5.0)
+    one = lens(TRIPLET, 8.0)
     a = carrying(ghosts.ghost_table(one, FIELD))
     b = by_path(ghosts.ghost_table(scaled(one, 2.0), FIELD))
     for path, g in a.items():

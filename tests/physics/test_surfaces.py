@@ -8,12 +8,16 @@ import numpy as np
 import pytest
 from prescriptions import HELIAR, TESSAR, TRIPLET, lens
 
+from flarewright.kernels import shapes
+from flarewright.kernels._jit import for_python
 from flarewright.model import Dispersion, Element, Figure, Lens, Medium, Stop, Surface
 from flarewright.optics.ghosts import ghost_table
 from flarewright.optics.pack import pack_lens
 from flarewright.optics.paraxial import D_LINE_NM, first_order
 from flarewright.optics.paths import direct_path, ghost_path
 from flarewright.optics.trace import trace_rays
+
+cross_shape = for_python(shapes.cross_shape)
 
 FIELDS = [(0.0, 0.0), (7.0, -3.0), (-12.0, 9.0)]
 INDEX = 1.6
@@ -127,11 +131,6 @@ def test_a_paraboloid_sends_light_of_its_axis_through_its_focus():
     packed = pack_lens(a_lens, first_order(a_lens, sensor_distance=5.0), (None,) * 3, np.array([D_LINE_NM]))
     x, y = np.random.default_rng(8).uniform(-9.0, 9.0, (2, 80))
     # inside the glass, traced by hand: the ghost's leg between the mirrors points at the focus
-    from flarewright.kernels._jit import for_python
-    from flarewright.kernels.shapes import cross_shape as kernel
-
-    cross_shape = for_python(kernel)
-
     for u, v in zip(x, y, strict=True):
         at = cross_shape(packed.shapes, 2, d, u, v, 0.0, 0.0, 0.0, 1.0, 1.0, INDEX, 1.0)
         hit, way = np.array(at[:3]), np.array(at[3:6])
@@ -283,13 +282,10 @@ def test_a_whole_lens_moved_as_one_element_sees_the_light_from_where_it_stands()
 @pytest.mark.parametrize("kind", [{}, {"figure": Figure()}], ids=["conic", "by its sag"])
 def test_the_rim_of_a_decentred_surface_is_around_its_own_axis(kind):
     """A ray beside the lens' axis meets the surface so far from the surface's vertex as it lies from there."""
-    from flarewright.kernels._jit import for_python
-    from flarewright.kernels.shapes import cross_shape
-
     a_lens = changed(lens(TESSAR, 5.0), 0, decentre=(3.0, -2.0), **kind)
     packed = pack_lens(a_lens, first_order(a_lens), (None,) * len(a_lens.rows), np.array([D_LINE_NM]))
-    cross, eta = for_python(cross_shape), 1.0 / packed.n_gap[0, 1]
+    eta = 1.0 / packed.n_gap[0, 1]
     for x, y in ((3.0, -2.0), (7.0, -2.0), (0.0, 2.0), (0.0, 0.0)):
-        met = cross(packed.shapes, 0, packed.z_vertex[0], x, y, -20.0, 0.0, 0.0, 1.0, 1.0, eta, 0.0)
+        met = cross_shape(packed.shapes, 0, packed.z_vertex[0], x, y, -20.0, 0.0, 0.0, 1.0, 1.0, eta, 0.0)
         assert met[:2] == pytest.approx((x, y), abs=1e-12)
         assert met[6] == pytest.approx((x - 3.0) ** 2 + (y + 2.0) ** 2, abs=1e-9)

@@ -96,6 +96,10 @@ def count(shot: Shot, path: LightPath, iris: Iris, *, w: int = 0, n: int = 240) 
         points, data = points[alive], data[alive]
         halves = []
         for mirror in (1.0, -1.0):
+            if halves and iris.blades == 0:
+                # a round opening is its own mirror image
+                halves.append(halves[0])
+                break
             passing = np.ones(len(data), dtype=bool)
             for c in range(path.stop_crossings):
                 x, y = _turned(mirror * data[:, 5 + 2 * c], data[:, 6 + 2 * c], shot.incidence.axes)

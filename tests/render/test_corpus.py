@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +20,7 @@ FILES = sorted(FOLDER.glob("**/*.lens"))
 pytestmark = pytest.mark.skipif(not FILES, reason=f"no lens corpus at {FOLDER}; set FLAREWRIGHT_CORPUS to its folder")
 
 
+@cache
 def verdict(path: Path):
     """Return the lens, or the reason for which the file is refused."""
     try:
@@ -36,12 +38,12 @@ def imported(path: Path):
     return a_lens
 
 
-def picture(a_lens, field, **quality) -> dict:
+def picture(a_lens, *fields, **quality) -> dict:
     project = Project(
         lens=a_lens,
         # the starburst of a round opening is the cheapest one
         iris=Iris(),
-        lights=(Light(field_deg=field),),
+        lights=tuple(Light(field_deg=field) for field in fields),
         camera=Camera(size_px=(64, 36)),
         quality=Quality(**quality),
         output=Output(layers="passes"),
@@ -61,11 +63,12 @@ def test_the_corpus_is_whole():
 def test_what_is_imported_renders(path):
     """Draft quality, three angles: finite everywhere, and light where light must be."""
     a_lens = imported(path)
-    for field in ((0.0, 0.0), (8.0, 5.0), (-17.0, 3.0)):
-        layers = picture(a_lens, field, mode="draft", wavelengths=3)
+    # what is not finite stays so in a sum
+    for fields in (((0.0, 0.0),), ((8.0, 5.0), (-17.0, 3.0))):
+        layers = picture(a_lens, *fields, mode="draft", wavelengths=3)
         for name, pixels in layers.items():
-            assert np.isfinite(pixels).all(), (name, field)
-        if field == (0.0, 0.0):
+            assert np.isfinite(pixels).all(), (name, fields)
+        if fields == ((0.0, 0.0),):
             # white light: the direct image is there, and its luminance positive
             assert layers["starburst"].max() > 0.0
             assert layers["ghosts"].sum() > 0.0

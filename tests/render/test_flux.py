@@ -571,6 +571,7 @@ def test_an_iris_image_that_is_not_square_is_told(tmp_path):
             iris=Iris(mask=str(tmp_path / "iris.png")),
             camera={"size_px": (48, 27)},
             quality={"mode": "draft"},
+            output=Output(starburst=False),
         )
         told.append([remark for remark in render(made).remarks if "stretched" in remark])
     assert told[0] == []

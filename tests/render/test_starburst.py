@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from functools import lru_cache
 
 import numpy as np
 import pytest
@@ -29,15 +28,9 @@ SHAPES = [
 ]
 
 
-@lru_cache(maxsize=12)
-def pattern_of(iris):
-    """Return the pattern that `starburst_layer` makes of an iris: a transform of 4096 samples, made once."""
-    return pupil_pattern(iris)
-
-
 def layer(iris, f_number=16.0, pitch=0.028, size=(200, 160), centre=None, wave=WHITE_NM, weights=WHITE, mask=None):
     centre = centre or (size[0] / 2 + 0.3, size[1] / 2 - 0.2)
-    pattern = pattern_of(iris) if mask is None else None
+    pattern = pupil_pattern(iris) if mask is None else None
     return starburst_layer(iris, f_number, (pitch, pitch), size, centre, wave, weights, mask=mask, pattern=pattern)
 
 
@@ -156,7 +149,7 @@ def test_core_is_the_exact_polygon(iris):
 
 def test_blade_wings_are_the_exact_polygon_without_its_fringes():
     iris = Iris(blades=6, rotation_deg=13)
-    wings = pattern_of(iris).wings
+    wings = pupil_pattern(iris).wings
     assert isinstance(wings, BladeWings)
     edges = blade_edges(iris, 1.0)
     rng = np.random.default_rng(5)
@@ -206,7 +199,7 @@ def test_a_draft_errs_near_the_centre_only(f_number, iris):
     size, centre = (320, 180), (160.3, 89.8)
     final = layer(iris, f_number, size=size, centre=centre, weights=GREY)
     draft = starburst_layer(
-        iris, f_number, (0.028, 0.028), size, centre, WHITE_NM, GREY, pattern=pattern_of(iris), split=1
+        iris, f_number, (0.028, 0.028), size, centre, WHITE_NM, GREY, pattern=pupil_pattern(iris), split=1
     )
     assert np.abs(draft - final).max() < 5e-6 * final.max()
     assert draft.sum(dtype=float) == pytest.approx(final.sum(dtype=float), rel=3e-5)
@@ -261,7 +254,7 @@ def test_a_curved_blade_spreads_its_spike_into_a_fan_of_the_same_flux(roundings)
         E = layer(iris, N, 0.028, size, centre, weights=GREY)[..., 0]
         flux[rounding] = E[ring].sum(dtype=float) / perimeter
         if 0 < rounding < 1:
-            wings = pattern_of(iris).wings
+            wings = pupil_pattern(iris).wings
             assert isinstance(wings, BladeWings)
             assert wings.length * 5 == pytest.approx(perimeter, rel=1e-5)
     for value in flux.values():

@@ -19,6 +19,8 @@ class Frozen(BaseModel):  # noqa: PLW1641
         What a record keeps beside its fields, such as an array that was read from one of them, does not count: pydantic
         compares it first, and of arrays it cannot be told whether they are equal.
         """
+        if self is other:
+            return True
         if type(self) is not type(other):
             return NotImplemented
         return all(getattr(self, name) == getattr(other, name) for name in type(self).model_fields)
