@@ -26,6 +26,8 @@ from flarewright.model.design import Bounds
 from flarewright.optics.paraxial import first_order
 from flarewright.render.prepare import load_lens
 
+values_of, row_of = for_python(edges.edge_values), for_python(edges.edge_row)
+
 
 def constrained(**bounds):
     problem, structure, vector = planted()
@@ -61,7 +63,6 @@ def test_edges_change_as_their_derivatives_say(entrance):
     rows, limits = structure.rows, np.array([2.5, 0.02])
     random = np.random.default_rng(1)
     work, beam, partial = np.empty((WORK_ROWS, rows)), np.empty(rows + 2), np.zeros((4, rows))
-    values_of, row_of = for_python(edges.edge_values), for_python(edges.edge_row)
     met = 0
     for _ in range(12):
         q = vector * (1.0 + 0.2 * random.normal(size=len(vector)))

@@ -21,6 +21,8 @@ from flarewright.kernels._jit import for_python
 from flarewright.kernels.design_ghosts import BOUND, PLACE, RADIUS, REACH_THESIS
 from flarewright.model import Design, GhostWish, Light, Project
 
+compare = for_python(kernel.compare)
+
 HALF = 20.0
 SPANS = np.array([0, 5])
 TARGETS = np.array([[-9.0, 3.0, 0.0], [0.5, -1.2, 0.0], [4.0, 6.0, 0.0], [17.0, 9.0, 0.0], [11.0, 0.7, 0.0]])
@@ -61,7 +63,6 @@ def test_derivatives_are_those_of_differences(blades):
     random = np.random.default_rng(3)
     shapes = np.array([0.0, 1.0, 0.0, kernel.ROUND, 0.0]) if blades else np.full(5, kernel.ROUND)
     places, sizes = TARGETS[:, 0] + random.normal(size=5), np.abs(TARGETS[:, 1]) * random.uniform(0.7, 1.3, 5)
-    compare = for_python(kernel.compare)
     columns = picture.wanted.shape[2]
 
     def error(places, sizes):

@@ -12,6 +12,8 @@ from flarewright.kernels.measure_mesh import window_of
 from flarewright.kernels.measure_pupil import FIRST_DISC, FIRST_G, SOFT
 from flarewright.kernels.measure_soft import reach_of, taps_of
 
+reach_to, fill_taps = for_python(reach_of), for_python(taps_of)
+
 
 def soft_ghost(variance: float, discs: int = 1) -> np.ndarray:
     numbers = ghost(discs)
@@ -21,7 +23,7 @@ def soft_ghost(variance: float, discs: int = 1) -> np.ndarray:
 
 def blurred(picture: np.ndarray, variance: float) -> np.ndarray:
     """Return a picture spread along both axes, going on as it is at its border."""
-    reach = for_python(reach_of)(variance)
+    reach = reach_to(variance)
     taps = ive(np.abs(np.arange(-reach, reach + 1)), variance)
     taps /= taps.sum()
     for axis in (0, 1):
@@ -33,9 +35,9 @@ def blurred(picture: np.ndarray, variance: float) -> np.ndarray:
 
 @pytest.mark.parametrize("variance", [1e-6, 0.03, 0.7, 5.0, 60.0])
 def test_taps_are_the_discrete_gaussian(variance):
-    reach = for_python(reach_of)(variance)
+    reach = reach_to(variance)
     taps = np.empty(reach + 1)
-    for_python(taps_of)(variance, taps)
+    fill_taps(variance, taps)
     expected = ive(np.arange(reach + 1), variance)
     assert np.allclose(taps, expected, rtol=2e-3, atol=2e-4)
     n = np.arange(1, reach + 1)

@@ -151,6 +151,9 @@ def test_the_judge_agrees(name, thorough, monkeypatch):
             wanted, sensor = 8e-3, (120.0, 90.0)
     camera = Camera(size_px=(64, 48), sensor_mm=sensor, **parts.pop("mirror", {}))
     quality = Quality(wavelengths=waves, bridge=False, reference_error=wanted, reference_error_of="total")
+    if not thorough:
+        # random rays have no rings, and what these do to flux `test_ringing.py` judges
+        quality = quality.replace(ringing="off")
     project = Project(
         **parts, lights=(Light(field_deg=(6.0, 3.0)),), f_number=5.6, camera=camera, quality=quality,
         output=Output(layers="passes", starburst=False),
