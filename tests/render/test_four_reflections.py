@@ -116,8 +116,8 @@ def test_a_light_that_brings_no_ghosts():
 
 def test_two_lights_are_one_and_the_other(plain):
     lights = (mono((8.0, 5.0)), mono((-3.0, 4.0)))
-    alone = [by_name(render(project(light=light, limit=1e-4)))["ghosts.order4"] for light in lights]
-    both = project(limit=1e-4).replace(lights=lights)
+    alone = [by_name(render(project(light=light, limit=3e-4)))["ghosts.order4"] for light in lights]
+    both = project(limit=3e-4).replace(lights=lights)
     together = by_name(render(both))["ghosts.order4"]
     # a path bright by one light is drawn by both
     np.testing.assert_allclose(

@@ -218,7 +218,8 @@ def test_a_far_near_light_is_a_distant_one(rough_standard, few_points):
 
 
 def test_lights_add(rough_standard, few_points):
-    lights = (Light(field_deg=(8.0, 4.0), spectrum=GREEN), Light(field_deg=(-5.0, 0.0), intensity=0.3))
+    red = Lines(lines=((620.0, 1.0),))
+    lights = (*project().lights, Light(field_deg=(-5.0, 0.0), intensity=0.3, spectrum=red))
     both = drawn(project(lights=lights))[0]
     alone = rough_standard + drawn(project(lights=lights[1:]))[0]
     np.testing.assert_allclose(both, alone, rtol=1e-5, atol=1e-12)
