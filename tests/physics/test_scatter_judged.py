@@ -69,7 +69,7 @@ def blocks(pixels):
 @pytest.mark.parametrize(
     ("lens", "f_number", "field", "model", "density", "rays"),
     [
-        ("heliar-tronnier", 5.6, (8.0, 4.0), "harvey-shack", polish, 2_500),
+        ("heliar-tronnier", 5.6, (8.0, 4.0), "harvey-shack", polish, 4_000),
         pytest.param("heliar-tronnier", 5.6, (8.0, 4.0), "harvey-shack", polish, MANY, marks=pytest.mark.slow),
         pytest.param("double-gauss-tronnier", None, (-10.0, 5.0), "harvey-shack", polish, MANY, marks=pytest.mark.slow),
         pytest.param("heliar-tronnier", 5.6, (8.0, 4.0), "chaumond", page, MANY, marks=pytest.mark.slow),
