@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from functools import cache
+from itertools import count
 from pathlib import Path
 
 import numpy as np
@@ -51,16 +53,31 @@ SMALL_GHOSTS = tuple(enlarged(one, 0.5) for one in GHOSTS)
 SMALL_ANGLES = np.linspace(2.0, LARGEST, 5)
 
 
+@cache
+def _grain(seed: int, shape: tuple[int, ...]) -> tuple[Iterator[np.ndarray], list[np.ndarray]]:
+    """Return pictures of noise of 1, one after the other, and those that were drawn so far."""
+    rng = np.random.default_rng(seed)
+    return (rng.standard_normal(shape) for _ in count()), []
+
+
+def _noise(seed: int, number: int, shape: tuple[int, ...]) -> np.ndarray:
+    """Return the noise of one picture: all runs of a seed and a size have the same, drawn once."""
+    fresh, drawn = _grain(seed, shape)
+    while len(drawn) <= number:
+        drawn.append(next(fresh))
+    return drawn[number]
+
+
 def views(ghosts=GHOSTS, *, angles=None, roll_deg=0.0, noise=NOISE, seed=0, size=SIZE) -> list[View]:
     """Return noisy views of ghosts; all three colours alike."""
-    rng = np.random.default_rng(seed)
-    out = []
+    out: list[View] = []
     for angle in np.linspace(1.0, LARGEST, 24) if angles is None else angles:
         placed = frame((0.5 * size[0] + 2.3, 0.5 * size[1] - 1.6), roll_deg, angle, 1.0)
         blank = np.zeros((size[1], size[0], 3), np.float32)
         view = View(float(angle), abs(field(angle, LARGEST)), placed, (1e4, 0.0), blank, np.full_like(blank, noise**2))
         total = sum((render(ghost, view) for ghost in ghosts), np.zeros((size[1], size[0])))
-        out.append(view.showing((total[..., None] + rng.normal(0.0, noise, blank.shape)).astype(np.float32)))
+        shown = total[..., None] + noise * _noise(seed, len(out), blank.shape)
+        out.append(view.showing(shown.astype(np.float32)))
     return out
 
 

@@ -161,21 +161,20 @@ def candidates(
                              np.arange(width, 2.6 * width, 2.0 * fine)])  # fmt: skip
     sizes = np.concatenate([np.arange(0.006, 0.06, 0.0028), np.geomspace(0.06, 0.45, 40)]) * width
     scores, runs = searched(slopes, speeds, sizes, rims, sign=sign, pool=pool)
+    # what is left, best first
+    places = np.argsort(scores, axis=None)[::-1]
+    s, r = np.unravel_index(places[: np.count_nonzero(scores > 0.0)], scores.shape)
     best: list[Candidate] = []
-    for place in np.argsort(scores, axis=None)[::-1]:
-        s, r = np.unravel_index(place, scores.shape)
-        if scores[s, r] <= 0.0 or len(best) == most:
-            break
-        speed, radius = float(speeds[s]), float(sizes[r])
-        first, last = int(runs[s, r, 0]), int(runs[s, r, 1])
-        reach = 0.3 * radius + 3.0 * fine
-        if any(
-            abs(speed - other.speed) < reach + 0.3 * other.radius and abs(radius - other.radius) < 0.5 * reach + fine
-            and not (last < other.first or first > other.last)
-            for other in best
-        ):  # fmt: skip
-            continue
-        best.append(Candidate(speed, radius, first, last, float(scores[s, r]), kinds[int(runs[s, r, 2])]))
+    while s.size and len(best) < most:
+        found, speed, radius = runs[s[0], r[0]], float(speeds[s[0]]), float(sizes[r[0]])
+        first, last, kind = (int(each) for each in found)
+        best.append(Candidate(speed, radius, first, last, float(scores[s[0], r[0]]), kinds[kind]))
+        reach = 0.3 * sizes[r] + 3.0 * fine
+        near = (np.abs(speeds[s] - speed) < reach + 0.3 * radius) & (np.abs(sizes[r] - radius) < 0.5 * reach + fine)
+        close = near & (runs[s, r, 1] >= first) & (runs[s, r, 0] <= last)
+        # a better one is close to itself
+        close[0] = True
+        s, r = s[~close], r[~close]
     return best
 
 

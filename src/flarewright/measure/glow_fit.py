@@ -331,20 +331,24 @@ def _strengths(basis: Floats, seen: Floats, variance: Floats) -> Floats:
     scale = basis.max(axis=0, initial=0.0)
     # what noise hides at its full strength tells none: beyond the picture's border it may be next to nothing
     free = scale > _SEEN * np.sqrt(np.median(variance)) if variance.size else scale < 0.0
+    if not free.any():
+        return np.zeros(scale.size)
     parts = np.where(free, 1.0, 0.0) * (np.arange(scale.size) < 2)
+    whole = basis[:, free] / scale[free]
     for _ in range(_ROUNDS):
         model = basis @ parts
         # equal parts of the light count alike
         spread = np.sqrt(variance + (_GLOW_ERROR * np.maximum(model, seen)) ** 2)
         weight = 1.0 / (spread**2 * (1.0 + ((seen - model) / (2.0 * spread)) ** 2))
-        picked = free.copy()
+        picked, part = free.copy(), whole
         while picked.any():
-            part = basis[:, picked] / scale[picked]
-            solved = np.linalg.lstsq((part.T * weight) @ part, (part.T * weight) @ seen, rcond=1e-9)[0] / scale[picked]
+            weighed = part.T * weight
+            solved = np.linalg.lstsq(weighed @ part, weighed @ seen, rcond=1e-9)[0] / scale[picked]
             if (solved >= 0.0).all():
                 break
             # what would take light away is left out
             picked[np.flatnonzero(picked)[int(np.argmin(solved * scale[picked]))]] = False
+            part = basis[:, picked] / scale[picked]
         parts = np.zeros(scale.size)
         if picked.any():
             parts[picked] = solved

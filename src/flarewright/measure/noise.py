@@ -78,8 +78,9 @@ def noise_of(camera: CameraNoise, iso: float, step: float) -> Noise:
 def smooth(band: NDArray[np.floating], side: int = _SIDE) -> NDArray[np.floating]:
     """Return means over squares of pixels, the border repeated; shape (height, width, 3) as given."""
     half = side // 2
-    padded = np.pad(band, ((half, half), (half, half), (0, 0)), mode="edge")
     height, width = band.shape[:2]
+    down, along = (np.clip(np.arange(-half, size + half), 0, size - 1) for size in (height, width))
+    padded = band.take(down, axis=0).take(along, axis=1)
     rows = np.zeros((height, *padded.shape[1:]), band.dtype)
     for k in range(side):
         rows += padded[k : k + height]

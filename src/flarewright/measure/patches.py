@@ -21,6 +21,8 @@ from .views import View, halved
 AREA = 7000
 # standard deviations beyond which a pixel counts less and less
 OUTLIER = 4.0
+# a ghost is drawn in so many pixels before other threads have heard of it
+_FEW = 30_000
 _ROOM = Room()
 
 
@@ -216,7 +218,7 @@ def missed(
             max(error, 0.0), outlier, offset, first, every, _ROOM.some(patches.largest), weight, residual, told,
         )  # fmt: skip
 
-    dealt_out(some, len(patches.table), pool=pool)
+    dealt_out(some, len(patches.table), pool=pool if patches.pixels.size > _FEW else None)
     return Missed(told, weight, residual)
 
 

@@ -41,9 +41,10 @@ def draw(numbers: Floats, frame: Floats, window: tuple[int, int, int, int]) -> F
 
 def _blur(picture: Floats) -> Floats:
     """Spread a picture (H, W) by the binomial kernel 1 4 6 4 1 along both axes."""
-    for axis in (0, 1):
-        padded = np.pad(picture, [(2, 2) if k == axis else (0, 0) for k in (0, 1)], mode="edge")
-        a, b, c, d, e = (np.take(padded, np.arange(k, k + picture.shape[axis]), axis) for k in range(5))
+    for axis, size in enumerate(picture.shape):
+        # the border repeated
+        padded = np.take(picture, np.clip(np.arange(-2, size + 2), 0, size - 1), axis)
+        a, b, c, d, e = (padded[k : k + size] if axis == 0 else padded[:, k : k + size] for k in range(5))
         picture = (a + 4.0 * b + 6.0 * c + 4.0 * d + e) / 16.0
     return picture
 
@@ -55,15 +56,18 @@ def edges(picture: Floats) -> Floats:
     return _blur(laplace)
 
 
-def cost(picture: Floats, wanted: Floats) -> float:
+def cost(picture: Floats, wanted: Floats, wanted_edges: Floats | None = None) -> float:
     """Return Walch's cost: mean squared error (equation 7.2) and that of the blurred edges.
 
     Parameters
     ----------
     picture, wanted : ndarray, shape (H, W)
         Grey.
+    wanted_edges : ndarray, shape (H, W), optional
+        Of `wanted`, where they are known already.
     """
-    return float(((picture - wanted) ** 2).mean() + EDGES * ((edges(picture) - edges(wanted)) ** 2).mean())
+    there = edges(wanted) if wanted_edges is None else wanted_edges
+    return float(((picture - wanted) ** 2).mean() + EDGES * ((edges(picture) - there) ** 2).mean())
 
 
 def descend(
@@ -104,12 +108,12 @@ def descend(
     steps = np.array([0.02 * scale] * 9 + [0.02 * scale] * 2 + [0.05] * 2)
     level = max(float(numbers[BORDER]), 1e-12)
     groups = [(k, steps[k]) for k in range(13)] + [(BORDER, 0.05 * level), (INNER, 0.05 * level)]
-    evaluations = 0
+    evaluations, wanted_edges = 0, edges(wanted)
 
     def look(trial: Floats) -> float:
         nonlocal evaluations
         evaluations += 1
-        return cost(draw(trial, frame, window)[..., 1], wanted)
+        return cost(draw(trial, frame, window)[..., 1], wanted, wanted_edges)
 
     def moved(at: int, by: float) -> Floats:
         trial = numbers.copy()

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from flarewright.errors import ProjectError
 from flarewright.kernels.resample import blend_blade_wings, blend_fan_wings, deposit_core
 from flarewright.model.iris import Iris
-from flarewright.optics.diffraction import BladeWings, FanWings, Pattern, pupil_pattern, spike_profile
+from flarewright.optics.diffraction import BladeWings, FanWings, Pattern, SpikeProfile, pupil_pattern, spike_profile
 from flarewright.optics.dirt import VeilTerm
 
 Floats = NDArray[np.float64]
@@ -193,17 +193,20 @@ class Painter:
             _in_bands(blend_fans, y, out, threads)
         elif self.pattern.rough_half_fan > 0.0:
             spread = out.copy()
-            self._blades(wings, wings.half_fan, x, y, pixel_mm, out, threads)
-            self._blades(wings, self.pattern.rough_half_fan, x, y, pixel_mm, spread, threads)
+            profile = spike_profile(wings, self.wave, self.weights, self.f_number, pixel_mm)
+            self._blades(wings, profile, wings.half_fan, x, y, pixel_mm, out, threads)
+            self._blades(wings, profile, self.pattern.rough_half_fan, x, y, pixel_mm, spread, threads)
             out += (1.0 - self._coherence(np.hypot(x, y[:, None]))) * (spread - out)
         else:
-            self._blades(wings, wings.half_fan, x, y, pixel_mm, out, threads)
+            profile = spike_profile(wings, self.wave, self.weights, self.f_number, pixel_mm)
+            self._blades(wings, profile, wings.half_fan, x, y, pixel_mm, out, threads)
         for term in self.pattern.veil:
             self._add_veil(term, x, y, out)
 
     def _blades(
         self,
         wings: BladeWings,
+        profile: SpikeProfile,
         half_fan: float,
         x: Floats,
         y: Floats,
@@ -211,8 +214,6 @@ class Painter:
         out: NDArray[np.float32] | Floats,
         threads: int | None,
     ) -> None:
-        profile = spike_profile(wings, self.wave, self.weights, self.f_number, pixel_mm)
-
         def blend(y: Floats, out: NDArray[np.float32] | Floats) -> None:
             blend_blade_wings(
                 x, y, np.array(pixel_mm), wings.angle, half_fan, profile.cumulative, profile.density,
