@@ -1,6 +1,7 @@
 """What is left beside ghosts goes with them between captures; ghosts come and go between captures too."""
 
 from dataclasses import replace
+from functools import cache
 from typing import cast
 
 import numpy as np
@@ -10,6 +11,7 @@ from planted_run import LARGEST, SIZE, shape, views
 from flarewright.kernels.measure_pupil import SOFT
 from flarewright.measure.carried import carried
 from flarewright.measure.found import Found
+from flarewright.measure.moves_fit import with_moves
 from flarewright.measure.packed import pack
 from flarewright.measure.replay import replay
 from flarewright.measure.settle import to_model
@@ -66,6 +68,17 @@ def model_beside(shapes: tuple[Shape, ...], seen: list) -> GhostModel:
     )  # fmt: skip
     left = [view.pixels - replay(model, view.constellation_deg)[0].pixels for view in seen]
     return model.replace(sprites=(axis_sprite(seen, left),))
+
+
+# how well a model knows the ghosts of `TRUE`
+KNOWN = {"unknown": (), "known": TRUE, "mistaken": tuple(mistaken(one) for one in TRUE)}
+
+
+@cache
+def moving(known: str, captured: tuple[float, ...]) -> tuple[GhostModel, GhostModel, list]:
+    """Return a model before and after it has moves, and what captures show: made once for all tests."""
+    model, seen = model_of(KNOWN[known], np.array(captured))
+    return model, with_moves(model), seen
 
 
 def missed(model: GhostModel, truth: list) -> float:

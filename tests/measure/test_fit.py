@@ -173,30 +173,35 @@ def test_uneven_and_growing_colour_comes_back_within_its_uncertainty_and_through
     assert channel_numbers(written, None) == pytest.approx(fit.shape.numbers)
 
 
-def test_wavelengths_part_where_that_pays_and_where_one_asks():
+@pytest.fixture(scope="module")
+def parting():
+    """Return numbers of a ghost whose wavelengths lie apart, views of it, and fits without and with that."""
     numbers = GHOSTS[0].numbers.copy()
     numbers[SOFT], numbers[LATERAL : LATERAL + 2] = 0.3, (4.0, -1.0)
+    numbers.flags.writeable = False
     shown = views((Shape(numbers),), angles=FEW)
-    rough = Shape(GHOSTS[0].numbers)
-    plain = grow(rough, shown, 1, most=Growth(discs=0))
+    plain = grow(Shape(GHOSTS[0].numbers), shown, 1, most=Growth(discs=0))
     assert plain is not None
-    apart = spread_by_colour(plain, shown, 1)
+    return numbers, shown, plain, spread_by_colour(plain, shown, 1)
+
+
+def test_wavelengths_part_where_that_pays_and_where_one_asks(parting):
+    numbers, _, plain, apart = parting
     assert not plain.shape.numbers[LATERAL:BELOW].any()
     # windows differ, for one is wider
     assert apart.cost / apart.count < 0.9 * plain.cost / plain.count
     assert np.abs(apart.shape.numbers[LATERAL : LATERAL + 2]) == pytest.approx([4.0, 1.0], abs=0.8)
     # a ghost that is as soft all around keeps its numbers
-    numbers[LATERAL:] = 0.0
+    numbers = numbers * (np.arange(numbers.size) < LATERAL)
     shown = views((Shape(numbers),), angles=FEW)
-    even = grow(rough, shown, 1, most=Growth(discs=0))
+    even = grow(Shape(GHOSTS[0].numbers), shown, 1, most=Growth(discs=0))
     assert even is not None
     assert spread_by_colour(even, shown, 1) is even
 
 
-def test_wavelengths_do_not_part_by_more_than_a_ghost_is_thick(monkeypatch):
+def test_wavelengths_do_not_part_by_more_than_a_ghost_is_thick(parting, monkeypatch):
     """What is thinner than that is not drawn by its rim alone: images of the light, lines near a focus."""
-    numbers = GHOSTS[0].numbers.copy()
-    numbers[SOFT], numbers[LATERAL : LATERAL + 2] = 0.3, (4.0, -1.0)
+    numbers, shown, plain, apart = parting
     frame = views((), angles=FEW)[-1].frame
     far = parting_of(numbers, 0, 0.9, frame)
     assert 0.05 < far < 0.4
@@ -208,10 +213,7 @@ def test_wavelengths_do_not_part_by_more_than_a_ghost_is_thick(monkeypatch):
     thin = numbers.copy()
     thin[:FIRST_I] *= 0.1
     assert parting_of(thin, 0, 0.9, frame) > 5.0 * far
-    shown = views((Shape(numbers),), angles=FEW)
-    plain = grow(Shape(GHOSTS[0].numbers), shown, 1, most=Growth(discs=0))
-    assert plain is not None
-    assert spread_by_colour(plain, shown, 1) is not plain
+    assert apart is not plain
     monkeypatch.setattr("flarewright.measure.grow._FARTHEST", 0.5 * far)
     assert spread_by_colour(plain, shown, 1) is plain
 

@@ -7,7 +7,7 @@ from zlib import compress
 import numpy as np
 import pytest
 from planted_run import SIZE, views
-from test_carried import CAPTURED, FEW, TRUE, between, missed, mistaken, model_beside, model_of, soft
+from test_carried import CAPTURED, FEW, KNOWN, TRUE, between, missed, model_beside, moving, soft
 
 from flarewright.measure.held import brightest, darkest, held
 from flarewright.measure.moves_fit import with_moves
@@ -70,10 +70,9 @@ def test_at_captures_nothing_changes(at_an_edge, captured):
     assert np.abs(near - there).max() < 1e-3 * np.abs(there).max()
 
 
-@pytest.mark.parametrize("shapes", [(), TRUE, tuple(mistaken(one) for one in TRUE)])
-def test_ghosts_that_move_are_left_to_move(shapes, captured):
-    model, seen = model_of(shapes, captured)
-    model = with_moves(model)
+@pytest.mark.parametrize("known", KNOWN)
+def test_ghosts_that_move_are_left_to_move(known, captured):
+    _, model, seen = moving(known, tuple(captured))
     truth = views(TRUE, angles=between(captured), noise=0.0)
     assert missed(with_reaches(model, seen), truth) < 1.01 * missed(model, truth)
 

@@ -1,5 +1,7 @@
 """Ghosts that shrink and slow down as the light leaves the axis, low and bent."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 from planted_run import SIZE, views
@@ -54,12 +56,18 @@ def test_an_outline_has_its_area_and_its_normals(side):
     assert (spots[:, 2] * side)[(side * along).argmax()] > 0.99
 
 
+@cache
+def looked_for(speed, roll=0.0):
+    """Return views of a lune, their slopes, and the best candidate in them."""
+    shown = views((lune(speed),), angles=ANGLES, roll_deg=roll)
+    found = slopes(shown)
+    return shown, found, lunes(found, SIZE[0], most=1)[0]
+
+
 @pytest.mark.parametrize("speed", [260.0, -260.0])
 def test_a_lune_is_found_that_no_circle_is(speed):
     planted = lune(speed)
-    shown = views((planted,), angles=ANGLES)
-    found = slopes(shown)
-    best = lunes(found, SIZE[0], most=1)[0]
+    shown, found, best = looked_for(speed)
     assert best.score > 2.0 * candidates(found, SIZE[0], most=1)[0].score
     middle = shown[(best.first + best.last) // 2]
     start = beginning(best, shown, [view.pixels[..., 1] for view in shown])
@@ -67,9 +75,7 @@ def test_a_lune_is_found_that_no_circle_is(speed):
 
 
 def test_a_rolled_camera_sees_the_same_lune():
-    best = [
-        lunes(slopes(views((lune(-260.0),), angles=ANGLES, roll_deg=roll)), SIZE[0], most=1)[0] for roll in (0.0, 143.0)
-    ]
+    best = [looked_for(-260.0, roll)[2] for roll in (0.0, 143.0)]
     assert best[1].usual == pytest.approx(best[0].usual, abs=6.0)
     assert best[1].below == best[0].below
 

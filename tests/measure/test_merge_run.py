@@ -18,6 +18,8 @@ from flarewright.measure.merge_run import MergeSettings, merge_captures
 from flarewright.measure.stages import reference_of
 from flarewright.model.capture import CameraNoise
 
+KNOWN = CameraNoise(black_level=CAMERA.black, white_level=CAMERA.white, electrons_per_unit=3.0, read_noise=4.0)
+
 
 def test_the_light_is_found_within_a_third_of_a_pixel_though_it_is_clipped(measured: Measured):
     for frame, pose in zip(measured.run.frames, measured.truth["poses"], strict=True):
@@ -103,13 +105,13 @@ def test_a_folder_is_for_the_run_of_one_camera(tmp_path):
     mine = shoot(tmp_path / "mine", {angle: star(light_px(angle)) for angle in ANGLES})
     other = shoot(tmp_path / "other", {angle: star(light_px(angle), level=0.06) for angle in ANGLES})
     run = tmp_path / "run"
-    merge_captures(read_captures(mine), mine.parent, run)
+    merge_captures(read_captures(mine), mine.parent, run, camera=KNOWN)
     (run / "found.json").write_text("by hand")
     before = {path: path.read_bytes() for path in run.rglob("*") if path.is_file()}
 
     def refused():
         with pytest.raises(FlarewrightError, match=r"run holds the run of other photographs \("):
-            merge_captures(read_captures(other), other.parent, run)
+            merge_captures(read_captures(other), other.parent, run, camera=KNOWN)
         assert {path: path.read_bytes() for path in run.rglob("*") if path.is_file()} == before
 
     # the same names in another folder, or other names in the same one
@@ -123,16 +125,16 @@ def test_a_folder_is_for_the_run_of_one_camera(tmp_path):
     mine.parent.rename(tmp_path / "moved")
     mine = tmp_path / "moved" / "captures.csv"
     stamp = stamps(run)
-    merge_captures(read_captures(mine), mine.parent, run)
+    merge_captures(read_captures(mine), mine.parent, run, camera=KNOWN)
     assert stamps(run) == stamp
 
 
 def test_frames_of_lines_that_are_gone_go_too(tmp_path):
     captures = read_captures(shoot(tmp_path, {angle: star(light_px(angle)) for angle in ANGLES}))
     run = tmp_path / "run"
-    merge_captures(captures, tmp_path, run, settings=MergeSettings(upright=True))
+    merge_captures(captures, tmp_path, run, camera=KNOWN, settings=MergeSettings(upright=True))
     (run / "frames" / "frame-mine.txt").write_text("kept")
-    merge_captures(captures[:-4], tmp_path, run)
+    merge_captures(captures[:-4], tmp_path, run, camera=KNOWN)
     left = [f"frame-{k:03d}.{kind}" for k in range(len(ANGLES) - 2) for kind in ("exr", "json")]
     assert sorted(path.name for path in (run / "frames").iterdir()) == [*left, "frame-mine.txt"]
     assert len(list((run / "upright").iterdir())) == len(ANGLES) - 2
@@ -140,16 +142,13 @@ def test_frames_of_lines_that_are_gone_go_too(tmp_path):
 
 def test_a_frame_that_was_cut_short_is_merged_anew(tmp_path):
     captures = read_captures(shoot(tmp_path, {angle: star(light_px(angle)) for angle in ANGLES}))
-    whole = merge_captures(captures, tmp_path, tmp_path / "run")
+    whole = merge_captures(captures, tmp_path, tmp_path / "run", camera=KNOWN)
     path = tmp_path / "run" / "frames" / "frame-003.exr"
     data = path.read_bytes()
     for damaged in (data[: len(data) // 2], b""):
         path.write_bytes(damaged)
-        assert merge_captures(captures, tmp_path, tmp_path / "run") == whole
+        assert merge_captures(captures, tmp_path, tmp_path / "run", camera=KNOWN) == whole
         assert path.read_bytes() == data
-
-
-KNOWN = CameraNoise(black_level=CAMERA.black, white_level=CAMERA.white, electrons_per_unit=3.0, read_noise=4.0)
 
 
 @pytest.mark.parametrize("camera", [KNOWN, KNOWN.replace(electrons_per_unit=None, read_noise=None)])

@@ -61,7 +61,7 @@ def test_what_stays_behind_of_a_glow_does_so_in_all_colours():
     np.testing.assert_allclose(glow - noise, (0.1 * 0.9 / 3.0) ** 2, rtol=1e-3)
 
 
-def test_a_purple_ghost_is_found_that_green_hides():
+def test_a_purple_ghost_is_found_that_green_hides(no_lunes):
     """As coatings for green leave them: next to nothing in the colour that was looked at alone before."""
     ghost = shape(-60.0, 25.0, 0.05)
     seen = []

@@ -8,7 +8,7 @@ from zlib import compress
 import numpy as np
 import pytest
 from planted_run import views
-from test_carried import CAPTURED, FEW, TRUE, between, missed, mistaken, model_of
+from test_carried import CAPTURED, FEW, TRUE, between, missed, model_of, moving
 
 from flarewright.measure.carried import carried
 from flarewright.measure.moved import halfway, landed, middles, spread
@@ -28,8 +28,7 @@ def captured(request):
 @pytest.fixture(scope="module")
 def unknown(captured):
     """Return a model that knows no ghost, before and after it has moves."""
-    model, _ = model_of((), captured)
-    return model, with_moves(model)
+    return moving("unknown", tuple(captured))[:2]
 
 
 def test_ghosts_that_nobody_knows_are_foretold_between_captures(unknown, captured):
@@ -39,10 +38,10 @@ def test_ghosts_that_nobody_knows_are_foretold_between_captures(unknown, capture
 
 
 def test_known_ghosts_still_go_with_their_boxes(captured):
-    model, _ = model_of(tuple(mistaken(one) for one in TRUE), captured)
+    model, with_its_moves, _ = moving("mistaken", tuple(captured))
     truth = views(TRUE, angles=between(captured), noise=0.0)
     # nor is a ghost a loss that is drawn quite elsewhere than it is
-    assert missed(with_moves(model), truth) < 1.1 * missed(model, truth)
+    assert missed(with_its_moves, truth) < 1.1 * missed(model, truth)
     strange, _ = model_of((replace(TRUE[0], numbers=-TRUE[0].numbers),), captured)
     assert missed(with_moves(strange), truth) < 0.5 * missed(strange, truth)
 

@@ -17,7 +17,7 @@ from flarewright.model.sprite import Sprite, packed
 
 SIZE = (240, 160)
 AXIS = (120.0, 80.0)
-ANGLES = np.linspace(2.0, LARGEST, 10)
+ANGLES = np.linspace(2.0, LARGEST, 10)[2:9]
 # radiance of the picture, and of a ghost over all of it that the model takes for six times as bright
 TRUE, TAKEN = 0.02, 0.12
 
@@ -68,7 +68,7 @@ def learned():
 
 
 @pytest.mark.parametrize("roll", [0.0, 30.0, 90.0, 180.0, 260.0])
-@pytest.mark.parametrize("angle", [ANGLES[4], ANGLES[7]])
+@pytest.mark.parametrize("angle", [ANGLES[2], ANGLES[5]])
 def test_a_rolled_replay_is_the_picture_that_the_light_would_make_there(learned, roll, angle):
     # the ghost's light and what makes up for it are six times the picture: neither may be seen
     true, mine = scene(angle, roll), replay(learned, float(angle), roll_deg=roll)[0].pixels
@@ -81,8 +81,8 @@ def test_a_rolled_replay_is_the_picture_that_the_light_would_make_there(learned,
 
 
 def test_a_taller_picture_goes_on_above_and_below(learned):
-    wide = replay(learned, float(ANGLES[4]))[0].pixels
-    tall = replay(learned, float(ANGLES[4]), size_px=(240, 240))[0].pixels
+    wide = replay(learned, float(ANGLES[2]))[0].pixels
+    tall = replay(learned, float(ANGLES[2]), size_px=(240, 240))[0].pixels
     np.testing.assert_allclose(tall[40:200], wide, atol=1e-5)
     assert np.abs(tall[:40] - TRUE).max() < 0.3 * TRUE
     assert np.abs(tall[200:] - TRUE).max() < 0.3 * TRUE

@@ -7,10 +7,12 @@ import pytest
 from planted_run import FOCAL, GHOSTS, LARGEST, SIZE, shape, views, write
 
 from flarewright.io.merged import read_run
+from flarewright.measure import pursuit
 from flarewright.measure.fit import render
 from flarewright.measure.found import Found
 from flarewright.measure.replay import replay
 from flarewright.measure.settle import to_model
+from flarewright.measure.shape import Shape
 from flarewright.measure.stages import find_ghosts, fit_ghosts
 from flarewright.model.ghost_model import AberrationGhost, GhostModel
 
@@ -30,27 +32,34 @@ BEGUN_ELSEWHERE = 0.015
 
 
 class Planted(NamedTuple):
-    """A merged run of two ghosts that stay in the picture, some of its constellations, and ghosts to find at most."""
+    """A merged run of two ghosts that stay in the picture, some of its constellations, and ghosts to find at most.
+
+    Without `lunes` none is looked for: `test_lunes` has a rolled camera for them.
+    """
 
     size: tuple[int, int]
+    ghosts: tuple[Shape, ...]
     angles: np.ndarray
     every: int
     most: int
+    lunes: bool
 
     def write(self, folder, **told):
-        return write(folder, PLANTED, angles=self.angles, size=self.size, **told)
+        return write(folder, self.ghosts, angles=self.angles, size=self.size, **told)
 
     def fitted(self, folder, run):
         """Return the ghosts as found and as fitted, without what is left beside them."""
-        rough = find_ghosts(folder, run, every=self.every, most=self.most)
-        assert len(rough.ghosts) == 2
-        return rough, fit_ghosts(folder, run, rough, every=self.every, rest=False)
+        with pytest.MonkeyPatch.context() as patch:
+            if not self.lunes:
+                patch.setattr(pursuit, "_lunes", lambda *_: [])
+            rough = find_ghosts(folder, run, every=self.every, most=self.most)
+            assert len(rough.ghosts) == 2
+            return rough, fit_ghosts(folder, run, rough, every=self.every, rest=False)
 
 
 # in the large pictures they stay also where these are lower than wide
-PLANTED = GHOSTS[1:3]
-SMALL_RUN = Planted((160, 106), np.linspace(2.0, LARGEST, 9), every=2, most=2)
-LARGE_RUN = Planted(SIZE, ANGLES, every=1, most=60)
+SMALL_RUN = Planted((160, 106), GHOSTS[1:3], np.linspace(2.0, LARGEST, 9), every=2, most=2, lunes=False)
+LARGE_RUN = Planted(SIZE, GHOSTS[1:3], ANGLES, every=1, most=60, lunes=True)
 BOTH = [pytest.param(SMALL_RUN, id="small"), pytest.param(LARGE_RUN, marks=pytest.mark.slow, id="large")]
 
 

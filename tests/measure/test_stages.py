@@ -122,7 +122,7 @@ def test_a_fit_does_not_find_again_what_a_person_took_away(tmp_path):
     rough = find_ghosts(tmp_path, run, corrections=Corrections(remove=("2",)))
     assert [ghost.name for ghost in rough.ghosts] == ["1"]
     assert [ghost.name for ghost in rough.removed] == ["2"]
-    model = fit_ghosts(tmp_path, run, rough)
+    model = fit_ghosts(tmp_path, run, rough, how=PLAIN)
     both = sorted(ghost.green.f[0] for ghost in (*rough.ghosts, *rough.removed))
     assert both == pytest.approx([-55.0, SPEED], abs=1.0)
     planted = SMALL_GHOSTS[:2] if rough.ghosts[0].green.f[0] < 0.0 else SMALL_GHOSTS[1::-1]

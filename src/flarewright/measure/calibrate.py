@@ -131,9 +131,9 @@ def calibrate(captures: Sequence[Capture], folder: Path, camera: CameraNoise, bl
         silent = (Noise(0.0, 0.0),) * 3
         for group in groups:
             refuse_contradiction([Exposure(photos[a.file], a.exposure_s, silent, black, white) for a in group])
-    points = _points(pairs, black, white, first.samples, black_noise) + _dark_points(darks, first.samples)
     known = camera
     if camera.electrons_per_unit is None or camera.read_noise is None:
+        points = _points(pairs, black, white, first.samples, black_noise) + _dark_points(darks, first.samples)
         known = fit_transfer(points, camera, first.step)
         remarks.append(_noise_words(camera, known))
     level = float(black.reshape(-1, 3).mean())

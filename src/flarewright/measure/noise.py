@@ -145,13 +145,12 @@ def transfers(
     difference = first[free].astype(np.float64) - level
     if level.size < _FEWEST:
         return []
-    bins = np.array_split(np.argsort(around[free], kind="stable"), min(_BINS, level.size // _FEWEST))
-    found = []
-    for inside in bins:
-        spread = float(difference[inside].var(ddof=1)) * samples
-        floors = 1.0 + ratio**2 + (1.0 - ratio) ** 2 * black_noise
-        found.append(Transfer((1.0 + ratio) * float(level[inside].mean()), floors, spread, inside.size))
-    return found
+    order, count = np.argsort(around[free], kind="stable"), min(_BINS, level.size // _FEWEST)
+    floors = 1.0 + ratio**2 + (1.0 - ratio) ** 2 * black_noise
+    return [
+        Transfer((1.0 + ratio) * float(inside.mean()), floors, float(apart.var(ddof=1)) * samples, inside.size)
+        for inside, apart in zip(*(np.array_split(each[order], count) for each in (level, difference)), strict=True)
+    ]
 
 
 def fit_transfer(points: Sequence[Transfer], camera: CameraNoise, step: float) -> CameraNoise:
@@ -244,9 +243,9 @@ def common_black(pairs: Iterable[tuple[Band, Band, Band, NDArray[np.bool_]]]) ->
         if x.size < _FEWEST * _FEWEST_BINS:
             continue
         order = np.argsort(around[free], kind="stable")
-        bins = np.array_split(order, _BINS)
-        bx, by = np.array([x[one].mean() for one in bins]), np.array([y[one].mean() for one in bins])
-        error = np.array([max(float(y[one].std()), 1e-12) / sqrt(one.size) for one in bins])
+        longer, shorter = (np.array_split(each[order], _BINS) for each in (x, y))
+        bx, by = np.array([one.mean() for one in longer]), np.array([one.mean() for one in shorter])
+        error = np.array([max(float(one.std()), 1e-12) / sqrt(one.size) for one in shorter])
         (ratio, start), covariance = np.polyfit(bx, by, 1, w=1.0 / error, cov="unscaled")
         if ratio < 0.9 and np.ptp(bx) > 0.0:
             found.append((start / (1.0 - ratio), covariance[1, 1] / (1.0 - ratio) ** 2))
