@@ -57,7 +57,7 @@ def test_an_outline_has_its_area_and_its_normals(side):
 
 
 @cache
-def looked_for(speed, roll=0.0):
+def looked_for(speed, roll):
     """Return views of a lune, their slopes, and the best candidate in them."""
     shown = views((lune(speed),), angles=ANGLES, roll_deg=roll)
     found = slopes(shown)
@@ -67,7 +67,7 @@ def looked_for(speed, roll=0.0):
 @pytest.mark.parametrize("speed", [260.0, -260.0])
 def test_a_lune_is_found_that_no_circle_is(speed):
     planted = lune(speed)
-    shown, found, best = looked_for(speed)
+    shown, found, best = looked_for(speed, 0.0)
     assert best.score > 2.0 * candidates(found, SIZE[0], most=1)[0].score
     middle = shown[(best.first + best.last) // 2]
     start = beginning(best, shown, [view.pixels[..., 1] for view in shown])

@@ -309,7 +309,7 @@ def faint(angle, place, part):
     return star(light_px(angle)) + part * (star(place) - star())
 
 
-@pytest.mark.parametrize("part", [0.1, 0.003])
+@pytest.mark.parametrize("part", [pytest.param(0.1, marks=pytest.mark.slow), 0.003])
 @pytest.mark.parametrize(
     ("angles", "away"), [(ANGLES, (-30.0, 20.0)), (ANGLES[-2:], (10.0, -20.0)), (ANGLES, (-25.0, 0.2))]
 )
@@ -320,7 +320,7 @@ def test_a_faint_second_light_is_told_by_staying_where_it_is(tmp_path, part, ang
         merge_captures(read_captures(shoot(tmp_path, scenes)), tmp_path, tmp_path / "run", camera=KNOWN)
 
 
-@pytest.mark.parametrize("part", [0.1, 0.01])
+@pytest.mark.parametrize("part", [0.1, pytest.param(0.01, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("pace", [-1.0, -0.5, 0.3])
 def test_bright_ghosts_are_no_second_light(tmp_path, part, pace):
     def ghost(angle):

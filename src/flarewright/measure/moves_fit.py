@@ -69,16 +69,25 @@ def _learned(sprite: Sprite, packed: Packed, model: GhostModel, threads: int | N
     left, angles = sprite.pictures, sprite.constellation_deg
     with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
         whole = left + np.stack(list(pool.map(lambda angle: ghosts_light(sprite, packed, model, angle), angles)))
-        missed = [np.stack(list(pool.map(lambda k: _missed_boxed(sprite, packed, model, k), _inner(left))))]
-        steps = []
-        for pictures in (left, whole):
-            onward = _steps(pictures[:-1], pictures[1:], sprite.unit, pool)
-            back = _steps(pictures[1:], pictures[:-1], sprite.unit, pool)
-            missed.append(_missed(pictures, onward, back, angles, pool))
-            steps.append(_refined(pictures, [_halfway(*pair) for pair in zip(onward, back, strict=True)], pool))
-    shares = _shares([_about(each, sprite.unit) for each in missed])
-    out: Sprite = sprite.replace(moves=packed_moves(_BLOCK, np.stack(steps, axis=1), shares[:, 1:]))
+        boxed = np.stack(list(pool.map(lambda k: _missed_boxed(sprite, packed, model, k), _inner(left))))
+        alone = _told_by(left, angles, sprite.unit, pool)
+        # where no ghost is drawn both are the same pictures
+        together = alone if np.array_equal(left, whole) else _told_by(whole, angles, sprite.unit, pool)
+    (missed, steps), (missed_together, steps_together) = alone, together
+    shares = _shares([_about(each, sprite.unit) for each in (boxed, missed, missed_together)])
+    both = np.stack([steps, steps_together], axis=1)
+    out: Sprite = sprite.replace(moves=packed_moves(_BLOCK, both, shares[:, 1:]))
     return out
+
+
+def _told_by(
+    pictures: Pixels, angles: Sequence[float], unit: float, pool: ThreadPoolExecutor
+) -> tuple[Floats, Floats]:
+    """Return by how much photographs are missed that others foretell by their moves, and the moves halfway."""
+    onward = _steps(pictures[:-1], pictures[1:], unit, pool)
+    back = _steps(pictures[1:], pictures[:-1], unit, pool)
+    halfway = [_halfway(*pair) for pair in zip(onward, back, strict=True)]
+    return _missed(pictures, onward, back, angles, pool), _refined(pictures, halfway, pool)
 
 
 def _inner(pictures: Pixels) -> range:
