@@ -317,6 +317,8 @@ def test_a_rolled_camera_sees_the_same_ghosts():
         shown = views(GHOSTS[:2], angles=FEW, roll_deg=roll)
         slopes = slopes_of(shown, [view.pixels[..., 1] for view in shown], masks(shown))
         best.append(candidates(slopes, SIZE[0], most=2))
+        # none is close to a better one: one is each ghost's, on its side of the axis
+        assert min(each.speed for each in best[-1]) < 0.0 < max(each.speed for each in best[-1])
     for one, other in zip(*best, strict=True):
         assert other.speed == pytest.approx(one.speed, abs=8.0)
         assert other.radius == pytest.approx(one.radius, abs=3.0)

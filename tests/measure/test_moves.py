@@ -42,6 +42,9 @@ def test_known_ghosts_still_go_with_their_boxes(captured):
     truth = views(TRUE, angles=between(captured), noise=0.0)
     # nor is a ghost a loss that is drawn quite elsewhere than it is
     assert missed(with_its_moves, truth) < 1.1 * missed(model, truth)
+    # what is left alone moves otherwise than it does with the ghosts' light
+    alone, together = with_its_moves.sprites[0].moves.steps(2)
+    assert np.abs(alone - together)[..., :2].max() > 2.0
     strange, _ = model_of((replace(TRUE[0], numbers=-TRUE[0].numbers),), captured)
     assert missed(with_moves(strange), truth) < 0.5 * missed(strange, truth)
 
