@@ -519,7 +519,7 @@ def test_the_library_and_the_keys(tab):
     tab.rest()
     tab.page.locator("#view").focus()
     for key, expression in (
-        ("v", "flarewright.state.view.look === 'filmic'"), ("h", "flarewright.state.view.safe_frame"),
+        ("v", "flarewright.state.view.look === 'srgb'"), ("h", "flarewright.state.view.safe_frame"),
         ("g", "flarewright.state.view.grey"), ("e", "flarewright.state.view.unclipped"),
         ("3", "flarewright.tab === 'lens'"), ("n", "flarewright.ghost !== null"),
         ("Escape", "flarewright.ghost === null"),

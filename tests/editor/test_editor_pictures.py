@@ -358,15 +358,15 @@ def test_looks_and_background(tmp_path):
     from PIL import Image
 
     light = np.full((8, 8, 3), 0.18, np.float32)
-    assert pixels_of(light, 0.0, View())[0, 0].tolist() == [118, 118, 118]
     # middle grey stays where it is
-    assert abs(int(pixels_of(light, 0.0, View(look="filmic"))[0, 0, 0]) - 118) <= 1
+    for shown in (View(), View(look="srgb")):
+        assert pixels_of(light, 0.0, shown)[0, 0].tolist() == [118, 118, 118]
     grey = next(colour for limit, colour in FALSE_COLOURS if limit == 0.5)
     assert tuple(pixels_of(light, 0.0, View(look="false-colour"))[0, 0]) == grey
     assert tuple(pixels_of(light, 20.0, View(look="false-colour"))[0, 0]) == FALSE_COLOURS[-1][1]
     path = tmp_path / "plate.png"
     Image.new("RGB", (30, 20), (188, 0, 0)).save(path)
-    look = View(plate=str(path), plate_stops=-1.0)
+    look = View(look="srgb", plate=str(path), plate_stops=-1.0)
     plate = plate_for(look, (8, 8))
     shown = pixels_of(np.zeros((8, 8, 3), np.float32), 5.0, look, plate)
     # half of the linear 0.503 is shown as 137

@@ -211,7 +211,7 @@ def test_coatings_are_shown_as_they_will_be_once_they_are_taken(project, chosen,
     told = []
     session = _Session(shot)
     session.tell = lambda event: told.append((event["type"], solver.progress.running, len(solver.progress.found)))
-    solver = Solver(session, lambda: Seeing(view, 7.5))
+    solver = Solver(session, lambda: Seeing(view, 7.0))
     solver.start_colors("quarter-wave", 5.0)
     # what is moved meanwhile is moved in their pictures too
     shot = session.project = shot.replace(lights=(Light(field_deg=(-4.0, 2.0)),))
@@ -220,11 +220,11 @@ def test_coatings_are_shown_as_they_will_be_once_they_are_taken(project, chosen,
     assert solver._tracing.wait(60.0)
     (found,) = solver.progress.found
     picture = studio.take(found.taken(shot), "soon", View(), scale=solving.THUMB_SCALE)
-    assert abs(studio.exposure_of(picture) - 7.5) > 0.5
+    assert abs(studio.exposure_of(picture) - 7.0) > 0.5
     shown = np.asarray(Image.open(io.BytesIO(found.picture)), dtype=float)
 
     def off(other):
-        pixels = pixels_of(studio.light_of(other, studio.Match()), chosen or 7.5, View(look=look))
+        pixels = pixels_of(studio.light_of(other, studio.Match()), chosen or 7.0, View(look=look))
         return np.abs(shown - pixels).mean()
 
     assert off(picture) < 1.5

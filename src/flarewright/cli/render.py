@@ -9,11 +9,12 @@ import typer
 
 from ..errors import ProjectError
 from .common import check_place, print_json, tell
+from .preview import PreviewLook, preview_look, write_preview
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from ..model import Layer, Project
+    from ..model import Project
     from ..model.reference_state import ReferenceState
     from ..render.ledger import Ledger
     from ..render.reference import ReferenceRun
@@ -323,6 +324,10 @@ def render(
         bool, typer.Option("--no-starburst", help="Leave out the light's direct image.", rich_help_panel=_OUT)
     ] = False,
     colorspace: Annotated[str | None, typer.Option(help="rec709 or acescg, linear.", rich_help_panel=_OUT)] = None,
+    gamut: Annotated[
+        str | None,
+        typer.Option(help="keep negative channels (when left out), or compress colours.", rich_help_panel=_OUT),
+    ] = None,
     half: Annotated[bool, typer.Option("--half", help="Write 16 bits a value.", rich_help_panel=_OUT)] = False,
     float32: Annotated[
         bool, typer.Option("--float", help="Write 32 bits a value, as when left out.", rich_help_panel=_OUT)
@@ -334,8 +339,27 @@ def render(
     exposure: Annotated[
         float | None, typer.Option(help="Stops, for the PNG only; automatic when left out.", rich_help_panel=_OUT)
     ] = None,
+    ev: Annotated[
+        float | None,
+        typer.Option(help="Exposure value of a camera, log2(N^2 / t), for the PNG only.", rich_help_panel=_OUT),
+    ] = None,
+    shutter: Annotated[
+        str | None,
+        typer.Option(metavar="SECONDS", help="Shutter of a camera, 1/250, for the PNG only.", rich_help_panel=_OUT),
+    ] = None,
+    iso: Annotated[
+        float | None, typer.Option(help="With --ev or --shutter; 100 when left out.", rich_help_panel=_OUT)
+    ] = None,
+    lux: Annotated[
+        str | None,
+        typer.Option(
+            help="With --ev or --shutter: what a light of intensity 1 gives; sun (100 000) when left out.",
+            rich_help_panel=_OUT,
+        ),
+    ] = None,
     view: Annotated[
-        str | None, typer.Option(help="srgb (when left out) or filmic, for the PNG only.", rich_help_panel=_OUT)
+        str | None,
+        typer.Option(help="filmic (when left out), srgb or aces, for the PNG only.", rich_help_panel=_OUT),
     ] = None,
     no_png: Annotated[
         bool, typer.Option("--no-png", help="Write no PNG beside the EXR.", rich_help_panel=_OUT)
@@ -352,13 +376,7 @@ def render(
     Every value is an irradiance on the sensor relative to a light of irradiance 1, so layers add up to the beauty.
     """
     check_place(output, ".exr")
-    if view not in (None, "srgb", "filmic"):
-        raise ProjectError(f"--view {view!r} is unknown; choose srgb or filmic")
-    if exposure is not None and not -100.0 <= exposure <= 100.0:
-        raise ProjectError(f"--exposure {exposure:g} is out of range; choose between -100 and 100 stops")
-    if no_png and (exposure is not None or view is not None):
-        flag = "--view" if exposure is None else "--exposure"
-        raise ProjectError(f"{flag} is for the PNG alone and --no-png leaves it out; keep one")
+    look = preview_look(view=view, exposure=exposure, ev=ev, shutter=shutter, iso=iso, lux=lux, no_png=no_png)
     if half and float32:
         raise ProjectError("--half and --float both say how many bits a value has; keep one")
     from .art_flags import naming_rules
@@ -374,7 +392,7 @@ def render(
         cats_eye=cats_eye, starburst_size=starburst_size, starburst_spiral=starburst_spiral,
         focus=focus, size=size, sensor=sensor, sensor_distance=sensor_distance, quality=quality,
         wavelengths=wavelengths, paths=paths, layers=layers, brightest=brightest, no_starburst=no_starburst,
-        colorspace=colorspace, half=half if half or float32 else None,
+        colorspace=colorspace, gamut=gamut, half=half if half or float32 else None,
         mute=mute or [], solo=solo or [], gain=gain or [], physical=physical,
         orders=orders, order4_limit=order4_limit,
         seed=seed, error=error, error_of=error_of, samples=samples, rays_from=rays_from,
@@ -401,7 +419,7 @@ def render(
         if run is not None and run.state_file is not None and run.state_file.exists():
             tell([f"to go on: flarewright render --resume {run.state_file} -o {output}"])
         raise
-    files, remarks = _write(rendering, output, full_windows, None if no_png else (exposure, view or "srgb"))
+    files, remarks = _write(rendering, output, full_windows, look)
     remarks = [*rendering.remarks, *remarks]
     if ringing == "collins" and settings.quality.mode != "final":
         remarks.insert(0, f"{settings.quality.mode} quality traces rays alone: --ringing is for final quality")
@@ -517,12 +535,13 @@ def _renderer(
 
 
 def _write(
-    rendering: Rendering, output: Path, full_windows: bool, look: tuple[float | None, str] | None
+    rendering: Rendering, output: Path, full_windows: bool, look: PreviewLook | None
 ) -> tuple[dict[str, Any], list[str]]:
     """Write the EXR and its preview; return what was written where, and remarks."""
     from .. import __version__
     from ..io.exr import write_exr
     from ..io.project_file import project_text
+    from ..render.gamut import negative_share
 
     project = rendering.project
     width, height = project.camera.size_px
@@ -538,25 +557,16 @@ def _write(
             full_windows=full_windows,
         )
     )
-    files: dict[str, Any] = {"output": str(output), "layers": [layer.name for layer in rendering.layers]}
+    outside = negative_share(rendering.layers[0])
+    if outside > 0.0:
+        remarks.append(
+            f"{outside:.1%} of the pixels have a negative channel, colours outside the file's primaries; "
+            "--gamut compress writes none"
+        )
+    files: dict[str, Any] = {
+        "output": str(output), "layers": [layer.name for layer in rendering.layers], "negative_pixels": outside
+    }  # fmt: skip
     if look is not None:
-        files |= _write_preview(rendering.layers, project, output.with_suffix(".png"), *look)
+        files |= write_preview(rendering, output.with_suffix(".png"), look)
         remarks.append(f"the preview shows {files['view']}")
     return files, remarks
-
-
-def _write_preview(
-    layers: tuple[Layer, ...], project: Project, path: Path, exposure: float | None, transform: Any
-) -> dict[str, Any]:
-    from .. import __version__
-    from ..io.png import write_png
-    from ..render.display import auto_exposure, view, view_text
-
-    colorspace = project.output.colorspace
-    # The direct image is a million times brighter than the ghosts, which are what a person wants to see.
-    measured = next((layer for layer in layers if layer.name == "ghosts"), layers[0])
-    stops = auto_exposure(measured.pixels, colorspace) if exposure is None else exposure
-    stated = view_text(stops, transform, colorspace, automatic=exposure is None)
-    pixels = view(layers[0].pixels, stops, transform, colorspace)
-    write_png(path, pixels, {"Software": f"Flarewright {__version__}", "Description": stated})
-    return {"preview": str(path), "view": stated, "exposure_stops": stops}

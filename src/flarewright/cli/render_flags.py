@@ -61,6 +61,7 @@ _FLAG_OF = {
     "output.layers": "--layers",
     "output.brightest": "--brightest",
     "output.colorspace": "--colorspace",
+    "output.gamut": "--gamut",
     "intensity": "--intensity",
 }
 
@@ -105,6 +106,7 @@ class Flags:
     brightest: int | None
     no_starburst: bool
     colorspace: str | None
+    gamut: str | None
     half: bool | None
     mute: list[str]
     solo: list[str]
@@ -293,6 +295,7 @@ def _sections(flags: Flags) -> dict[str, dict[str, Any]]:
             "layers": flags.layers,
             "brightest": flags.brightest,
             "colorspace": flags.colorspace,
+            "gamut": flags.gamut,
             "pixel_type": None if flags.half is None else "half" if flags.half else "float",
             "starburst": False if flags.no_starburst else None,
         },

@@ -174,7 +174,7 @@ class Hand:
             (star,) = drawn.stars
             return view_sum(
                 drawn.ghosts, star.sheet.pixels, screen.exposure_stops,
-                ghost_gain=screen.match.gain, rest_gain=star.gain, corner=star.corner,
+                ghost_gain=screen.match.gain, rest_gain=star.gain, corner=star.corner, transform=view.look,
             )  # fmt: skip
         return pixels_of_picture(screen, Picture(screen.session.project, "moving", drawn.ghosts, drawn.rest, 0.0))
 

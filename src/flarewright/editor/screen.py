@@ -244,7 +244,7 @@ def pixels_of_picture(screen: Screen, picture: Picture) -> NDArray[np.uint8]:
     view = screen.session.view
     if view.plain:
         gain = studio.ghost_gain(picture, screen.match)
-        return view_sum(picture.ghosts, picture.rest, screen.exposure_stops, ghost_gain=gain)
+        return view_sum(picture.ghosts, picture.rest, screen.exposure_stops, ghost_gain=gain, transform=view.look)
     light = studio.light_of(picture, screen.match)
     plate = plate_for(view, (light.shape[1], light.shape[0]))
     return pixels_of(light, screen.exposure_stops, view, plate)

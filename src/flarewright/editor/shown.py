@@ -5,13 +5,13 @@ from __future__ import annotations
 from functools import lru_cache
 from io import BytesIO
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import FlarewrightError, ProjectError
 from ..io.exr import read_exr_colour
+from ..render.aces_view import aces_available
 from ..render.display import view
 from .view import View
 
@@ -55,8 +55,6 @@ def pixels_of(light: Floats, exposure_stops: float, look: View, plate: Floats | 
         exposure_stops = 0.0
     if look.look == "false-colour":
         return _false_colour(light * np.float32(2.0**exposure_stops))
-    if look.look == "aces":
-        return _aces(light * np.float32(2.0**exposure_stops))
     return view(light, exposure_stops, look.look)
 
 
@@ -65,54 +63,6 @@ def _false_colour(light: Floats) -> NDArray[np.uint8]:
     limits = np.array([limit for limit, _ in FALSE_COLOURS[:-1]])
     colours = np.array([colour for _, colour in FALSE_COLOURS], dtype=np.uint8)
     return np.asarray(colours[np.searchsorted(limits, stops)])
-
-
-# the cube that stands for an ACES view: side, and the stops around 1 that it covers
-_CUBE, _LOW, _HIGH = 40, -14.0, 12.0
-
-
-def aces_available() -> bool:
-    """Tell whether opencolorio is installed."""
-    from importlib.util import find_spec
-
-    return find_spec("PyOpenColorIO") is not None
-
-
-@lru_cache(maxsize=1)
-def _aces_cube() -> NDArray[np.float32]:
-    """Bake the ACES view of opencolorio's built-in configuration: a picture through it would take 0.2 s."""
-    if not aces_available():
-        raise ProjectError("the ACES view needs opencolorio: pip install opencolorio, or choose filmic")
-    import PyOpenColorIO
-
-    config: Any = PyOpenColorIO.Config.CreateFromFile("ocio://default")
-    display = config.getDefaultDisplay()
-    chosen = PyOpenColorIO.DisplayViewTransform(
-        src="lin_rec709_scene", display=display, view=config.getDefaultView(display)
-    )
-    processor = config.getProcessor(chosen).getDefaultCPUProcessor()
-    axis = np.exp2(np.linspace(_LOW, _HIGH, _CUBE, dtype=np.float32))
-    axis[0] = 0.0
-    grid = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1).reshape(-1, 1, 3)
-    baked = np.ascontiguousarray(grid, dtype=np.float32)
-    processor.applyRGB(baked)
-    return np.clip(baked.reshape(_CUBE, _CUBE, _CUBE, 3), 0.0, 1.0)
-
-
-def _aces(light: Floats) -> NDArray[np.uint8]:
-    """Look colours up in the baked cube, linear between its corners."""
-    cube = _aces_cube()
-    place = (np.log2(np.maximum(light, 2.0**_LOW)) - _LOW) / (_HIGH - _LOW) * (_CUBE - 1)
-    place = np.clip(place, 0.0, _CUBE - 1.001).astype(np.float32)
-    low = place.astype(np.intp)
-    part = place - low
-    out = np.zeros_like(light)
-    for corner in range(8):
-        step = np.array([corner >> 2 & 1, corner >> 1 & 1, corner & 1])
-        weight = np.prod(np.where(step == 1, part, 1.0 - part), axis=2, keepdims=True)
-        at = low + step
-        out += weight * cube[at[..., 0], at[..., 1], at[..., 2]]
-    return (np.clip(out, 0.0, 1.0) * 255.0 + 0.5).astype(np.uint8)
 
 
 @lru_cache(maxsize=4)

@@ -322,8 +322,9 @@ def _levelled(art: Art, levels: Levels) -> Art:
 
 
 def exposure_of(picture: Picture, match: Match | None = None) -> float:
-    """Find an exposure that shows the ghosts of a picture."""
-    return auto_exposure(ghosts_of(picture, match or Match()))
+    """Find an exposure that shows the ghosts of a picture, and burns out little of it."""
+    known = match or Match()
+    return auto_exposure(light_of(picture, known), ghosts=ghosts_of(picture, known))
 
 
 def is_as_large(picture: Picture, room: tuple[int, int]) -> bool:

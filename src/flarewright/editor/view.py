@@ -8,7 +8,7 @@ from pydantic import Field
 
 from ..model.base import Frozen
 
-Look = Literal["srgb", "filmic", "aces", "false-colour"]
+Look = Literal["filmic", "srgb", "aces", "false-colour"]
 
 
 class View(Frozen):
@@ -20,7 +20,7 @@ class View(Frozen):
         None: found for each lens, and held while the light moves or the lens is edited.
     found_stops : float or None
         What was found, so that a session that goes on looks as it did.
-    look : {"srgb", "filmic", "aces", "false-colour"}
+    look : {"filmic", "srgb", "aces", "false-colour"}
     grey : bool
         Every ghost reflects alike, so that those which coatings hide are seen; drawn by matrices.
     unclipped : bool
@@ -34,7 +34,7 @@ class View(Frozen):
 
     exposure_stops: float | None = Field(None, ge=-60.0, le=60.0)
     found_stops: float | None = None
-    look: Look = "srgb"
+    look: Look = "filmic"
     grey: bool = False
     unclipped: bool = False
     safe_frame: bool = False
@@ -43,5 +43,5 @@ class View(Frozen):
 
     @property
     def plain(self) -> bool:
-        """Whether a picture is shown by the sRGB curve and nothing else."""
-        return self.look == "srgb" and self.plate is None
+        """Whether a picture is shown as `render.display.view` shows it, with nothing behind it."""
+        return self.look in ("srgb", "filmic") and self.plate is None

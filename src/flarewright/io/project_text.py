@@ -69,6 +69,7 @@ ABOUT = {
     "output.layers": '"beauty", "passes" or "ghosts" (one layer a ghost)',
     "output.brightest": "20   # of the single ghosts only so many",
     "output.colorspace": '"rec709" or "acescg", linear',
+    "output.gamut": '"keep" negative channels, or "compress" colours until there are none',
     "output.pixel_type": '"half" or "float"',
 }
 

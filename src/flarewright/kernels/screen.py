@@ -2,11 +2,135 @@
 
 import numpy as np
 
-from ._jit import compiled
+from ._jit import borrowing, compiled
+
+# of the distance from grey, as a part of the brightest channel, in the filmic view: what lies beyond is moved inwards
+KNEE = 0.9
+# filmic: up to here light is shown as it is, beyond it rolls off towards white
+SHOULDER = 0.5
+# and a colour this many times brighter than white has lost half of its saturation
+HALF_WHITE = 8.0
+
+
+@borrowing
+def shown_color(red, green, blue, filmic):
+    """Bring a colour into the range of a screen.
+
+    Parameters
+    ----------
+    red, green, blue : float32
+        Linear Rec.709, exposed; negative where the colour lies outside the triangle, of any size.
+    filmic : bool
+        Whether bright light rolls off towards white; else it clips.
+
+    Returns
+    -------
+    tuple of float32
+        In [0, 1].
+
+    Notes
+    -----
+    The farthest channel's distance from grey, d = (max - min) / max, exceeds 1 where a channel is negative. All three
+    distances are scaled alike, so the colour moves along the line to the white of its largest channel: its dominant
+    wavelength stays, and so does the order of its channels. Without filmic d is cut at 1, which leaves what a screen
+    can show as it is; filmic uses the smooth knee of the ACES reference gamut compression,
+    k + (1 - k) x / (1 + x^p)^(1/p) with x = (d - k) / (1 - k) and p = 1.2 (Academy S-2020-001), whose limit is 1. The
+    largest channel rolls off by s + (1 - s) u / (1 + u), u = (v - s) / (1 - s), the others in proportion.
+    """
+    zero, one = np.float32(0.0), np.float32(1.0)
+    red, green, blue = _bounded(red), _bounded(green), _bounded(blue)
+    high = max(red, green, blue)
+    if not high > zero:
+        return zero, zero, zero
+    far = (high - min(red, green, blue)) / high
+    kept = kept_distance(far) if filmic else one / max(far, one)
+    if kept < one:
+        red, green, blue = high - (high - red) * kept, high - (high - green) * kept, high - (high - blue) * kept
+    if not filmic:
+        return min(max(red, zero), one), min(max(green, zero), one), min(max(blue, zero), one)
+    tone, bend = high, np.float32(SHOULDER)
+    if high > bend:
+        beyond = (high - bend) / (one - bend)
+        tone = bend + (one - bend) * beyond / (one + beyond)
+    over = max(high - one, zero)
+    colored = np.float32(HALF_WHITE) / (np.float32(HALF_WHITE) + over)
+    scale = tone / high * colored
+    grey = tone * (one - colored)
+    red, green, blue = grey + red * scale, grey + green * scale, grey + blue * scale
+    return min(max(red, zero), one), min(max(green, zero), one), min(max(blue, zero), one)
+
+
+@borrowing
+def kept_distance(far):
+    """Return the part that is kept of a distance from grey, (max - min) / max: the smooth knee of `shown_color`."""
+    one, knee = np.float32(1.0), np.float32(KNEE)
+    if far <= knee:
+        return one
+    beyond = min((far - knee) / (one - knee), np.float32(1e6))
+    return (knee + (one - knee) * beyond / (one + beyond ** np.float32(1.2)) ** np.float32(1.0 / 1.2)) / far
 
 
 @compiled
-def encode_sum(ghosts, ghost_gain, rest, rest_gain, corner, codes, following, out):
+def compress_gamut(pixels):
+    """Move colours with negative channels inwards, in place, as `shown_color` does in the filmic view.
+
+    Parameters
+    ----------
+    pixels : ndarray, shape (H, W, 3), float32
+        Linear; no channel is negative afterwards, and no pixel's largest channel changes.
+    """
+    zero = np.float32(0.0)
+    for i in range(pixels.shape[0]):
+        for j in range(pixels.shape[1]):
+            red, green, blue = pixels[i, j, 0], pixels[i, j, 1], pixels[i, j, 2]
+            high = max(red, green, blue)
+            if not high > zero:
+                pixels[i, j, 0], pixels[i, j, 1], pixels[i, j, 2] = zero, zero, zero
+                continue
+            kept = kept_distance((high - min(red, green, blue)) / high)
+            # what lies well within stays to the last bit
+            if kept < np.float32(1.0):
+                pixels[i, j, 0] = max(high - (high - red) * kept, zero)
+                pixels[i, j, 1] = max(high - (high - green) * kept, zero)
+                pixels[i, j, 2] = max(high - (high - blue) * kept, zero)
+
+
+@borrowing
+def _bounded(light):
+    """Return light that can be reckoned with: what is no number is dark."""
+    most = np.float32(1e30)
+    return min(max(light, -most), most) if light == light else np.float32(0.0)
+
+
+@borrowing
+def code_of(light, codes, following):
+    """Look up the code of a value in [0, 1]; the tables as in `encode_sum`."""
+    code = codes[np.int64(light * np.float32(codes.shape[0] - 1))]
+    return np.uint8(code + (light >= following[code]))
+
+
+@compiled
+def encode(light, gain, filmic, codes, following, out):
+    """Expose a picture and look its codes up.
+
+    Parameters
+    ----------
+    light : ndarray, shape (H, W, 3), float32
+        Linear Rec.709.
+    gain : float32
+    filmic, codes, following, out
+        As in `encode_sum`.
+    """
+    for i in range(out.shape[0]):
+        for j in range(out.shape[1]):
+            red, green, blue = shown_color(light[i, j, 0] * gain, light[i, j, 1] * gain, light[i, j, 2] * gain, filmic)
+            out[i, j, 0] = code_of(red, codes, following)
+            out[i, j, 1] = code_of(green, codes, following)
+            out[i, j, 2] = code_of(blue, codes, following)
+
+
+@compiled
+def encode_sum(ghosts, ghost_gain, rest, rest_gain, corner, filmic, codes, following, out):
     """Add two pictures and look their codes up.
 
     Parameters
@@ -18,6 +142,8 @@ def encode_sum(ghosts, ghost_gain, rest, rest_gain, corner, codes, following, ou
         At least as large.
     corner : tuple of int
         Row and column of `rest` that lie on the first pixel.
+    filmic : bool
+        As in `shown_color`.
     codes : ndarray, shape (N + 1,), uint8
         Code at the lower end of each of N even cells of [0, 1].
     following : ndarray, shape (256,), float32
@@ -25,13 +151,14 @@ def encode_sum(ghosts, ghost_gain, rest, rest_gain, corner, codes, following, ou
     out : ndarray, shape (H, W, 3), uint8
     """
     top, left = corner
-    cells = np.float32(codes.shape[0] - 1)
-    zero, one = np.float32(0.0), np.float32(1.0)
     for i in range(out.shape[0]):
         for j in range(out.shape[1]):
-            for c in range(3):
-                light = ghosts[i, j, c] * ghost_gain[c] + rest[top + i, left + j, c] * rest_gain[c]
-                # what is no number is dark
-                light = min(light, one) if light > zero else zero
-                code = codes[np.int64(light * cells)]
-                out[i, j, c] = code + (light >= following[code])
+            red, green, blue = shown_color(
+                ghosts[i, j, 0] * ghost_gain[0] + rest[top + i, left + j, 0] * rest_gain[0],
+                ghosts[i, j, 1] * ghost_gain[1] + rest[top + i, left + j, 1] * rest_gain[1],
+                ghosts[i, j, 2] * ghost_gain[2] + rest[top + i, left + j, 2] * rest_gain[2],
+                filmic,
+            )
+            out[i, j, 0] = code_of(red, codes, following)
+            out[i, j, 1] = code_of(green, codes, following)
+            out[i, j, 2] = code_of(blue, codes, following)

@@ -26,6 +26,7 @@ from ..optics.holdout import hidden_at
 from ..optics.spectrum import spectrum_xyz
 from ..render.art import graded
 from ..render.compose import beauty
+from ..render.gamut import within
 from ..render.holdout import read_plates
 from ..render.render import BLACK, HIDDEN, PIXEL_BYTES, Progress, Rendering, refuse_endless, render
 from ..render.room import need, spare_bytes
@@ -203,6 +204,7 @@ def render_measured(project: Project, *, progress: Progress | None = None) -> Re
         others = [
             graded(layer, by_pass.get("ghosts", 1.0)) for layer in _brightest(project, singles, gains)
         ]  # fmt: skip
+        passes, others = within(project.output.gamut, passes), within(project.output.gamut, others)
         total = beauty(passes, size)
     refuse_endless((total, *others))
     layers = (total,) if project.output.layers == "beauty" else (total, *passes, *others)

@@ -123,6 +123,9 @@ class Output(Frozen):
     brightest : int or None
         Of the single ghosts only the N brightest get a layer of their own.
     colorspace : {"rec709", "acescg"}
+    gamut : {"keep", "compress"}
+        keep: colours outside the primaries have negative channels; compress: they are moved towards white, and the
+        beauty is the sum of the passes so moved.
     pixel_type : {"half", "float"}
     starburst : bool
         Whether the direct image of the light with its diffraction pattern is part of the picture.
@@ -131,6 +134,7 @@ class Output(Frozen):
     layers: Literal["beauty", "passes", "ghosts"] = "passes"
     brightest: int | None = Field(None, ge=1)
     colorspace: Colorspace = "rec709"
+    gamut: Literal["keep", "compress"] = "keep"
     pixel_type: Literal["half", "float"] = "float"
     starburst: StrictBool = True
 

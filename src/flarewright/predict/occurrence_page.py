@@ -110,7 +110,7 @@ def shown_together(pictures: Sequence[NDArray[np.float32]]) -> tuple[list[NDArra
     """
     lit = [auto_exposure(picture) for picture in pictures if float(picture.max(initial=0.0)) > 0.0]
     stops = min(lit, default=0.0)
-    return [view(picture, stops, "filmic") for picture in pictures], stops
+    return [view(picture, stops) for picture in pictures], stops
 
 
 def _context(found: Occurrence) -> str:

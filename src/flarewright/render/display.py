@@ -1,14 +1,15 @@
 """From linear light to the eight bits of a screen.
 
-Everything before this file keeps negative and very large values. Here, at the very end, negative colours (outside
-Rec.709's triangle) are clamped to 0 and what is brighter than white is clipped to white; `view_text` says so.
+Everything before this file keeps negative and very large values. Here, at the very end, colours outside Rec.709's
+triangle are brought in along the line to white, and what is brighter than white rolls off; `view_text` says so. One
+function serves the PNG, the editor, the library's thumbnails, reports and movies (`kernels.screen.shown_color`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import lru_cache
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +17,7 @@ from numpy.typing import NDArray
 from ..errors import FlarewrightError
 from ..model.camera import Colorspace
 
-Transform = Literal["srgb", "filmic"]
+Transform = Literal["filmic", "srgb", "aces"]
 
 # ACEScg (AP1, ACES white) to Rec.709 (D65), Bradford adaptation: from the primaries of S-2014-004 and BT.709-6,
 # recomputed in tests/render/test_display.py.
@@ -28,26 +29,24 @@ ACESCG_TO_REC709: NDArray[np.float64] = np.array(
     ]
 )
 
-_LUMINANCE_REC709 = np.array([0.2126, 0.7152, 0.0722])
-
-# Auto exposure puts this percentile of the lit pixels at this linear display value,
-_PERCENTILE = 99.0
-_TARGET = 0.7
-# unless a veil over the whole picture, its median, would come out brighter than this.
-_BRIGHTEST_VEIL = 0.04
+# Auto exposure puts this percentile of the lit pixels of what shall be seen at this linear display value,
+_PERCENTILE = 99.5
+_TARGET = 0.9
+# unless more of the whole picture than this would burn out, which spikes and scattered light do together with the core
+# of a star,
+_BURNT_OUT = 2.5
+# or a veil over all of it, its median, would come out brighter than this.
+_BRIGHTEST_VEIL = 0.03
 _DARKEST = 1e-30
 
 # The sRGB curve is steepest at black, 12.92 * 255 codes per unit: no cell of [0, 1] holds more than two codes.
 _CELLS = 4096
 
-_GREY = 0.18
-_CONTRAST = 1.2
-
 
 def view(
     rgb_linear: NDArray[np.float32],
     exposure_stops: float | None = None,
-    transform: Transform = "srgb",
+    transform: Transform = "filmic",
     colorspace: Colorspace = "rec709",
 ) -> NDArray[np.uint8]:
     """Return a picture for a screen.
@@ -58,8 +57,9 @@ def view(
         Linear, scene-referred.
     exposure_stops : float or None
         The light is multiplied by 2 to this power; None takes `auto_exposure`.
-    transform : {"srgb", "filmic"}
-        srgb: the exact sRGB curve, clipped at white; filmic: `filmic` first, which rolls off towards white.
+    transform : {"filmic", "srgb", "aces"}
+        filmic: bright light rolls off towards white; srgb: the exact sRGB curve, clipped at white. Colours outside
+        Rec.709 keep their dominant wavelength in both (`kernels.screen.shown_color`). aces: ACES 2 by opencolorio.
     colorspace : {"rec709", "acescg"}
         Of `rgb_linear`.
 
@@ -67,19 +67,30 @@ def view(
     -------
     ndarray, shape (height, width, 3), uint8
         sRGB-encoded.
+
+    Raises
+    ------
+    FlarewrightError
+        For a transform that is not known, or one that needs what is not installed.
     """
+    from ..kernels.screen import encode
+
+    if transform not in get_args(Transform):
+        raise FlarewrightError(f"the view {transform!r} is unknown; choose {', '.join(get_args(Transform))}")
     if exposure_stops is None:
         exposure_stops = auto_exposure(rgb_linear, colorspace)
     light: NDArray[np.floating] = np.asarray(rgb_linear, np.float32)
     if colorspace == "acescg":
         light = light @ ACESCG_TO_REC709.T
-    with np.errstate(over="ignore"):
-        light = np.maximum(light * np.float32(2.0**exposure_stops), 0.0)
-    if transform == "filmic":
-        light = filmic(light.astype(np.float64))
-    elif transform != "srgb":
-        raise FlarewrightError(f"the view {transform!r} is unknown; known are srgb and filmic")
-    return _encoded(np.minimum(light, 1.0))
+    gain = np.float32(min(2.0**exposure_stops, float(np.finfo(np.float32).max)))
+    if transform == "aces":
+        from .aces_view import aces_pixels
+
+        with np.errstate(over="ignore"):
+            return aces_pixels(np.asarray(light * gain, np.float32))
+    out = np.empty(light.shape, dtype=np.uint8)
+    encode(np.ascontiguousarray(light, np.float32), gain, transform == "filmic", *_tables(), out)
+    return out
 
 
 def view_sum(
@@ -90,8 +101,9 @@ def view_sum(
     ghost_gain: Sequence[float] = (1.0, 1.0, 1.0),
     rest_gain: Sequence[float] = (1.0, 1.0, 1.0),
     corner: tuple[int, int] = (0, 0),
+    transform: str = "filmic",
 ) -> NDArray[np.uint8]:
-    """Return `view` of a sum by the sRGB curve, in a fraction of its time: for pictures that are only looked at.
+    """Return `view` of a sum, without the sum: for pictures that are only looked at.
 
     Parameters
     ----------
@@ -104,11 +116,13 @@ def view_sum(
         Red, green and blue.
     corner : tuple of int
         Row and column of `rest` that lie on the first pixel.
+    transform : {"filmic", "srgb"}
+        As in `view`.
 
     Returns
     -------
     ndarray, shape (height, width, 3), uint8
-        sRGB-encoded; as `view(ghosts * ghost_gain + rest * rest_gain, exposure_stops)`.
+        sRGB-encoded; as `view(ghosts * ghost_gain + rest * rest_gain, exposure_stops, transform)`.
     """
     # compiled code is loaded where it is called
     from ..kernels.screen import encode_sum
@@ -117,15 +131,8 @@ def view_sum(
     gains = (np.array(gain, dtype=np.float64) * exposure for gain in (ghost_gain, rest_gain))
     first, second = (np.minimum(gain, np.finfo(np.float32).max).astype(np.float32) for gain in gains)
     out = np.empty(ghosts.shape, dtype=np.uint8)
-    encode_sum(ghosts, first, rest, second, corner, *_tables(), out)
+    encode_sum(ghosts, first, rest, second, corner, transform == "filmic", *_tables(), out)
     return out
-
-
-def _encoded(light: NDArray[np.floating]) -> NDArray[np.uint8]:
-    """Round `srgb_oetf` of values in [0, 1] to 8 bits, by tables: a power per value would take longer than a draft."""
-    codes, following = _tables()
-    found = codes[(light * _CELLS).astype(np.uint16)]
-    return found + (light >= following[found])
 
 
 @lru_cache(maxsize=1)
@@ -145,60 +152,53 @@ def _tables() -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
 def view_text(exposure_stops: float, transform: Transform, colorspace: Colorspace, *, automatic: bool) -> str:
     """Return the sentence that states a view, for the file and the person."""
     how = " (automatic)" if automatic else ""
-    curve = "sRGB" if transform == "srgb" else "filmic (Naka-Rushton, contrast 1.2) then sRGB"
+    curve = {"srgb": "sRGB clipped at white", "aces": "ACES by opencolorio"}.get(
+        transform, "filmic roll-off to white, sRGB"
+    )
     source = "ACEScg converted to Rec.709" if colorspace == "acescg" else "Rec.709"
-    return f"exposure {exposure_stops:+.2f} stops{how}, {source}, {curve}, negative colours clamped to 0"
+    gamut = "" if transform == "aces" else ", colours outside Rec.709 moved towards white"
+    return f"exposure {exposure_stops:+.2f} stops{how}, {source}, {curve}{gamut}"
 
 
-def auto_exposure(rgb_linear: NDArray[np.float32], colorspace: Colorspace = "rec709") -> float:
-    """Return the exposure in stops that shows faint light without burning out most of it.
+def auto_exposure(
+    rgb_linear: NDArray[np.float32], colorspace: Colorspace = "rec709", *, ghosts: NDArray[np.float32] | None = None
+) -> float:
+    """Return the exposure in stops that shows faint light without burning out much of the picture.
 
     Parameters
     ----------
     rgb_linear : ndarray, shape (height, width, 3)
-        Best the ghosts alone: the direct image of a light is a million times brighter than they are.
+        The whole picture.
     colorspace : {"rec709", "acescg"}
+    ghosts : ndarray, shape (..., 3), optional
+        What shall be seen, if not all: the spikes of a star are as bright as a thousand ghosts.
 
     Returns
     -------
     float
-        Puts the 99th percentile of the luminance of all lit pixels at a linear 0.7, or the median of all pixels at
-        0.04 where that is darker, so that large even ghosts do not turn black into grey. Rounded to a hundredth of a
-        stop; 0 for a black picture.
+        Puts the 99.5th percentile of the ghosts' lit pixels at a linear 0.9 (largest channel), or the 97.5th of the
+        whole picture at 1 or its median at 0.03 where these are darker: what scatters is not burnt out, and large even
+        light does not turn black into grey. Rounded to a hundredth of a stop; 0 for a black picture.
     """
-    light = np.asarray(rgb_linear, np.float64)
-    weights = _LUMINANCE_REC709 if colorspace == "rec709" else _LUMINANCE_REC709 @ ACESCG_TO_REC709
-    luminance = light @ weights
-    lit = luminance[luminance > _DARKEST]
+    whole = _brightest(rgb_linear, colorspace)
+    shown = whole if ghosts is None else _brightest(ghosts, colorspace)
+    lit = shown[shown > _DARKEST]
+    if lit.size == 0:
+        lit = whole[whole > _DARKEST]
     if lit.size == 0:
         return 0.0
-    gain = _TARGET / float(np.percentile(lit, _PERCENTILE))
-    veil = float(np.median(luminance))
-    if veil > _DARKEST:
-        gain = min(gain, _BRIGHTEST_VEIL / veil)
+    burnt_out, veil = np.percentile(whole, [100.0 - _BURNT_OUT, 50.0])
+    limits = (_TARGET / float(np.percentile(lit, _PERCENTILE)), 1.0, burnt_out), (np.inf, _BRIGHTEST_VEIL, veil)
+    gain = min(min(most, value / light) if light > _DARKEST else most for most, value, light in limits)
     return round(float(np.log2(gain)), 2)
 
 
-def filmic(light: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return light rolled off towards white like film: 0 stays 0, 0.18 stays 0.18, infinity becomes 1.
-
-    Parameters
-    ----------
-    light : ndarray
-        Linear, not negative.
-
-    Returns
-    -------
-    ndarray of the same shape, in [0, 1)
-
-    Notes
-    -----
-    The Naka-Rushton response x^c / (x^c + s), the photoreceptor curve of Reinhard and Devlin, "Dynamic Range Reduction
-    Inspired by Photoreceptor Physiology", 2005, eq. 1, per channel with c = 1.2 and s so that middle grey stays.
-    """
-    semi_saturation = _GREY**_CONTRAST * (1.0 - _GREY) / _GREY
-    # Written as 1 - s / (x^c + s), an infinite x gives 1 and not infinity over infinity.
-    return np.asarray(1.0 - semi_saturation / (np.power(light, _CONTRAST) + semi_saturation))
+def _brightest(rgb_linear: NDArray[np.float32], colorspace: Colorspace) -> NDArray[np.float64]:
+    """Return the largest channel of each pixel in Rec.709."""
+    light = np.asarray(rgb_linear, np.float64)
+    if colorspace == "acescg":
+        light = light @ ACESCG_TO_REC709.T
+    return np.asarray(light.max(axis=-1))
 
 
 def srgb_oetf(light: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -24,6 +24,7 @@ from ..optics.shape import ideal
 from .art import ResolvedArt, directed, graded, resolve_art
 from .compose import beauty
 from .direct import DirectImage, direct_image, widest_defocus_mm
+from .gamut import within
 from .ghosts import plain_level, render_ghosts
 from .prepare import Settled, settle
 from .room import need, spare_bytes
@@ -149,6 +150,7 @@ def render(
     with np.errstate(over="ignore", invalid="ignore"):
         passes = [graded(layer, art.gain.get(layer.name.removesuffix(".order4"), 1.0)) for layer in passes]
         others = [graded(layer, art.gain.get("ghosts", 1.0)) for layer in drawn.others]
+        passes, others = within(project.output.gamut, passes), within(project.output.gamut, others)
         whole = beauty(passes, project.camera.size_px)
     layers = (whole,) if project.output.layers == "beauty" else (whole, *passes, *others)
     # the beauty is endless where a pass is

@@ -229,7 +229,7 @@ function header() {
   const undo = button('↶', () => app.step('/api/undo'), { kind: 'quiet', 'aria-label': 'Undo', id: 'undo' });
   const redo = button('↷', () => app.step('/api/redo'), { kind: 'quiet', 'aria-label': 'Redo', id: 'redo' });
   const look = h('select', { id: 'look', 'aria-label': 'View', tip: 'How linear light becomes a picture for the screen; files stay linear.' },
-    h('option', { value: 'srgb' }, 'sRGB'), h('option', { value: 'filmic' }, 'Filmic'), h('option', { value: 'aces' }, 'ACES'), h('option', { value: 'false-colour' }, 'False colour'));
+    h('option', { value: 'filmic' }, 'Filmic'), h('option', { value: 'srgb' }, 'sRGB'), h('option', { value: 'aces' }, 'ACES'), h('option', { value: 'false-colour' }, 'False colour'));
   look.addEventListener('change', () => app.setView({ look: look.value }));
   const exposure = slider({
     label: 'Exposure', tip: 'Stops: each step of one doubles the light. It changes the screen, no file.', min: -6, max: 30, step: 0.1, digits: 1, name: 'exposure',
@@ -450,7 +450,7 @@ addEventListener('keydown', (event) => {
   const zoom = { PageUp: 1.25, PageDown: 0.8 }[event.key];
   if (zoom && onPage) { event.preventDefault(); app.view.zoomBy(zoom); return; }
   if (event.key === ' ' && onPage) { event.preventDefault(); app.view.space = true; return; }
-  const looks = ['srgb', 'filmic', ...(app.state.aces ? ['aces'] : []), 'false-colour'];
+  const looks = ['filmic', 'srgb', ...(app.state.aces ? ['aces'] : []), 'false-colour'];
   const work = {
     f: () => app.view.fit(), z: () => app.view.fit(app.state.frame.full[0] / app.view.frame().w * app.view.zoom / (devicePixelRatio || 1)), a: () => app.ask('/api/expose'),
     '+': () => app.setView({ exposure_stops: view.stops + 0.5 }), '=': () => app.setView({ exposure_stops: view.stops + 0.5 }), '-': () => app.setView({ exposure_stops: view.stops - 0.5 }),

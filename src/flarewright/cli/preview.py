@@ -1,0 +1,121 @@
+"""The PNG beside a render: its flags, its exposure, its file."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, get_args
+
+from ..errors import ProjectError
+
+if TYPE_CHECKING:
+    from ..render.render import Rendering
+
+__all__ = ["PreviewLook", "preview_look", "write_preview"]
+
+
+@dataclass(frozen=True)
+class PreviewLook:
+    """How the PNG is to look.
+
+    Attributes
+    ----------
+    transform : {"filmic", "srgb", "aces"}
+    stops : float or None
+        Exposure; None: found, or that of a camera.
+    ev, shutter_s : float or None
+        Of a camera.
+    iso, lux : float
+    """
+
+    transform: Any = "filmic"
+    stops: float | None = None
+    ev: float | None = None
+    shutter_s: float | None = None
+    iso: float = 100.0
+    lux: float = 1e5
+
+
+def preview_look(
+    *, view: str | None, exposure: float | None, ev: float | None, shutter: str | None, iso: float | None,
+    lux: str | None, no_png: bool,
+) -> PreviewLook | None:  # fmt: skip
+    """Read the flags of the PNG; None when there is to be none.
+
+    Raises
+    ------
+    ProjectError
+        For flags that say nothing, contradict each other or are out of range.
+    """
+    from ..render.display import Transform
+    from ..render.photographic import SUN_LUX
+
+    given = {"--exposure": exposure, "--ev": ev, "--shutter": shutter, "--iso": iso, "--lux": lux, "--view": view}
+    flags = [flag for flag, value in given.items() if value is not None]
+    if no_png:
+        if flags:
+            raise ProjectError(f"{flags[0]} is for the PNG alone and --no-png leaves it out; keep one")
+        return None
+    if view is not None and view not in get_args(Transform):
+        raise ProjectError(f"--view {view!r} is unknown; choose {', '.join(get_args(Transform))}")
+    if view == "aces":
+        from ..render.aces_view import aces_available
+
+        if not aces_available():
+            raise ProjectError("--view aces needs opencolorio: pip install 'flarewright[color]', or choose filmic")
+    if exposure is not None and not -100.0 <= exposure <= 100.0:
+        raise ProjectError(f"--exposure {exposure:g} is out of range; choose between -100 and 100 stops")
+    ways = [flag for flag in ("--exposure", "--ev", "--shutter") if flag in flags]
+    if len(ways) > 1:
+        raise ProjectError(f"{' and '.join(ways)} each say how bright the PNG is; keep one")
+    if ways in ([], ["--exposure"]) and (iso is not None or lux is not None):
+        raise ProjectError(f"{'--iso' if iso is not None else '--lux'} needs --ev or --shutter beside it")
+    if ev is not None and not -30.0 <= ev <= 40.0:
+        raise ProjectError(f"--ev {ev:g} is out of range; choose between -30 and 40")
+    if iso is not None and not 1.0 <= iso <= 1e7:
+        raise ProjectError(f"--iso {iso:g} is out of range; choose between 1 and 10 000 000")
+    return PreviewLook(
+        transform=view or "filmic", stops=exposure, ev=ev,
+        shutter_s=None if shutter is None else _number("--shutter", shutter, "1/250 or 0.004", 1e-6, 1e5),
+        iso=iso or 100.0,
+        lux=SUN_LUX if lux in (None, "sun") else _number("--lux", lux, "a number or sun", 1e-6, 1e9),
+    )  # fmt: skip
+
+
+def _number(flag: str, text: str | None, example: str, low: float, high: float) -> float:
+    """Read a number or a fraction."""
+    above, _, below = (text or "").partition("/")
+    try:
+        value = float(above) / (float(below) if below else 1.0)
+    except (ValueError, ZeroDivisionError):
+        value = float("nan")
+    if not low <= value <= high:
+        raise ProjectError(f"{flag} {text!r} is not between {low:g} and {high:g}; write it like {example}")
+    return value
+
+
+def write_preview(rendering: Rendering, path: Path, look: PreviewLook) -> dict[str, Any]:
+    """Write the PNG of a render and return what the summary states of it."""
+    from .. import __version__
+    from ..io.png import write_png
+    from ..render.display import auto_exposure, view, view_text
+    from ..render.photographic import photographic_stops
+
+    layers, colorspace = rendering.layers, rendering.project.output.colorspace
+    automatic = look.stops is None and look.ev is None and look.shutter_s is None
+    if automatic:
+        ghosts = next((layer.pixels for layer in layers if layer.name == "ghosts"), None)
+        stops = auto_exposure(layers[0].pixels, colorspace, ghosts=ghosts)
+    elif look.stops is not None:
+        stops = look.stops
+    else:
+        f_number = rendering.summary.get("f_number")
+        if f_number is None:
+            if look.ev is not None:
+                raise ProjectError("--ev needs an f-number, which this flare has not; give --shutter instead")
+            f_number = 1.0
+        stops = photographic_stops(f_number, ev=look.ev, shutter_s=look.shutter_s, iso=look.iso, lux=look.lux)
+    stated = view_text(stops, look.transform, colorspace, automatic=automatic)
+    pixels = view(layers[0].pixels, stops, look.transform, colorspace)
+    write_png(path, pixels, {"Software": f"Flarewright {__version__}", "Description": stated})
+    return {"preview": str(path), "view": stated, "exposure_stops": stops}
