@@ -560,8 +560,8 @@ def _write(
     outside = negative_share(rendering.layers[0])
     if outside > 0.0:
         remarks.append(
-            f"{round(outside * width * height)} of {width * height} pixels have a negative channel, colours outside the "
-            "file's primaries; --gamut compress writes none"
+            f"{round(outside * width * height)} of {width * height} pixels have a negative channel: colours outside "
+            "the file's primaries; --gamut compress writes none"
         )
     files: dict[str, Any] = {
         "output": str(output), "layers": [layer.name for layer in rendering.layers], "negative_pixels": outside

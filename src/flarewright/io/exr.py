@@ -79,8 +79,8 @@ def write_exr(
     layers: Sequence[Layer],
     size_px: tuple[int, int],
     *,
-    pixel_type: Literal["half", "float"],
-    metadata: Mapping[str, str],
+    pixel_type: Literal["half", "float"] = "float",
+    metadata: Mapping[str, str] | None = None,
     pixel_aspect: float = 1.0,
     colorspace: Colorspace = "rec709",
     full_windows: bool = False,
@@ -95,7 +95,7 @@ def write_exr(
     size_px : tuple of int
         Width and height of the whole picture.
     pixel_type : {"half", "float"}
-    metadata : mapping of str to str
+    metadata : mapping of str to str, optional
         Goes into the first part's header, each name prefixed by "flarewright.".
     pixel_aspect : float
         Width of a pixel over its height.
@@ -133,7 +133,7 @@ def write_exr(
         clipped += lost
         header = _header(layer, window, size_px, pixel_aspect, colorspace)
         if k == 0:
-            header |= {f"{_PREFIX}{name}": text for name, text in metadata.items()}
+            header |= {f"{_PREFIX}{name}": text for name, text in (metadata or {}).items()}
         parts.append(OpenEXR.Part(header, channels, layer.name))
 
     # the library compresses on one thread unless it is told otherwise; its oldest releases cannot be told

@@ -26,6 +26,7 @@ from .compose import beauty
 from .direct import DirectImage, direct_image, widest_defocus_mm
 from .gamut import within
 from .ghosts import plain_level, render_ghosts
+from .placing import outside, veiled
 from .prepare import Settled, settle
 from .room import need, spare_bytes
 from .scatter import dimmed, render_scatter, scatter_facts, scatter_of
@@ -68,6 +69,16 @@ class Rendering:
     summary: dict[str, Any]
     remarks: tuple[str, ...]
     ledger: Ledger | None = None
+
+    def _repr_png_(self) -> bytes:
+        """Show the beauty in a notebook, as the PNG beside an EXR does."""
+        from ..io.png import encode_png
+        from .display import auto_exposure, view
+
+        colorspace = self.project.output.colorspace
+        ghosts = next((layer.pixels for layer in self.layers if layer.name == "ghosts"), None)
+        stops = auto_exposure(self.layers[0].pixels, colorspace, ghosts=ghosts)
+        return encode_png(view(self.layers[0].pixels, stops, "filmic", colorspace), {})
 
 
 def render(
@@ -168,7 +179,10 @@ def render(
         settled.project,
         layers,
         {**summary, "ledger": account.as_data()} if ledger and account is not None else summary,
-        (*settled.remarks, *drawn.remarks, *told, *_remarks(settled, seen), *_stretched(mask)),
+        (
+            *settled.remarks, *drawn.remarks, *told, *outside(shots, images), *_veiled(drawn.passes),
+            *_remarks(settled, seen), *_stretched(mask),
+        ),
         account if ledger else None,
     )
 
@@ -324,6 +338,11 @@ def _reference(
     if settled.project.quality.paths != "all":
         told.append(f"reference quality traces every path, not only {settled.project.quality.paths} ones")
     return _Drawn(found.layers, found.variances, {"reference": found.facts}, tuple(told), found.ledger)
+
+
+def _veiled(passes: Sequence[Layer]) -> list[str]:
+    ghosts = next((layer for layer in passes if layer.name == "ghosts"), None)
+    return [] if ghosts is None else veiled(ghosts)
 
 
 def _remarks(settled: Settled, shots: tuple[Shot, ...]) -> tuple[str, ...]:
