@@ -25,7 +25,8 @@ def rendering(*fields, **light):
 
 
 def remarks(*fields, **light):
-    return [remark for remark in rendering(*fields, **light).remarks if "the picture" in remark and "veil" not in remark]
+    told = rendering(*fields, **light).remarks
+    return [remark for remark in told if "the picture" in remark and "veil" not in remark]
 
 
 def test_a_light_inside_is_not_told():
