@@ -351,7 +351,7 @@ COMMAND_LINES = {
     "sensor of an airfield": (
         [*H, *GOOD, "--sensor", "1e9x1e9"], "--sensor: 1e+09x1e+09 mm is no sensor; give at most"),
     "pixels like fields": (
-        [*H, *GOOD, "--sensor", "1e6x1e6", "--size", "64x36", "--quality", "draft"],
+        [*H, *GOOD, "--ideal", "--sensor", "1e6x1e6", "--size", "64x36", "--quality", "draft"],
         "pixels of 2.78e+04 mm are too coarse for the starburst, whose core has 0.084 mm; give a smaller --sensor"),
     "unknown layers": ([*H, *GOOD, "--layers", "all"], "--layers"),
     "brightest zero": ([*H, *GOOD, "--brightest", "0"], "--brightest"),

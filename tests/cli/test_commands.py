@@ -94,7 +94,9 @@ def projects(monkeypatch):
 
 
 def test_render_writes_exr_and_preview_and_tells(capsys, projects, folder):
-    said = call(capsys, "render", "heliar-tronnier", "--light", "-3,4", "--size", "8x6", "--half", "-o", "a.exr")
+    said = call(
+        capsys, "render", "heliar-tronnier", "--ideal", "--light", "-3,4", "--size", "8x6", "--half", "-o", "a.exr"
+    )
     assert said.out == ""
     assert said.err.splitlines()[0] == "flarewright: a remark"
     assert "clipped" in said.err
@@ -112,7 +114,7 @@ def test_render_writes_exr_and_preview_and_tells(capsys, projects, folder):
 
 def test_render_json_is_one_object_and_holds_no_infinity(capsys, projects, folder):
     summary = call_json(
-        capsys, "render", "heliar-tronnier", "--light", "1,1", "--size", "8x6", "--no-png", "-o", "a.exr"
+        capsys, "render", "heliar-tronnier", "--ideal", "--light", "1,1", "--size", "8x6", "--no-png", "-o", "a.exr"
     )
     assert summary["efl_mm"] == 1.0
     assert summary["far"] is None
@@ -214,8 +216,8 @@ def test_a_flag_for_all_that_art_and_lights_can_be(capsys, projects, folder):
     )
     call(capsys, "render", "--project", "p.toml", "-o", "a.exr")
     call(
-        capsys, "render", "heliar-tronnier", "--light", "1,2", "--light-polygon", "-1,0 3,0 3,1", "--size", "8x6",
-        "--starburst-spiral", "12", "--rule",
+        capsys, "render", "heliar-tronnier", "--ideal", "--light", "1,2", "--light-polygon", "-1,0 3,0 3,1", "--size",
+        "8x6", "--starburst-spiral", "12", "--rule",
         'select = "row:7", tint = [1, 0.5, 0], ramp = [[0, 1, 1, 1], [1, 2, 1, 1]], offset_mm = [1, 2]',
         "--rule", "select = 'largest:2', scale = 2, blur_px = 0.5", "-o", "a.exr",
     )  # fmt: skip
@@ -244,6 +246,7 @@ def test_turning_the_blades_keeps_the_lens_own_number(capsys, projects):
         capsys,
         "render",
         "heliar-tronnier",
+        "--ideal",
         "--light",
         "1,1",
         "--size",

@@ -125,7 +125,7 @@ def watched_here(monkeypatch):
         _everywhere(root, root.kernel)
 
 
-SMALL = ("heliar-tronnier", "--light", "12,7", "--size", "64x36", "--wavelengths", "3", "--no-png")
+SMALL = ("heliar-tronnier", "--ideal", "--light", "12,7", "--size", "64x36", "--wavelengths", "3", "--no-png")
 
 
 @pytest.mark.slow
@@ -148,7 +148,8 @@ def test_a_cold_command_writes_what_a_warm_one_writes(tmp_path):
 @pytest.mark.parametrize("size", ["64x36", pytest.param("192x108", marks=pytest.mark.slow)])
 def test_what_a_command_calls_is_compiled_while_its_helper_works(size, tmp_path, request):
     # at seven wavelengths some ghosts are drawn at a few of them
-    words = ("render", "heliar-tronnier", "--light", "12,7", "--size", size, "--no-png", "-o", tmp_path / "a.exr")
+    lens = ("heliar-tronnier", "--ideal", "--light", "12,7")
+    words = ("render", *lens, "--size", size, "--no-png", "-o", tmp_path / "a.exr")
     if size == "64x36":
         roots = request.getfixturevalue("watched_here")(*words)
     else:

@@ -90,6 +90,7 @@ def as_data(lens: Lens, order: FirstOrder) -> dict[str, Any]:
     """Return a lens as the JSON that `--json` prints."""
     from ..io.coating_text import format_coating
     from ..model import Surface
+    from ..optics.pack import preset_names
 
     rows: list[dict[str, Any]] = []
     for k, row in enumerate(lens.rows):
@@ -139,7 +140,7 @@ def as_data(lens: Lens, order: FirstOrder) -> dict[str, Any]:
         "positions": [position.name for position in lens.positions],
         "squeeze": lens.squeeze,
         "elements": [element.model_dump(mode="json") for element in lens.elements],
-        "coating_presets": sorted(lens.coating_presets),
+        "coating_presets": sorted(preset_names(lens)),
         "rows": rows,
     }
 

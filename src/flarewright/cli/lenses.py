@@ -15,6 +15,7 @@ def lenses(as_json: Annotated[bool, typer.Option("--json", help="Print one JSON 
     """List the lenses that ship, with focal length, f-number, field and source."""
     from ..io.lens_file import read_lens_toml
     from ..io.library import lens_path, shipped
+    from ..optics.pack import preset_names
     from ..render.prepare import first_order
 
     found: list[dict[str, Any]] = []
@@ -29,7 +30,7 @@ def lenses(as_json: Annotated[bool, typer.Option("--json", help="Print one JSON 
                 "f_number": lens.f_number,
                 "field_deg": lens.field_deg,
                 "surfaces": len(lens.rows) - 1,
-                "coating_presets": sorted(lens.coating_presets),
+                "coating_presets": sorted(preset_names(lens)),
                 "source": lens.source,
             }
         )

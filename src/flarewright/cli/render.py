@@ -119,6 +119,15 @@ def render(
             rich_help_panel=_LENS,
         ),
     ] = None,
+    ideal: Annotated[
+        bool,
+        typer.Option(
+            "--ideal",
+            help="Lens of the library as in its file: wide open, bare unless its file says more, straight blades, a "
+            "point of light. Left out: stopped down, coated, as photographed.",
+            rich_help_panel=_LENS,
+        ),
+    ] = False,
     focus: Annotated[
         float | None,
         typer.Option(help="Plane in focus, mm in front of the lens; infinity when left out.", rich_help_panel=_LENS),
@@ -380,6 +389,7 @@ def render(
     if half and float32:
         raise ProjectError("--half and --float both say how many bits a value has; keep one")
     from .art_flags import naming_rules
+    from .photograph import as_photographed
     from .render_flags import Flags, build_project
 
     state = _read_state(resume)
@@ -403,6 +413,7 @@ def render(
         cover_glass=cover_glass, sensor_reflectance=sensor_reflectance, sensor_grating=sensor_grating,
         squeeze=squeeze, desqueeze=desqueeze,
     )  # fmt: skip
+    flags, defaults = (flags, None) if ideal else as_photographed(flags)
     settings = build_project(flags)
     only = {
         "--resume": state, "--time-limit": time_limit, "--error": error, "--error-of": error_of, "--samples": samples,
@@ -420,7 +431,7 @@ def render(
             tell([f"to go on: flarewright render --resume {run.state_file} -o {output}"])
         raise
     files, remarks = _write(rendering, output, full_windows, look)
-    remarks = [*rendering.remarks, *remarks]
+    remarks = [*([] if defaults is None else [defaults]), *rendering.remarks, *remarks]
     if ringing == "collins" and settings.quality.mode != "final":
         remarks.insert(0, f"{settings.quality.mode} quality traces rays alone: --ringing is for final quality")
     if orders == 4 and settings.quality.mode == "draft":

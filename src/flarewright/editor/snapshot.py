@@ -8,6 +8,7 @@ from ..errors import FlarewrightError
 from ..io.spectrum_text import spectrum_text
 from ..measure.rendering import is_measured
 from ..model import Design, Project
+from ..optics.pack import preset_names
 from ..render.prepare import as_lens
 from .edit_ghosts import hand, soloed
 from .edit_lens import prescription, table_of
@@ -117,7 +118,7 @@ def _lens(project: Project, facts: dict[str, float], problem: str) -> dict[str, 
         "name": lens.name, "source": lens.source, "notes": lens.notes, "facts": facts, "problem": problem,
         "open": lens.f_number, "f_number": project.f_number, "zoom": project.zoom,
         "positions": [position.name for position in lens.positions],
-        "presets": list(lens.coating_presets), "stop_row": lens.stop_row,
+        "presets": list(preset_names(lens)), "stop_row": lens.stop_row,
         "shipped": project.lens if isinstance(project.lens, str) else None,
     }  # fmt: skip
 

@@ -83,8 +83,8 @@ class BandCurves:
         place = np.linspace(0.0, COSINES - 1.0, REFLECTANCE_SAMPLES)
         cell = np.minimum(place.astype(np.intp), COSINES - 2)
         low, high = means[:, :, cell], means[:, :, cell + 1]
-        finer: Floats = low + (place - cell) * (high - low)
-        return finer
+        # what is picked out lies in another order, and kernels would be compiled for it once more
+        return np.ascontiguousarray(low + (place - cell) * (high - low))
 
 
 @dataclass(frozen=True)

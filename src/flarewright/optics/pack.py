@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
+from itertools import cycle
 from typing import get_args
 
 import numpy as np
@@ -11,13 +12,19 @@ from numpy.typing import NDArray
 
 from ..errors import LensError, ProjectError
 from ..kernels.intersect import AXES, DEGREE, TANGENT
-from ..model import AsLens, Coating, CoatingChoice, Everywhere, Lens, PerRow, Preset, Stop
+from ..model import AsLens, Coating, CoatingChoice, Everywhere, Lens, PerRow, Preset, QuarterWave, Stop
 from ..model.coating import StandardName
 from .coatings import film_stack, reflectance_table
 from .paraxial import D_LINE_NM, FirstOrder, gap_indices, vertex_positions
 from .shape import curvature_across, seen_along, shape_table, symmetric
 
 REFLECTANCE_SAMPLES = 1025
+
+STAGGERED = "staggered"
+"""A preset that every lens has, if its file has none of that name: chosen for ghosts of many colours, not known."""
+
+STAGGERED_NM = (450.0, 520.0, 600.0, 550.0)
+"""Centre wavelengths of its single films, from the front on."""
 
 
 @dataclass(frozen=True)
@@ -155,8 +162,10 @@ def resolve_coatings(lens: Lens, choice: CoatingChoice) -> tuple[Coating | None,
     if isinstance(choice, AsLens):
         return tuple(None if isinstance(row, Stop) else row.coating for row in lens.rows)
     if isinstance(choice, Preset):
+        if choice.name == STAGGERED and STAGGERED not in lens.coating_presets:
+            return _staggered(lens)
         if choice.name not in lens.coating_presets:
-            known = ", ".join(lens.coating_presets) or "none"
+            known = ", ".join(preset_names(lens))
             hint = "; leave out 'preset:' for the standard coating" if choice.name in get_args(StandardName) else ""
             raise ProjectError(f"{lens.name} has no coating preset {choice.name!r}; it has: {known}{hint}")
         return lens.coating_presets[choice.name]
@@ -171,6 +180,19 @@ def resolve_coatings(lens: Lens, choice: CoatingChoice) -> tuple[Coating | None,
     n = gap_indices(lens, D_LINE_NM)
     in_air = [min(n[k], n[k + 1]) == 1.0 and n[k] != n[k + 1] for k in range(len(lens.rows))]
     return tuple(choice.coating if air else None for air in in_air)
+
+
+def preset_names(lens: Lens) -> tuple[str, ...]:
+    """Return the names that `Preset` may have for a lens: those of its file, and "staggered" in any case."""
+    return tuple(dict.fromkeys((*lens.coating_presets, STAGGERED)))
+
+
+def _staggered(lens: Lens) -> tuple[Coating | None, ...]:
+    """Coat each surface in air with a quarter wave of the next centre wavelength; cemented ones stay bare."""
+    n = gap_indices(lens, D_LINE_NM)
+    centers = cycle(STAGGERED_NM)
+    in_air = [min(n[k], n[k + 1]) == 1.0 and n[k] != n[k + 1] for k in range(len(lens.rows))]
+    return tuple(QuarterWave(center_wavelength_nm=next(centers)) if air else None for air in in_air)
 
 
 def pack_lens(
