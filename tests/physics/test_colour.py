@@ -26,7 +26,7 @@ from flarewright.model import (
     QuarterWave,
     Standard,
 )
-from flarewright.optics.spectrum import VISIBLE_NM, spectral_power
+from flarewright.optics.spectrum import VISIBLE_NM, cie_1931, spectral_power
 from flarewright.render.render import render
 
 LINES_NM = np.linspace(*VISIBLE_NM, 61)
@@ -82,6 +82,14 @@ def off_by(case, spectrum, wavelengths, mode="final"):
     return {
         name: np.abs(found[name].sum(axis=(0, 1)) - rgb).max() / np.abs(rgb).max() for name, rgb in counted.items()
     }
+
+
+@pytest.mark.parametrize("spectrum", [D65(), BlackBody(temperature_k=2856.0)])
+def test_the_range_holds_the_light(spectrum):
+    nm = np.arange(360.0, 831.0)
+    xyz = cie_1931(nm) * spectral_power(spectrum, nm)[:, None]
+    within = (nm >= VISIBLE_NM[0]) & (nm <= VISIBLE_NM[1])
+    assert (xyz[~within].sum(axis=0) < 2e-5 * xyz.sum(axis=0)).all()
 
 
 @pytest.mark.parametrize("case", [*CASES, *SLOW])

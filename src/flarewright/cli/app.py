@@ -44,6 +44,7 @@ from . import (
     scene_check,
     scene_init,
     scene_schema,
+    warm_up,
 )
 from .option_words import name_values
 
@@ -73,6 +74,7 @@ app.command("ghosts", epilog=ghosts.EPILOG)(ghosts.ghosts)
 app.command("predict", epilog=predict.EPILOG)(predict.predict)
 app.command("lenses", epilog=lenses.EPILOG)(lenses.lenses)
 app.command("edit", epilog=edit.EPILOG)(edit.edit)
+app.command("warm-up", epilog=warm_up.EPILOG)(warm_up.warm_up)
 app.add_typer(lens_app, name="lens")
 app.add_typer(coating_app, name="coating")
 app.add_typer(project_app, name="project")

@@ -541,7 +541,7 @@ def _renderer(
     from ..render.first_run import compile_for_render
     from ..render.render import render as render_project
 
-    compile_for_render(project, threads)
+    compile_for_render(project, threads, lambda sentence: tell([sentence]))
     return partial(render_project, project, threads=threads, run=run, ledger=ledger)
 
 

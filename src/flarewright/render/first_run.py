@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from ..kernels.first_run import absent, compile_together
 from ..kernels.helpers import TRACING, cores
 from ..model import Bare, Project
@@ -9,13 +11,16 @@ from ..optics.pack import resolve_coatings
 from ..optics.paths import ghost_paths
 from .prepare import settle
 
+FIRST = "first run: the kernels are compiled once, in some 10 to 40 seconds; flarewright warm-up does it ahead of time"
 # what every command calls that traces rays
 _TRACING = (*sum(TRACING, ()), "measure")
 # what a render with scatter calls besides; that of a lens file compiles when it is called
 _SCATTERING = ("hits", "scatter", "scatter picture", "scatter share")
 
 
-def compile_for_render(project: Project, threads: int | None = None) -> None:
+def compile_for_render(
+    project: Project, threads: int | None = None, report: Callable[[str], None] | None = None
+) -> None:
     """Compile what a render calls, unless it is compiled.
 
     Parameters
@@ -23,6 +28,8 @@ def compile_for_render(project: Project, threads: int | None = None) -> None:
     project : Project
     threads : int, optional
         Most processes to use; None: one a core.
+    report : callable, optional
+        Told a sentence when something has to be compiled.
 
     Raises
     ------
@@ -33,6 +40,8 @@ def compile_for_render(project: Project, threads: int | None = None) -> None:
     if not absent((*_TRACING, *scattering)):
         return
     settled = settle(project)
+    if report is not None:
+        report(FIRST)
     iris = settled.iris
     coated = any(coating not in (None, Bare()) for coating in resolve_coatings(settled.lens, settled.coating))
     names = [*_TRACING, *scattering]
