@@ -20,8 +20,8 @@ LAST_NM = FIRST_NM + STEP_NM * (len(Y_BAR) - 1)
 """The colour matching functions cover FIRST_NM to LAST_NM, 360 to 830 nm."""
 
 VISIBLE_NM = (360.0, 780.0)
-"""Colours of coatings are integrated from here to here; what is beyond counts with the ends. The functions begin at 360 nm,
-and beyond 780 lie 4e-6 of daylight's X, Y and Z, 12e-6 of an incandescent lamp's."""
+"""Colours of coatings are integrated from here to here; what is beyond counts with the ends. The functions begin at
+360 nm, and beyond 780 lie 4e-6 of daylight's X, Y and Z, 12e-6 of an incandescent lamp's."""
 
 _H, _C, _KB = 6.62607015e-34, 299792458.0, 1.380649e-23  # exact SI values
 
