@@ -33,8 +33,8 @@ def test_its_handle_lies_on_its_light_and_takes_it_along(opened):
     tab.drag(start, (start[0] - 330, start[1] + 60), steps=30, hold_ms=25)
     tab.rest()
     assert not tab.state()["picture"]["problem"]
-    # the halo is brightest where its light is
-    picture = tab.shown().astype(float).sum(axis=2)
+    # the halo is brightest where its light is, and warmer than the borders of ghosts, which the codec sharpens
+    picture = tab.shown()[..., 0].astype(float)
     rows, columns = np.nonzero(picture >= picture.max() - 1.0)
     x, y, w, h = tab.frame()
     seen = x + (columns.mean() + 0.5) / picture.shape[1] * w, y + (rows.mean() + 0.5) / picture.shape[0] * h
