@@ -642,7 +642,7 @@ def test_a_hand_is_followed_and_let_go():
     session.do("set_coating", {"text": "none"})
     assert screen.wait(60.0)
     assert screen.exposure_stops == exposure
-    session.do("choose_lens", {"lens": "tessar-brendel"})
+    session.do("choose_lens", {"lens": "speed-panchro-50"})
     assert screen.wait(60.0)
     assert screen.exposure_stops != exposure
     session.undo()
