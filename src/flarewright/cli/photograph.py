@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from .render_flags import Flags
 
 STOPPED = 4.0
-"""Two stops down from wide open, in f-number times sqrt 2 twice, but no faster than this."""
+"""Fast lenses, two stops down from wide open, are stopped down at least to this f-number."""
 
 THIRDS = (4.0, 4.5, 5.0, 5.6, 6.3, 7.1, 8.0, 9.0, 10.0, 11.0, 13.0, 14.0, 16.0, 18.0, 20.0, 22.0)
 """F-numbers engraved in thirds of a stop."""

@@ -28,12 +28,12 @@ class PreviewLook:
     iso, lux : float
     """
 
-    transform: Any = "filmic"
-    stops: float | None = None
-    ev: float | None = None
-    shutter_s: float | None = None
-    iso: float = 100.0
-    lux: float = 1e5
+    transform: Any
+    stops: float | None
+    ev: float | None
+    shutter_s: float | None
+    iso: float
+    lux: float
 
 
 def preview_look(
@@ -78,13 +78,13 @@ def preview_look(
         transform=view or "filmic", stops=exposure, ev=ev,
         shutter_s=None if shutter is None else _number("--shutter", shutter, "1/250 or 0.004", 1e-6, 1e5),
         iso=iso or 100.0,
-        lux=SUN_LUX if lux in (None, "sun") else _number("--lux", lux, "a number or sun", 1e-6, 1e9),
+        lux=SUN_LUX if lux is None or lux == "sun" else _number("--lux", lux, "a number or sun", 1e-6, 1e9),
     )  # fmt: skip
 
 
-def _number(flag: str, text: str | None, example: str, low: float, high: float) -> float:
+def _number(flag: str, text: str, example: str, low: float, high: float) -> float:
     """Read a number or a fraction."""
-    above, _, below = (text or "").partition("/")
+    above, _, below = text.partition("/")
     try:
         value = float(above) / (float(below) if below else 1.0)
     except (ValueError, ZeroDivisionError):
@@ -98,14 +98,13 @@ def write_preview(rendering: Rendering, path: Path, look: PreviewLook) -> dict[s
     """Write the PNG of a render and return what the summary states of it."""
     from .. import __version__
     from ..io.png import write_png
-    from ..render.display import auto_exposure, view, view_text
+    from ..render.display import layers_exposure, view, view_text
     from ..render.photographic import photographic_stops
 
     layers, colorspace = rendering.layers, rendering.project.output.colorspace
     automatic = look.stops is None and look.ev is None and look.shutter_s is None
     if automatic:
-        ghosts = next((layer.pixels for layer in layers if layer.name == "ghosts"), None)
-        stops = auto_exposure(layers[0].pixels, colorspace, ghosts=ghosts)
+        stops = layers_exposure(layers, colorspace)
     elif look.stops is not None:
         stops = look.stops
     else:

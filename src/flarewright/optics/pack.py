@@ -177,9 +177,7 @@ def resolve_coatings(lens: Lens, choice: CoatingChoice) -> tuple[Coating | None,
             )
         return choice.coatings
     assert isinstance(choice, Everywhere)
-    n = gap_indices(lens, D_LINE_NM)
-    in_air = [min(n[k], n[k + 1]) == 1.0 and n[k] != n[k + 1] for k in range(len(lens.rows))]
-    return tuple(choice.coating if air else None for air in in_air)
+    return tuple(choice.coating if air else None for air in _in_air(lens))
 
 
 def preset_names(lens: Lens) -> tuple[str, ...]:
@@ -189,10 +187,14 @@ def preset_names(lens: Lens) -> tuple[str, ...]:
 
 def _staggered(lens: Lens) -> tuple[Coating | None, ...]:
     """Coat each surface in air with a quarter wave of the next centre wavelength; cemented ones stay bare."""
-    n = gap_indices(lens, D_LINE_NM)
     centers = cycle(STAGGERED_NM)
-    in_air = [min(n[k], n[k + 1]) == 1.0 and n[k] != n[k + 1] for k in range(len(lens.rows))]
-    return tuple(QuarterWave(center_wavelength_nm=next(centers)) if air else None for air in in_air)
+    return tuple(QuarterWave(center_wavelength_nm=next(centers)) if air else None for air in _in_air(lens))
+
+
+def _in_air(lens: Lens) -> list[bool]:
+    """Return for each row whether it stands between glass and air."""
+    n = gap_indices(lens, D_LINE_NM)
+    return [min(n[k], n[k + 1]) == 1.0 and n[k] != n[k + 1] for k in range(len(lens.rows))]
 
 
 def pack_lens(

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from ..errors import FlarewrightError
 from ..model.camera import Colorspace
+from ..model.layer import Layer
 
 Transform = Literal["filmic", "srgb", "aces"]
 
@@ -191,6 +192,12 @@ def auto_exposure(
     limits = (_TARGET / float(np.percentile(lit, _PERCENTILE)), 1.0, burnt_out), (np.inf, _BRIGHTEST_VEIL, veil)
     gain = min(min(most, value / light) if light > _DARKEST else most for most, value, light in limits)
     return round(float(np.log2(gain)), 2)
+
+
+def layers_exposure(layers: Sequence[Layer], colorspace: Colorspace = "rec709") -> float:
+    """Return `auto_exposure` of a render: its first layer, the beauty, and its ghosts where they have a layer."""
+    ghosts = next((layer.pixels for layer in layers if layer.name == "ghosts"), None)
+    return auto_exposure(layers[0].pixels, colorspace, ghosts=ghosts)
 
 
 def _brightest(rgb_linear: NDArray[np.float32], colorspace: Colorspace) -> NDArray[np.float64]:

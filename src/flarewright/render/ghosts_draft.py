@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from ..kernels.matrix import draw_matrix_ghosts, matrix_squares, path_matrices, weigh_matrix_ghosts
 from ..kernels.raster import sum_rows
 from ..kernels.spread_marks import spread_marks
+from ..optics.coating_curves import joined_steps
 from ..optics.color import luminance_weights
 from ..optics.paths import LightPath
 from .art import Frame, PathArt
@@ -100,9 +101,7 @@ def _steps(shot: Shot, paths: Sequence[LightPath]) -> tuple[tuple[Any, ...], tup
 @lru_cache(maxsize=64)
 def _in_a_row(paths: tuple[LightPath, ...]) -> tuple[NDArray[np.int64], ...]:
     """Join the rows and the actions of paths; tell where each begins, and how often it crosses the stop."""
-    starts = np.cumsum([0, *(len(path.rows) for path in paths)])
-    steps = np.concatenate([path.steps for path in paths], axis=1)
-    return steps[0], steps[1], starts, np.array([path.stop_crossings for path in paths])
+    return *joined_steps(paths), np.array([path.stop_crossings for path in paths])
 
 
 def seen_small(shot: Shot, times: int) -> Shot:

@@ -17,7 +17,7 @@ from .shot import Shot
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
-# so many rays of a bundle stand for the angles at which all of it meets the mirrors
+# so many rays of a bundle stand for the angles at which all of it meets the surfaces
 RAYS = 48
 # and these are looked for among so many triangles of its grid
 TRIANGLES = 512

@@ -73,11 +73,10 @@ class Rendering:
     def _repr_png_(self) -> bytes:
         """Show the beauty in a notebook, as the PNG beside an EXR does."""
         from ..io.png import encode_png
-        from .display import auto_exposure, view
+        from .display import layers_exposure, view
 
         colorspace = self.project.output.colorspace
-        ghosts = next((layer.pixels for layer in self.layers if layer.name == "ghosts"), None)
-        stops = auto_exposure(self.layers[0].pixels, colorspace, ghosts=ghosts)
+        stops = layers_exposure(self.layers, colorspace)
         return encode_png(view(self.layers[0].pixels, stops, "filmic", colorspace), {})
 
 
