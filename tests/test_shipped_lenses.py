@@ -150,6 +150,10 @@ def test_presets_leave_cemented_surfaces_bare(name: str) -> None:
         assert len(coatings) == len(rows)
         if preset == "thesis":
             continue
+        if preset == "period" and name in ("biotar-50-f1.4", "speed-panchro-50"):
+            # from before coatings
+            assert set(coatings) == {"none"}
+            continue
         before = False
         for row, coating in zip(rows, coatings, strict=True):
             behind = "n_d" in row

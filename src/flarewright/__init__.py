@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from .model import EqualEnergy as EqualEnergy
     from .model import Everywhere as Everywhere
     from .model import Film as Film
+    from .model import InTurn as InTurn
     from .model import Iris as Iris
     from .model import Layer as Layer
     from .model import Lens as Lens
@@ -65,8 +66,8 @@ if TYPE_CHECKING:
 _HOMES = {
     ".errors": ("FlarewrightError", "GlassError", "LensError", "OutputError", "ProjectError"),
     ".model": (
-        "D65", "Art", "AsLens", "Bare", "BlackBody", "Camera", "EqualEnergy", "Everywhere", "Film", "Iris", "Layer",
-        "Lens", "Light", "Lines", "Medium", "Output", "PerRow", "Polygon", "Preset", "Project", "Quality",
+        "D65", "Art", "AsLens", "Bare", "BlackBody", "Camera", "EqualEnergy", "Everywhere", "Film", "InTurn", "Iris",
+        "Layer", "Lens", "Light", "Lines", "Medium", "Output", "PerRow", "Polygon", "Preset", "Project", "Quality",
         "QuarterWave", "Rectangle", "Rgb", "RowScatter", "Rule", "Scatter", "Stack", "Standard", "Stop", "Surface",
         "Tabulated",
     ),

@@ -5,9 +5,10 @@ from types import SimpleNamespace
 import pytest
 
 from flarewright.cli.app import run
-from flarewright.cli.photograph import LIGHT_DEG, ROUNDING, plausible_preset, stopped_down
+from flarewright.cli.photograph import LIGHT_DEG, ROUGHNESS_UM, ROUNDING, plausible_preset, stopped_down
 from flarewright.io.library import shipped
-from flarewright.model import AsLens, Everywhere, Layer, Preset, Standard
+from flarewright.model import AsLens, Bare, Everywhere, Layer, Preset, Standard
+from flarewright.optics.pack import resolve_coatings
 from flarewright.render.prepare import load_lens
 
 
@@ -38,12 +39,13 @@ def test_a_lens_of_the_library_is_as_photographed(projects, capsys):
     call("takumar-50-f1.4", "--light", "-9,5")
     (project,) = projects
     assert project.f_number == 4.0
-    assert project.coating == Preset(name="staggered")
+    assert project.coating == Preset(name="period")
     assert project.iris.rounding == ROUNDING
+    assert project.iris.roughness_um == ROUGHNESS_UM
     assert project.iris.blades == load_lens("takumar-50-f1.4").iris.blades
     assert project.lights[0].diameter_deg == LIGHT_DEG
     told = capsys.readouterr().err
-    assert "as photographed: f/4, coating preset:staggered (chosen, not known)" in told
+    assert "as photographed: f/4, coating preset:period (chosen, not known)" in told
     assert "--ideal leaves this out" in told
 
 
@@ -104,13 +106,22 @@ def test_two_stops_down(wide_open, stopped):
 
 
 @pytest.mark.parametrize("name", shipped())
-def test_every_lens_has_a_preset_but_those_from_before_coatings(name):
-    """Those whose file names no preset are of 1938 or before."""
+def test_every_lens_wears_films_of_its_time(name):
+    """None before 1938; single films or stacks that differ from surface to surface after."""
     lens = load_lens(name)
     preset = plausible_preset(lens)
     assert stopped_down(lens.f_number) >= lens.f_number
-    if preset is None:
-        assert name in ("biotar-50-f1.4", "speed-panchro-50")
-    else:
-        own = {"heliar-tronnier": "thesis", "anamorphic-heliar-2x": "blue-streak"}
-        assert preset == own.get(name, "staggered")
+    assert preset == ("blue-streak" if name == "anamorphic-heliar-2x" else "period")
+    worn = [coating for coating in resolve_coatings(lens, Preset(name=preset)) if coating not in (None, Bare())]
+    if name in ("biotar-50-f1.4", "speed-panchro-50"):
+        assert not worn
+    elif preset == "period":
+        assert len(set(worn)) >= 4
+
+
+def test_a_lens_without_films_of_its_time_wears_the_first_that_it_names():
+    lens = load_lens("triplet-pestrecov")
+    bare = lens.replace(coating_presets={})
+    assert plausible_preset(bare) == "staggered"
+    coatings = lens.coating_presets["single-coated"]
+    assert plausible_preset(bare.replace(coating_presets={"single-coated": coatings, "maker": coatings})) == "maker"

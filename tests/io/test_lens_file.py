@@ -25,6 +25,7 @@ from flarewright.model import (
     Everywhere,
     Figure,
     Film,
+    InTurn,
     Iris,
     Lens,
     Medium,
@@ -323,6 +324,7 @@ COATINGS = {
     "quarter-wave:550:ideal-10.5": QuarterWave(center_wavelength_nm=550, index="ideal", thickness_offset_nm=-10.5),
     "film:1.38:96.4": Film(index=1.38, thickness_nm=96.4),
     "modern-broadband": Standard(name="modern-broadband"),
+    "early-multicoat*0.94": Standard(name="early-multicoat", thickness=0.94),
     "stack:1.38:96.4,2.1:120": Stack(layers=(Film(index=1.38, thickness_nm=96.4), Film(index=2.1, thickness_nm=120))),
 }
 
@@ -356,6 +358,9 @@ def test_coating_text_is_tolerant():
         "film:1.38:inf",
         "stack:",
         "stack:1.4:90,",
+        "early-multicoat*",
+        "early-multicoat*3",
+        "early-multicoat*-1",
     ],
 )
 def test_coating_nonsense_is_told(text):
@@ -368,7 +373,11 @@ def test_coating_files(tmp_path):
     assert read_coating_file(one) == Everywhere(coating=QuarterWave(center_wavelength_nm=550))
     rows = written(tmp_path, 'rows = ["none", "-", { kind = "film", index = 1.4, thickness_nm = 90 }]\n', "rows.toml")
     assert read_coating_file(rows) == PerRow(coatings=(Bare(), None, Film(index=1.4, thickness_nm=90)))
+    turn = written(tmp_path, 'in_turn = ["quarter-wave:450", "none"]\n', "turn.toml")
+    assert read_coating_file(turn) == InTurn(coatings=(QuarterWave(center_wavelength_nm=450), Bare()))
     for text, words in [
+        ("in_turn = []", "in_turn = .* dealt out from the front"),
+        ('in_turn = ["none", "x"]', "coating 1: coating 'x' is not understood"),
         ('rows = ["x", "none", "y"]', "row 0: coating 'x' is not understood.*row 2: coating 'y'"),
         ("colour = 1", "is no coating file"),
         ("coating = ", "is not valid TOML"),

@@ -24,6 +24,7 @@ from flarewright.model import (
     Film,
     Holdout,
     Imperfection,
+    InTurn,
     Iris,
     Lens,
     Light,
@@ -105,7 +106,12 @@ PROJECTS = [
             ),
         ),
     ),
-    Project(lens="x", lights=(Light(field_deg=(0, 0)),), art=Art(physical=True)),
+    Project(
+        lens="x",
+        coating=InTurn(coatings=(Bare(), Standard(name="early-multicoat", thickness=0.94))),
+        lights=(Light(field_deg=(0, 0)),),
+        art=Art(physical=True),
+    ),
     Project(
         lens="x",
         lights=(Light(field_deg=(0, 0)),),

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from flarewright.model import D65, Everywhere, Film, Standard
+from flarewright.model import D65, Bare, Everywhere, Film, InTurn, QuarterWave, Standard
 from flarewright.optics.coating_response import BAND_NM, coating_response
 from flarewright.optics.coatings import film_stack, stack_reflectance, stack_reflectance_transmittance
 from flarewright.optics.pack import resolve_coatings
@@ -99,6 +99,25 @@ def test_at_its_centre_the_early_multicoat_has_no_half_wave(glass):
     n, d = film_stack(Standard(name="early-multicoat"), 1.0, glass)
     Y = n[0] ** 2 * glass / n[2] ** 2 if len(n) == 3 else n[0] ** 2 / glass
     assert stack_reflectance(1.0, glass, n, d, 530.0, 1.0) == pytest.approx(((1 - Y) / (1 + Y)) ** 2, abs=1e-12)
+
+
+@pytest.mark.parametrize("name", ["single-1950s", "early-multicoat", "modern-broadband"])
+def test_thicker_films_move_the_curve_to_longer_wavelengths(name):
+    """Films of one index at all wavelengths know only thickness over wavelength."""
+    as_is, thicker = film_stack(Standard(name=name), 1.0, 1.7), film_stack(Standard(name=name, thickness=1.1), 1.0, 1.7)
+    wave = np.linspace(400.0, 700.0, 31)
+    expected = stack_reflectance(1.0, 1.7, *as_is, wave, 0.9)
+    np.testing.assert_allclose(stack_reflectance(1.0, 1.7, *thicker, 1.1 * wave, 0.9), expected, rtol=1e-9)
+
+
+def test_coatings_in_turn_skip_what_is_cemented():
+    lens = load_lens("heliar-tronnier")
+    deck = (Standard(name="single-1950s"), Bare(), QuarterWave(center_wavelength_nm=450.0))
+    dealt = resolve_coatings(lens, InTurn(coatings=deck))
+    everywhere = resolve_coatings(lens, Everywhere(coating=deck[0]))
+    air = [k for k, coating in enumerate(everywhere) if coating is not None]
+    assert [dealt[k] for k in air] == [deck[k % 3] for k in range(len(air))]
+    assert all(dealt[k] is None for k in range(len(lens.rows)) if k not in air)
 
 
 def test_films_run_from_the_air_whichever_way_the_light_goes():

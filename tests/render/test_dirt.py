@@ -289,16 +289,37 @@ def test_dirt_in_ghosts_takes_its_share_and_leaves_the_edges():
     assert (dirty <= clean + 0.02 * clean.max()).all()
 
 
+def test_scratches_of_many_widths_make_no_comb():
+    """Widths average what they are said to; fringes that one width would draw are gone from the sum of many."""
+    dirt = Dirt(scratches_per_cm2=400.0, scratch_um=40.0, seed=1)
+    arcs = lay_elements(dirt, 8.0).arcs
+    widths = 8e3 * arcs[:, 4]
+    assert len(widths) > 1000
+    assert widths.mean() == pytest.approx(40.0, rel=0.03)
+    assert widths.max() / widths.min() == pytest.approx(8.0, rel=0.02)
+    many = scattered(Elements(np.empty((0, 4)), arcs), np.zeros(0, bool), np.ones(len(arcs), bool), math.pi)
+    same = arcs.copy()
+    same[:, 4] = 5e-3
+    (comb,) = scattered(Elements(np.empty((0, 4)), same), np.zeros(0, bool), np.ones(len(arcs), bool), math.pi)
+    s = np.linspace(150.0, 1000.0, 3000)
+    mixed = sum(np.interp(s, term.s, term.radial) for term in many) * s**3
+    holes = np.interp(s, comb.s, comb.radial) * s**3
+    assert mixed.min() > 0.45 * mixed.max()
+    assert holes.min() < 0.01 * holes.max()
+
+
 def test_the_fringes_of_a_scratch_fade_as_colours_mix_and_end_nowhere():
     """Second method: sinc^2 of every wavelength, added up along the middle of a scratch's fan, orders 2 to 8."""
-    dirt, N, pitch = Dirt(scratches_per_cm2=1.0, scratch_um=40.0, seed=3), 16.0, 0.02
+    # one scratch lies in this opening
+    dirt, N, pitch = Dirt(scratches_per_cm2=0.5, scratch_um=40.0, seed=82), 16.0, 0.02
     soil, radius_mm = Soil(dirt), 8.0
+    ((_, _, _, _, width, _),) = lay_elements(dirt, radius_mm).arcs
     pattern = pupil_pattern(Iris(), radius_mm=radius_mm, soil=soil)
     (term,) = pattern.veil
     bright = np.flatnonzero(term.angular > 0.99 * term.angular.max())
     direction = math.pi * float(np.median(bright)) / len(term.angular)
     weights = np.exp(-(((WAVES - 550.0) / 25.0) ** 2))[:, None] * np.ones(3)
-    place = np.arange(3.0, 8.0 * 0.55e-3 * 2.0 * N / (40e-3 / radius_mm), 0.15)
+    place = np.arange(3.0, 8.0 * 0.55e-3 * 2.0 * N / width, 0.15)
     wide, high = (int(abs(part) * place[-1] / pitch) + 20 for part in (math.cos(direction), math.sin(direction)))
     cx = 10.0 if math.cos(direction) > 0.0 else wide - 10.0
     frame = ((pitch, pitch), (wide, high), (cx, high - 10.0), WAVES, weights)
@@ -311,7 +332,7 @@ def test_the_fringes_of_a_scratch_fade_as_colours_mix_and_end_nowhere():
     r = pitch * np.hypot(columns + 0.5 - cx, rows + 0.5 - (high - 10.0))
     scale = 2.0 * N * WAVES * 1e-6
     s = r[:, None] / scale
-    order = s * 40e-3 / radius_mm
+    order = s * width
     even = (1.0 / s**3 / scale**2 @ weights[:, 0]) * 0.5
     fringes = (np.sinc(order) ** 2 * (math.pi * order) ** 2 / s**3 / scale**2) @ weights[:, 0]
     ratio = found / even

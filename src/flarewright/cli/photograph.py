@@ -9,6 +9,8 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+from ..optics.pack import PERIOD, STAGGERED
+
 if TYPE_CHECKING:
     from ..model import Lens
     from .render_flags import Flags
@@ -20,6 +22,9 @@ THIRDS = (4.0, 4.5, 5.0, 5.6, 6.3, 7.1, 8.0, 9.0, 10.0, 11.0, 13.0, 14.0, 16.0, 
 """F-numbers engraved in thirds of a stop."""
 
 ROUNDING = 0.3
+ROUGHNESS_UM = 3.0
+"""Rms of the blades' edges: cut steel is true to some micrometres."""
+
 LIGHT_DEG = 0.25
 
 __all__ = ["as_photographed"]
@@ -52,12 +57,15 @@ def as_photographed(flags: Flags) -> tuple[Flags, str | None]:
     if flags.fstop is None:
         changes["fstop"] = stopped_down(lens.f_number)
         told.append(f"f/{changes['fstop']:g}")
-    if flags.coating is None and (preset := plausible_preset(lens)) is not None:
-        changes["coating"] = f"preset:{preset}"
-        told.append(f"coating preset:{preset} (chosen, not known)")
+    if flags.coating is None:
+        changes["coating"] = f"preset:{plausible_preset(lens)}"
+        told.append(f"coating {changes['coating']} (chosen, not known)")
     if flags.rounding is None and flags.blades is None and flags.iris_image is None and _straight(lens):
         changes["rounding"] = ROUNDING
         told.append(f"blades rounded by {ROUNDING:g}")
+        if flags.roughness is None:
+            changes["roughness"] = ROUGHNESS_UM
+            told.append(f"edges rough by {ROUGHNESS_UM:g} um")
     if flags.light and not (flags.light_diameter or flags.light_size or flags.light_polygon or _has_sun(flags)):
         changes["light_diameter"] = [LIGHT_DEG]
         told.append(f"lights of {LIGHT_DEG:g} degrees")
@@ -72,14 +80,14 @@ def stopped_down(f_number: float) -> float:
     return min((max(number, f_number) for number in THIRDS), key=lambda number: abs(number / wanted - 1.0))
 
 
-def plausible_preset(lens: Lens) -> str | None:
-    """Return the coating preset that a lens of the library is shown with; None for one from before coatings."""
-    from ..optics.pack import STAGGERED
+def plausible_preset(lens: Lens) -> str:
+    """Return the coating preset that a lens of the library is shown with.
 
-    if not lens.coating_presets:
-        return None
-    known = [name for name in lens.coating_presets if name not in (STAGGERED, "single-coated")]
-    return known[0] if known else STAGGERED
+    Films of its time, on each surface its own; of a lens that has none of that time, the first that its file names.
+    """
+    if PERIOD in lens.coating_presets:
+        return PERIOD
+    return next((name for name in lens.coating_presets if name not in (STAGGERED, "single-coated")), STAGGERED)
 
 
 def _straight(lens: Lens) -> bool:

@@ -25,7 +25,7 @@ from ..design.search import State, solve
 from ..design.target import problem_of
 from ..errors import FlarewrightError, ProjectError
 from ..io.sentences import count
-from ..model import AsLens, CoatingChoice, Design, Everywhere, Lens, PerRow, Project, Surface
+from ..model import AsLens, CoatingChoice, Design, Everywhere, InTurn, Lens, PerRow, Project, Surface
 from ..optics.pack import resolve_coatings
 from ..render.prepare import as_lens, first_order, settle
 from .edit_wishes import clear_wishes, wish_names
@@ -296,7 +296,7 @@ class Solver:
 
 def _kept(project: Project, lens: Lens) -> CoatingChoice | None:
     """Return what a new lens wears: what the one before did, row for row where it has the same; None where not."""
-    if isinstance(project.coating, Everywhere):
+    if isinstance(project.coating, Everywhere | InTurn):
         return project.coating
     before = as_lens(project.lens)
     worn = resolve_coatings(before, project.coating)

@@ -10,6 +10,7 @@
 | `film:1.38:96.4` | one film of index 1.38, 96.4 nm thick |
 | `stack:1.38:96.4,2.1:120` | several films, from the air to the glass |
 | `modern-broadband` | a standard coating: `uncoated-1930s`, `single-1950s`, `early-multicoat`, `modern-broadband` |
+| `modern-broadband*1.05` | the same with every film 5 % thicker: its colours lie at wavelengths 5 % longer |
 """
 
 from __future__ import annotations
@@ -22,7 +23,18 @@ from typing import Any, get_args
 from pydantic import TypeAdapter, ValidationError
 
 from flarewright.errors import ProjectError
-from flarewright.model import Bare, Coating, CoatingChoice, Everywhere, Film, PerRow, QuarterWave, Stack, Standard
+from flarewright.model import (
+    Bare,
+    Coating,
+    CoatingChoice,
+    Everywhere,
+    Film,
+    InTurn,
+    PerRow,
+    QuarterWave,
+    Stack,
+    Standard,
+)
 from flarewright.model.coating import StandardName
 
 from .sentences import did_you_mean, shorten, validation_sentences
@@ -69,11 +81,12 @@ def parse_coating(text: str) -> Coating:
     plain = re.sub(r"\s+", "", text).lower()
     if plain in ("none", "bare"):
         return Bare()
-    for name in STANDARD_NAMES:
-        if plain == name:
-            return Standard(name=name)
     kind, _, rest = plain.partition(":")
+    named, _, factor = plain.partition("*")
     try:
+        for name in STANDARD_NAMES:
+            if plain == name or (named == name and re.fullmatch(_NUMBER, factor)):
+                return Standard(name=name, thickness=float(factor or 1.0))
         if kind == "quarter-wave" and (match := _QUARTER_WAVE.fullmatch(plain)):
             return _quarter_wave(match, text)
         if kind == "film":
@@ -129,7 +142,7 @@ def format_coating(coating: Coating) -> str:
     if isinstance(coating, Bare):
         return "none"
     if isinstance(coating, Standard):
-        return coating.name
+        return coating.name if coating.thickness == 1.0 else f"{coating.name}*{_number(coating.thickness)}"
     if isinstance(coating, Film):
         return f"film:{_number(coating.index)}:{_number(coating.thickness_nm)}"
     if isinstance(coating, Stack):
@@ -143,7 +156,7 @@ def format_coating(coating: Coating) -> str:
 
 
 def read_coating_file(path: str | Path) -> CoatingChoice:
-    """Read a coating file: TOML with either `coating = "..."` or `rows = [...]`, one entry a row.
+    """Read a coating file: TOML with `coating = "..."`, or `rows = [...]`, one a row, or `in_turn = [...]`.
 
     Parameters
     ----------
@@ -151,12 +164,12 @@ def read_coating_file(path: str | Path) -> CoatingChoice:
 
     Returns
     -------
-    Everywhere or PerRow
+    Everywhere, PerRow or InTurn
 
     Raises
     ------
     ProjectError
-        The file cannot be read, has neither or both of the keys, or an entry is no coating; all bad entries are named.
+        The file cannot be read, has none or several of the keys, or an entry is no coating; all bad entries are named.
     """
     try:
         table = read_toml(path, "a coating file")
@@ -164,21 +177,32 @@ def read_coating_file(path: str | Path) -> CoatingChoice:
         raise ProjectError(str(error)) from None
     if set(table) == {"coating"}:
         return Everywhere(coating=coating_from(table["coating"]) or Bare())
-    if set(table) == {"rows"} and isinstance(table["rows"], list):
-        coatings: list[Coating | None] = []
-        problems: list[str] = []
-        for k, entry in enumerate(table["rows"]):
-            try:
-                coatings.append(coating_from(entry))
-            except ProjectError as error:
-                problems.append(f"row {k}: {error}")
-        if problems:
-            raise ProjectError(f"{path}: " + "; ".join(problems))
-        return PerRow(coatings=tuple(coatings))
+    for key, place in (("rows", "row"), ("in_turn", "coating")):
+        if set(table) == {key} and isinstance(table[key], list):
+            found = _coatings(path, table[key], place)
+            if key == "rows":
+                return PerRow(coatings=tuple(found))
+            if found:
+                return InTurn(coatings=tuple(coating or Bare() for coating in found))
     raise ProjectError(
         f'{path} is no coating file: it holds either one line coating = "quarter-wave:550" '
-        f'or rows = ["quarter-wave:550", "{UNCOATED}", ...] with one entry for each row of the lens'
+        f'or rows = ["quarter-wave:550", "{UNCOATED}", ...] with one entry for each row of the lens, '
+        'or in_turn = ["quarter-wave:450", "quarter-wave:600"] for its surfaces in air, dealt out from the front'
     )
+
+
+def _coatings(path: str | Path, entries: list[Any], place: str) -> list[Coating | None]:
+    """Read the coatings of a list; all entries that are none are named by their place in it."""
+    coatings: list[Coating | None] = []
+    problems: list[str] = []
+    for k, entry in enumerate(entries):
+        try:
+            coatings.append(coating_from(entry))
+        except ProjectError as error:
+            problems.append(f"{place} {k}: {error}")
+    if problems:
+        raise ProjectError(f"{path}: " + "; ".join(problems))
+    return coatings
 
 
 def _quarter_wave(match: re.Match[str], text: str) -> QuarterWave:

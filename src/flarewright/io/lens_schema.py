@@ -13,7 +13,7 @@ from .shape_fields import elements_schema, positions_schema, shape_schema
 
 _NUMBER = r"([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?"
 _COATING_TEXT = (
-    rf"^(none|bare|-|{'|'.join(STANDARD_NAMES)}|"
+    rf"^(none|bare|-|({'|'.join(STANDARD_NAMES)})(\*{_NUMBER})?|"
     rf"quarter-wave:{_NUMBER}([+-]{_NUMBER})?(:(ideal|real|{_NUMBER}))?([+-]{_NUMBER})?|"
     rf"film:{_NUMBER}:{_NUMBER}|"
     rf"stack:{_NUMBER}:{_NUMBER}(,{_NUMBER}:{_NUMBER})*)?$"
@@ -145,7 +145,14 @@ def _coating() -> dict[str, Any]:
                 },
                 ["kind", "layers"],
             ),
-            _table({"kind": {"const": "standard"}, "name": {"enum": list(STANDARD_NAMES)}}, ["kind", "name"]),
+            _table(
+                {
+                    "kind": {"const": "standard"},
+                    "name": {"enum": list(STANDARD_NAMES)},
+                    "thickness": {"type": "number", "minimum": 0.5, "maximum": 2},
+                },
+                ["kind", "name"],
+            ),
         ],
     }
 

@@ -315,7 +315,8 @@ _SECTIONS: Sections = {
     "imperfection": (Imperfection,),
     "spectrum": (lights.EqualEnergy, lights.D65, lights.BlackBody, lights.Lines, lights.Tabulated, lights.Rgb),
     "coating": (
-        choices.Preset, choices.Everywhere, choices.PerRow, coatings.QuarterWave, coatings.Film, coatings.Standard,
+        choices.Preset, choices.Everywhere, choices.InTurn, choices.PerRow, coatings.QuarterWave, coatings.Film,
+        coatings.Standard,
     ),
     "dirt": (starbursts.Dirt,),
     "starburst": (starbursts.Starburst,),

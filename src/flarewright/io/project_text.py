@@ -190,6 +190,8 @@ def _short_coating(choice: CoatingChoice) -> str | dict[str, Any]:
             return f"preset:{choice.name}"
         case choices.Everywhere():
             return format_coating(choice.coating)
+        case choices.InTurn():
+            return {"kind": "in-turn", "coatings": [format_coating(item) for item in choice.coatings]}
         case choices.PerRow():
             texts = [UNCOATED if item is None else format_coating(item) for item in choice.coatings]
             return {"kind": "per-row", "coatings": texts}

@@ -39,7 +39,7 @@ _SECTIONS: Sections = {
     "cameras": (records.SceneCamera,),
     "lights": (records.Lamp, records.Distant, records.Sun),
     "keyframes": (records.CameraKey, records.LampKey),
-    "coating": (choices.Preset, choices.Everywhere, choices.PerRow),
+    "coating": (choices.Preset, choices.Everywhere, choices.InTurn, choices.PerRow),
     "spectrum": (spectra.BlackBody, spectra.Lines, spectra.Tabulated, spectra.Rgb),
 }
 

@@ -14,7 +14,7 @@ from .layer import Layer
 from .lens import Element, Lens, Position, Row, Stop, Surface
 from .light import D65, BlackBody, EqualEnergy, Light, LightKey, Lines, Polygon, Rectangle, Rgb, Spectrum, Tabulated
 from .plate import Plate
-from .project import AsLens, CoatingChoice, Everywhere, Output, PerRow, Preset, Project, Quality
+from .project import AsLens, CoatingChoice, Everywhere, InTurn, Output, PerRow, Preset, Project, Quality
 from .scatter import RowScatter, Scatter
 from .starburst import Dirt, Starburst
 
@@ -39,6 +39,7 @@ __all__ = [
     "GhostWish",
     "Holdout",
     "Imperfection",
+    "InTurn",
     "Iris",
     "Layer",
     "Lens",

@@ -50,10 +50,15 @@ StandardName = Literal["uncoated-1930s", "single-1950s", "early-multicoat", "mod
 
 
 class Standard(Frozen):
-    """A coating as lenses of an era wore it; its films follow the glass (`optics.standard_coatings`)."""
+    """A coating as lenses of an era wore it; its films follow the glass (`optics.standard_coatings`).
+
+    `thickness` multiplies the thickness of every film, as a change of the evaporation does: the whole curve of R moves
+    to wavelengths longer by that factor.
+    """
 
     kind: Literal["standard"] = "standard"
     name: StandardName
+    thickness: float = Field(1.0, ge=0.5, le=2.0)
 
 
 Coating = Annotated[Bare | QuarterWave | Film | Stack | Standard, Field(discriminator="kind")]

@@ -41,6 +41,13 @@ class Everywhere(Frozen):
     coating: Coating
 
 
+class InTurn(Frozen):
+    """Coatings dealt out in turn, from the front on, to the surfaces between glass and air; cemented ones stay bare."""
+
+    kind: Literal["in-turn"] = "in-turn"
+    coatings: tuple[Coating, ...] = Field(min_length=1, max_length=500)
+
+
 class PerRow(Frozen):
     """One coating a row, the stop's ignored."""
 
@@ -48,7 +55,7 @@ class PerRow(Frozen):
     coatings: tuple[Coating | None, ...]
 
 
-CoatingChoice = Annotated[AsLens | Preset | Everywhere | PerRow, Field(discriminator="kind")]
+CoatingChoice = Annotated[AsLens | Preset | Everywhere | InTurn | PerRow, Field(discriminator="kind")]
 
 
 class Quality(Frozen):

@@ -25,7 +25,7 @@ class Dirt(Frozen):
     scratches_per_cm2 : float
         Scratches per cm^2.
     scratch_um : float
-        Their width in micrometres.
+        Their mean width in micrometres; the widest are eight times as wide as the narrowest.
     scratch_mm : float
         Their mean length.
     fingerprint : float

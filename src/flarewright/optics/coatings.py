@@ -65,9 +65,12 @@ def film_stack(coating: Coating | None, n_front: float, n_back: float) -> tuple[
         return (coating.index,), (coating.thickness_nm,)
     if isinstance(coating, QuarterWave):
         return _quarter_wave(coating, n_front, n_back)
-    outward = standard_films(coating.name, max(n_front, n_back)) if isinstance(coating, Standard) else coating.layers
+    if isinstance(coating, Standard):
+        outward, factor = standard_films(coating.name, max(n_front, n_back)), coating.thickness
+    else:
+        outward, factor = coating.layers, 1.0
     films = outward if n_front <= n_back else outward[::-1]
-    return tuple(film.index for film in films), tuple(film.thickness_nm for film in films)
+    return tuple(film.index for film in films), tuple(factor * film.thickness_nm for film in films)
 
 
 def _quarter_wave(coating: QuarterWave, n_front: float, n_back: float) -> tuple[tuple[float, ...], tuple[float, ...]]:

@@ -23,6 +23,11 @@ FIELD = 1.65
 _RIDGE_MM, _DROPLET_MM, _DROPLET_STEP_MM, _PRINT_MM = 0.5, 0.06, 0.15, (7.0, 9.0)
 # half the angle over which a scratch bends
 _BEND_DEG = (0.5, 5.0)
+# widths of scratches are even in their logarithm: the widest over the narrowest, and that over their mean
+_WIDTHS = 8.0
+_NARROWEST = math.log(_WIDTHS) / (_WIDTHS - 1.0)
+# ... and scatter in so many classes of like width, each with fringes of its own
+_CLASSES = 6
 # orders of a scratch's fringes: up to the first all are drawn, from the last on their mean; white light has none so far
 # out, for a channel's band of 60 to 100 nm spans whole orders there; lines have, and what draws them has to follow each
 _FADE = (12.0, 20.0)
@@ -84,7 +89,8 @@ def lay_elements(dirt: Dirt, radius_mm: float, turn: float = 0.0) -> Elements:
     Notes
     -----
     Every square millimetre (every square centimetre for scratches) draws from its own seed, so what lies at a place
-    does not depend on how far the iris is opened. Diameters are even in their logarithm.
+    does not depend on how far the iris is opened. Diameters of specks and widths of scratches are even in their
+    logarithm: scratches of one width would add up to a comb of equal fringes.
     """
     reach = FIELD * radius_mm
     discs = [np.empty((0, 4))]
@@ -104,8 +110,9 @@ def lay_elements(dirt: Dirt, radius_mm: float, turn: float = 0.0) -> Elements:
             place = corner + 10.0 * rng.random((count, 2))
             length = dirt.scratch_mm * rng.uniform(0.5, 1.5, count)
             bend = np.radians(rng.uniform(*_BEND_DEG, count))
-            width = np.full(count, 1e-3 * dirt.scratch_um)
-            arcs.append(np.column_stack([place, rng.uniform(0.0, 2.0 * np.pi, count), length, width, bend]))
+            angle = rng.uniform(0.0, 2.0 * np.pi, count)
+            width = 1e-3 * dirt.scratch_um * _NARROWEST * _WIDTHS ** rng.random(count)
+            arcs.append(np.column_stack([place, angle, length, width, bend]))
     found, bands = np.concatenate(discs), np.concatenate(arcs)
     found[:, :3] /= radius_mm
     bands[:, [0, 1, 3, 4]] /= radius_mm
@@ -264,20 +271,30 @@ def scattered(elements: Elements, inside: NDArray[np.bool_], inside_arcs: NDArra
         terms.append(VeilTerm(s, radial, np.ones(1)))
     arcs = elements.arcs[inside_arcs]
     if len(arcs):
-        directions = 720
-        angular = np.zeros(directions)
-        at = math.pi / directions * np.arange(directions, dtype=np.float64)
-        for _, _, normal, length, _, bend in arcs:
-            off = np.abs((at - normal + 0.5 * math.pi) % math.pi - 0.5 * math.pi)
-            fan = np.clip((bend - off) / (math.pi / directions) + 0.5, 0.0, 1.0)
-            angular += fan * length / (2.0 * bend)
-        w = float(arcs[0, 4])
-        mean = float(angular.mean())
-        # as fine as its fringes need
-        fine = np.geomspace(0.02 / w, _FADE[1] / w, 2400)
-        s = np.concatenate([s[s < fine[0]], fine, s[s > fine[-1]]])
-        terms.append(VeilTerm(s, mean * w * w * _slit(w * s) / s / power, angular / mean))
+        w = arcs[:, 4]
+        lowest, step = math.log(w.min()), math.log(w.max() / w.min()) / _CLASSES
+        place = np.clip((np.log(w) - lowest) / max(step, 1e-12), 0.0, _CLASSES - 1.0).astype(np.intp)
+        terms += [_fans(arcs[place == k], s, power) for k in np.unique(place)]
     return tuple(terms)
+
+
+def _fans(arcs: Floats, s: Floats, power: float) -> VeilTerm:
+    """Return what scratches of like width scatter: fans along their normals, fringes averaged over their widths."""
+    directions = 720
+    angular = np.zeros(directions)
+    at = math.pi / directions * np.arange(directions, dtype=np.float64)
+    for _, _, normal, length, _, bend in arcs:
+        off = np.abs((at - normal + 0.5 * math.pi) % math.pi - 0.5 * math.pi)
+        fan = np.clip((bend - off) / (math.pi / directions) + 0.5, 0.0, 1.0)
+        angular += fan * length / (2.0 * bend)
+    mean = float(angular.mean())
+    widths = arcs[:, 4]
+    # as fine as their fringes need
+    fine = np.geomspace(0.02 / widths.max(), _FADE[1] / widths.min(), 2400)
+    s = np.concatenate([s[s < fine[0]], fine, s[s > fine[-1]]])
+    share = arcs[:, 3] / arcs[:, 3].sum()
+    slits = sum(part * w * w * _slit(w * s) for part, w in zip(share, widths, strict=True))
+    return VeilTerm(s, mean * slits / s / power, angular / mean)
 
 
 def _slit(order: Floats) -> Floats:

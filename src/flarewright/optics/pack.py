@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..errors import LensError, ProjectError
 from ..kernels.intersect import AXES, DEGREE, TANGENT
-from ..model import AsLens, Coating, CoatingChoice, Everywhere, Lens, PerRow, Preset, QuarterWave, Stop
+from ..model import AsLens, Coating, CoatingChoice, InTurn, Lens, PerRow, Preset, QuarterWave, Stop
 from ..model.coating import StandardName
 from .coatings import film_stack, reflectance_table
 from .paraxial import D_LINE_NM, FirstOrder, gap_indices, vertex_positions
@@ -20,11 +20,13 @@ from .shape import curvature_across, seen_along, shape_table, symmetric
 
 REFLECTANCE_SAMPLES = 1025
 
+PERIOD = "period"
+"""A preset of the lenses of the library: plausible films of their time (tools/choose_period_coatings.py)."""
+
 STAGGERED = "staggered"
 """A preset that every lens has, if its file has none of that name: chosen for ghosts of many colours, not known."""
 
-STAGGERED_NM = (450.0, 520.0, 600.0, 550.0)
-"""Centre wavelengths of its single films, from the front on."""
+_STAGGERED = tuple(QuarterWave(center_wavelength_nm=center) for center in (450.0, 520.0, 600.0, 550.0))
 
 
 @dataclass(frozen=True)
@@ -147,7 +149,8 @@ def resolve_coatings(lens: Lens, choice: CoatingChoice) -> tuple[Coating | None,
     ----------
     lens : Lens
     choice : CoatingChoice
-        As the lens file says, a preset of it, one coating on every surface between glass and air, or one a row.
+        As the lens file says, a preset of it, one coating on every surface between glass and air, several in turn, or
+        one a row.
 
     Returns
     -------
@@ -163,7 +166,7 @@ def resolve_coatings(lens: Lens, choice: CoatingChoice) -> tuple[Coating | None,
         return tuple(None if isinstance(row, Stop) else row.coating for row in lens.rows)
     if isinstance(choice, Preset):
         if choice.name == STAGGERED and STAGGERED not in lens.coating_presets:
-            return _staggered(lens)
+            return _dealt(lens, _STAGGERED)
         if choice.name not in lens.coating_presets:
             known = ", ".join(preset_names(lens))
             hint = "; leave out 'preset:' for the standard coating" if choice.name in get_args(StandardName) else ""
@@ -176,8 +179,7 @@ def resolve_coatings(lens: Lens, choice: CoatingChoice) -> tuple[Coating | None,
                 "give one entry a row, the stop's included"
             )
         return choice.coatings
-    assert isinstance(choice, Everywhere)
-    return tuple(choice.coating if air else None for air in _in_air(lens))
+    return _dealt(lens, choice.coatings if isinstance(choice, InTurn) else (choice.coating,))
 
 
 def preset_names(lens: Lens) -> tuple[str, ...]:
@@ -185,10 +187,10 @@ def preset_names(lens: Lens) -> tuple[str, ...]:
     return tuple(dict.fromkeys((*lens.coating_presets, STAGGERED)))
 
 
-def _staggered(lens: Lens) -> tuple[Coating | None, ...]:
-    """Coat each surface in air with a quarter wave of the next centre wavelength; cemented ones stay bare."""
-    centers = cycle(STAGGERED_NM)
-    return tuple(QuarterWave(center_wavelength_nm=next(centers)) if air else None for air in _in_air(lens))
+def _dealt(lens: Lens, coatings: tuple[Coating, ...]) -> tuple[Coating | None, ...]:
+    """Coat each surface in air with the next of the coatings; cemented ones stay bare."""
+    deck = cycle(coatings)
+    return tuple(next(deck) if air else None for air in _in_air(lens))
 
 
 def _in_air(lens: Lens) -> list[bool]:
