@@ -46,6 +46,13 @@ def render(
     project: Annotated[
         Path | None, typer.Option(metavar="FILE", help="A project file; flags given beside it win over it.")
     ] = None,
+    look: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME|FILE",
+            help="Coatings, iris, dirt, colours of lights ... as one of `flarewright looks`; flags beside it win.",
+        ),
+    ] = None,
     light: Annotated[
         list[str] | None,
         typer.Option(
@@ -385,11 +392,11 @@ def render(
     Every value is an irradiance on the sensor relative to a light of irradiance 1, so layers add up to the beauty.
     """
     check_place(output, ".exr")
-    look = preview_look(view=view, exposure=exposure, ev=ev, shutter=shutter, iso=iso, lux=lux, no_png=no_png)
+    view_of = preview_look(view=view, exposure=exposure, ev=ev, shutter=shutter, iso=iso, lux=lux, no_png=no_png)
     if half and float32:
         raise ProjectError("--half and --float both say how many bits a value has; keep one")
     from .art_flags import naming_rules
-    from .photograph import as_photographed
+    from .look_flags import photographed, put_look, said_by
     from .render_flags import Flags, build_project
 
     state = _read_state(resume)
@@ -413,8 +420,15 @@ def render(
         cover_glass=cover_glass, sensor_reflectance=sensor_reflectance, sensor_grating=sensor_grating,
         squeeze=squeeze, desqueeze=desqueeze,
     )  # fmt: skip
-    flags, defaults = (flags, None) if ideal else as_photographed(flags)
+    said, plain = said_by(flags), ideal or project is not None or state is not None
+    remarks: list[str] = []
+    if look is not None:
+        flags, of_look, unfit = put_look(flags, look)
+        said, remarks = said | of_look, list(unfit)
     settings = build_project(flags)
+    if not plain:
+        settings, filled = photographed(settings, said)
+        remarks = [*filled, *remarks]
     only = {
         "--resume": state, "--time-limit": time_limit, "--error": error, "--error-of": error_of, "--samples": samples,
         "--rays-from": rays_from,
@@ -430,8 +444,8 @@ def render(
         if run is not None and run.state_file is not None and run.state_file.exists():
             tell([f"to go on: flarewright render --resume {run.state_file} -o {output}"])
         raise
-    files, remarks = _write(rendering, output, full_windows, look)
-    remarks = [*([] if defaults is None else [defaults]), *rendering.remarks, *remarks]
+    files, written = _write(rendering, output, full_windows, view_of)
+    remarks = [*remarks, *rendering.remarks, *written]
     if ringing == "collins" and settings.quality.mode != "final":
         remarks.insert(0, f"{settings.quality.mode} quality traces rays alone: --ringing is for final quality")
     if orders == 4 and settings.quality.mode == "draft":

@@ -304,7 +304,7 @@ def _sections(flags: Flags) -> dict[str, dict[str, Any]]:
 
 def _lights(flags: Flags, base: tuple[Light, ...]) -> list[dict[str, Any]]:
     """Return the lights: those of the flags, else those of the project, with intensities and spectra of the flags."""
-    lights = [_light(text) for text in flags.light] if flags.light else [dict(light) for light in base]
+    lights = [light_of(text) for text in flags.light] if flags.light else [dict(light) for light in base]
     spectra = [parse_spectrum(text) for text in flags.spectrum]
     for name, values in (
         ("intensity", flags.intensity),
@@ -350,8 +350,8 @@ def _extents(flags: Flags, lights: list[dict[str, Any]]) -> None:
         _share_out(flag, [{"shape": shape, "diameter_deg": 0.0} for shape in values], rest, others=bool(suns))
 
 
-def _light(text: str) -> dict[str, Any]:
-    """Return what `--light` says: X,Y or sun@X,Y."""
+def light_of(text: str) -> dict[str, Any]:
+    """Return what `--light` says, X,Y or sun@X,Y, as the fields of a light."""
     word, at, place = text.rpartition("@")
     if at and word.strip().lower() != "sun":
         raise ProjectError(f"--light {text!r}: there is no {word.strip()!r}; write --light 10,5 or --light sun@10,5")

@@ -136,6 +136,40 @@ def project_text(project: Project, *, folder: Path | None = None, comments: bool
     -------
     str
     """
+    data = project_data(project, folder)
+    nothing = _left_out(project) if comments else {}
+    out: list[str] = []
+    _emit_table(out, data, (), nothing, ABOUT if comments else {})
+    teach = _TEACH_ART if comments and project.art == Art() else ""
+    if comments and project.holdout is None:
+        teach = _TEACH_HOLDOUT + teach
+    if comments and project.scatter is None:
+        teach = _TEACH_SCATTER + teach
+    if comments and "dirt" not in data and "starburst" not in data:
+        teach = _TEACH_DIRT + teach
+    return "\n".join(out).strip() + "\n" + teach
+
+
+def toml_text(data: dict[str, Any]) -> str:
+    """Return a table as TOML, its own keys before its sub-tables."""
+    out: list[str] = []
+    _emit_table(out, data, (), {}, {})
+    return "\n".join(out).strip() + "\n"
+
+
+def project_data(project: Project, folder: Path | None = None) -> dict[str, Any]:
+    """Return a project as its file says it: short texts where there are some, nothing that is None.
+
+    Parameters
+    ----------
+    project : Project
+    folder : path, optional
+        As in `project_text`.
+
+    Returns
+    -------
+    dict
+    """
     data = cast(dict[str, Any], _without_none(project.model_dump(mode="json")))
     if folder is not None:
         _make_relative(data, folder)
@@ -155,17 +189,7 @@ def project_text(project: Project, *, folder: Path | None = None, comments: bool
         written["spectrum"] = spectrum_text(light.spectrum) or written["spectrum"]
         if not light.keyframes:
             del written["keyframes"]
-    nothing = _left_out(project) if comments else {}
-    out: list[str] = []
-    _emit_table(out, data, (), nothing, ABOUT if comments else {})
-    teach = _TEACH_ART if comments and project.art == Art() else ""
-    if comments and project.holdout is None:
-        teach = _TEACH_HOLDOUT + teach
-    if comments and project.scatter is None:
-        teach = _TEACH_SCATTER + teach
-    if comments and "dirt" not in data and "starburst" not in data:
-        teach = _TEACH_DIRT + teach
-    return "\n".join(out).strip() + "\n" + teach
+    return data
 
 
 def _make_relative(data: dict[str, Any], folder: Path) -> None:

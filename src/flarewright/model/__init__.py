@@ -13,6 +13,7 @@ from .iris import Iris
 from .layer import Layer
 from .lens import Element, Lens, Position, Row, Stop, Surface
 from .light import D65, BlackBody, EqualEnergy, Light, LightKey, Lines, Polygon, Rectangle, Rgb, Spectrum, Tabulated
+from .look import Look
 from .plate import Plate
 from .project import AsLens, CoatingChoice, Everywhere, InTurn, Output, PerRow, Preset, Project, Quality
 from .scatter import RowScatter, Scatter
@@ -46,6 +47,7 @@ __all__ = [
     "Light",
     "LightKey",
     "Lines",
+    "Look",
     "Medium",
     "Output",
     "PerRow",

@@ -189,14 +189,16 @@ def preset_names(lens: Lens) -> tuple[str, ...]:
 
 def _dealt(lens: Lens, coatings: tuple[Coating, ...]) -> tuple[Coating | None, ...]:
     """Coat each surface in air with the next of the coatings; cemented ones stay bare."""
-    deck = cycle(coatings)
-    return tuple(next(deck) if air else None for air in _in_air(lens))
+    worn: list[Coating | None] = [None] * len(lens.rows)
+    for k, coating in zip(rows_in_air(lens), cycle(coatings), strict=False):
+        worn[k] = coating
+    return tuple(worn)
 
 
-def _in_air(lens: Lens) -> list[bool]:
-    """Return for each row whether it stands between glass and air."""
+def rows_in_air(lens: Lens) -> tuple[int, ...]:
+    """Return the rows that stand between glass and air."""
     n = gap_indices(lens, D_LINE_NM)
-    return [min(n[k], n[k + 1]) == 1.0 and n[k] != n[k + 1] for k in range(len(lens.rows))]
+    return tuple(k for k in range(len(lens.rows)) if min(n[k], n[k + 1]) == 1.0 and n[k] != n[k + 1])
 
 
 def pack_lens(

@@ -1,14 +1,12 @@
-"""What `flarewright render` fills in for a lens of the library when nothing is said."""
+"""What `flarewright render` fills in for a lens of the library when nothing is said, and what `--look` puts on it."""
 
 from types import SimpleNamespace
 
 import pytest
 
 from flarewright.cli.app import run
-from flarewright.cli.photograph import LIGHT_DEG, ROUGHNESS_UM, ROUNDING, plausible_preset, stopped_down
-from flarewright.io.library import shipped
-from flarewright.model import AsLens, Bare, Everywhere, Layer, Preset, Standard
-from flarewright.optics.pack import resolve_coatings
+from flarewright.model import AsLens, Bare, BlackBody, Everywhere, Layer, Preset, QuarterWave, Standard
+from flarewright.render.photographed import LIGHT_DEG, ROUGHNESS_UM, ROUNDING
 from flarewright.render.prepare import load_lens
 
 
@@ -98,30 +96,77 @@ def test_a_file_of_ones_own_is_taken_as_it_is(projects, tmp_path, capsys):
     assert "as photographed" not in capsys.readouterr().err
 
 
+LOOK = """
+name = "Dusk"
+lens = "tessar-brendel"
+f_number = 8.0
+coating = "quarter-wave:600"
+[iris]
+rounding = 0.1
+[dirt]
+dust_per_mm2 = 3.0
+[[lights]]
+field_deg = [-5.0, 2.0]
+spectrum = "black-body:2500"
+"""
+
+
+@pytest.fixture
+def dusk(tmp_path):
+    (tmp_path / "dusk.toml").write_text(LOOK, "utf-8")
+    return "dusk.toml"
+
+
+def test_a_look_by_itself_is_its_own_lens_and_lights(projects, dusk, capsys):
+    call("--look", dusk)
+    (project,) = projects
+    assert (project.lens, project.f_number, project.dirt.dust_per_mm2) == ("tessar-brendel", 8.0, 3.0)
+    assert project.lights[0].field_deg == (-5.0, 2.0)
+    assert project.lights[0].spectrum == BlackBody(temperature_k=2500.0)
+    # what it says nothing of is as photographed
+    assert project.lights[0].diameter_deg == LIGHT_DEG
+    assert project.iris == load_lens("tessar-brendel").iris.replace(rounding=0.1)
+    assert "as photographed: lights of 0.25 degrees; --ideal leaves this out" in capsys.readouterr().err
+
+
+def test_a_look_goes_onto_another_lens_and_light_and_flags_win(projects, dusk):
+    call(
+        "takumar-50-f1.4", "--look", dusk, "--light", "sun@-9,5", "--intensity", "2", "--coating", "none",
+        "--blades", "8",
+    )  # fmt: skip
+    (project,) = projects
+    assert project.lens == "takumar-50-f1.4"
+    assert project.f_number == 8.0
+    assert project.coating == Everywhere(coating=Bare())
+    assert (project.iris.blades, project.iris.rounding) == (8, 0.1)
+    (light,) = project.lights
+    assert (light.field_deg, light.intensity, light.diameter_deg) == ((-9.0, 5.0), 2.0, 0.53)
+    assert light.spectrum == BlackBody(temperature_k=2500.0)
+
+
+def test_a_look_goes_onto_a_project(projects, dusk, tmp_path):
+    (tmp_path / "shot.toml").write_text(
+        'lens = "takumar-50-f1.4"\nf_number = 2.0\ncoating = "none"\n[[lights]]\nfield_deg = [1, 2]\n'
+        "[camera]\nsize_px = [4, 3]\n"
+    )
+    call("--project", "shot.toml", "--look", dusk)
+    (project,) = projects
+    assert (project.lens, project.f_number, project.dirt.dust_per_mm2) == ("takumar-50-f1.4", 8.0, 3.0)
+    assert project.coating == Everywhere(coating=QuarterWave(center_wavelength_nm=600.0))
+    # a project is taken as it is: nothing else is filled in
+    assert project.lights[0].diameter_deg == 0.0
+
+
 @pytest.mark.parametrize(
-    ("wide_open", "stopped"), [(1.1, 4.0), (1.4, 4.0), (2.03, 4.0), (2.8, 5.6), (3.5, 7.1), (4.0, 8.0), (11.5, 22.0)]
+    ("words", "told"),
+    [
+        (["--look", "warm-vintge"], "'warm-vintge' is neither a look that ships nor a file: did you mean warm-vintage"),
+        (["--look", "none.toml"], "the look none.toml does not exist"),
+        (["model.json", "--look", "dusk.toml"], "model.json is a measured flare and has the look of its own lens"),
+    ],
 )
-def test_two_stops_down(wide_open, stopped):
-    assert stopped_down(wide_open) == stopped
-
-
-@pytest.mark.parametrize("name", shipped())
-def test_every_lens_wears_films_of_its_time(name):
-    """None before 1938; single films or stacks that differ from surface to surface after."""
-    lens = load_lens(name)
-    preset = plausible_preset(lens)
-    assert stopped_down(lens.f_number) >= lens.f_number
-    assert preset == ("blue-streak" if name == "anamorphic-heliar-2x" else "period")
-    worn = [coating for coating in resolve_coatings(lens, Preset(name=preset)) if coating not in (None, Bare())]
-    if name in ("biotar-50-f1.4", "speed-panchro-50"):
-        assert not worn
-    elif preset == "period":
-        assert len(set(worn)) >= 4
-
-
-def test_a_lens_without_films_of_its_time_wears_the_first_that_it_names():
-    lens = load_lens("triplet-pestrecov")
-    bare = lens.replace(coating_presets={})
-    assert plausible_preset(bare) == "staggered"
-    coatings = lens.coating_presets["single-coated"]
-    assert plausible_preset(bare.replace(coating_presets={"single-coated": coatings, "maker": coatings})) == "maker"
+def test_what_is_no_look_is_told(words, told, dusk, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "model.json").write_text("{}")
+    assert run(["render", *words, "-o", "a.exr"]) == 2
+    assert told in capsys.readouterr().err
