@@ -9,9 +9,10 @@ import sys
 from contextlib import contextmanager
 from pathlib import Path
 
+from sample import few_ghosts
+
 FLAGS = ["--no-sandbox", "--disable-gpu", "--disable-background-networking", "--disable-component-update", "--no-pings"]
 SRC = Path(__file__).parents[2] / "src"
-
 
 def chromium():
     """Return Debian's browser, or whatever is called alike; None where there is none."""
@@ -34,7 +35,12 @@ class Editor:
             environment["PYTHONPATH"] = os.pathsep.join([str(SRC), environment.get("PYTHONPATH", "")]).rstrip(
                 os.pathsep
             )
-        code = "from flarewright.cli.app import main; main()"
+        # a sample that is drawn in no time
+        code = (
+            "from flarewright.editor import session; from flarewright.model import Project; "
+            f"session.sample_project = lambda: Project.model_validate_json({few_ghosts().model_dump_json()!r}); "
+            "from flarewright.cli.app import main; main()"
+        )
         self.process = subprocess.Popen(
             [sys.executable, "-c", code, "edit", "--no-browser", "--port", str(self.port), *self.words],
             stderr=subprocess.PIPE, text=True, env=environment,

@@ -3,9 +3,9 @@
 from importlib.util import find_spec
 
 import pytest
+from sample import few_ghosts
 
 from flarewright.editor import ladder, studio
-from flarewright.editor.files import sample_project
 from flarewright.editor.jobs import Lane
 from flarewright.editor.seen import see
 from flarewright.model import Camera, Iris, Light, Output, Preset, Project, Quality
@@ -16,6 +16,7 @@ collect_ignore = [] if find_spec("starlette") else ["test_editor_server.py"]
 @pytest.fixture(autouse=True)
 def _own_state(tmp_path, monkeypatch):
     monkeypatch.setenv("FLAREWRIGHT_STATE", str(tmp_path / "state"))
+    monkeypatch.setattr("flarewright.editor.session.sample_project", few_ghosts)
 
 
 @pytest.fixture
@@ -69,7 +70,7 @@ def screen_size(request, monkeypatch):
         monkeypatch.setattr(studio, "WIDEST", 192)
         monkeypatch.setattr(studio, "HIGHEST", 108)
         monkeypatch.setattr(ladder, "ANGLES_DEG", (20.0,))
-        monkeypatch.setattr("flarewright.editor.session.sample_project", lambda: plainly(sample_project()))
+        monkeypatch.setattr("flarewright.editor.session.sample_project", lambda: plainly(few_ghosts()))
         monkeypatch.setattr(studio, "take", drawn_once(studio.take))
         for module in ("ladder", "sharpening"):
             monkeypatch.setattr(f"flarewright.editor.{module}.see", drawn_once(see))

@@ -10,13 +10,14 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from PIL import Image
+from sample import plain_lens
 
 from flarewright.editor import ladder as ladder_module
 from flarewright.editor import studio
 from flarewright.editor.drawings import section
 from flarewright.editor.edit_shot import move_light
 from flarewright.editor.edit_wishes import target_project
-from flarewright.editor.files import project_for_lens, save_project
+from flarewright.editor.files import save_project
 from flarewright.editor.hand import FAST_S, SCALES, SLOW_S, Hand
 from flarewright.editor.ladder import levels_at, measured, missing, with_rung
 from flarewright.editor.pictures import in_short
@@ -457,7 +458,7 @@ def test_a_zoom_that_is_final_for_the_screen_can_hardly_be_told_from_the_full_pi
     """
     monkeypatch.setattr(studio, "WIDEST", widest)
     monkeypatch.setattr(studio, "HIGHEST", widest * 9 // 16)
-    project = project_for_lens(lens)
+    project = plain_lens(lens)
     if widest < 960:
         project = project.replace(output=Output(starburst=False))
     soon = studio.take(project, "soon", View())
@@ -778,7 +779,7 @@ def test_a_view_that_changes_while_a_picture_is_packed_is_shown(monkeypatch):
 
 def test_every_ghost_of_the_picture_has_rays_in_the_cross_section():
     """Also those that fill little of the entrance, or that only a corner of the blades lets through."""
-    project = project_for_lens("canon-28-80")
+    project = plain_lens("canon-28-80")
     for name in ("8-6", "18-10", "27-5"):
         drawn = section(project, name)
         assert (name, drawn.told) == (name, "")

@@ -64,8 +64,8 @@ def test_the_page_and_every_question_it_asks(desk):
     assert state["picture"]["grade"] == "final"
     asked = {
         "/api/picture", "/api/moving?light=0&x=3&y=1", "/api/target", "/api/target?light=0&x=3&y=1",
-        "/api/outline?ghost=8-6", "/api/coating?row=0", "/api/map?ghost=8-6", "/api/thumbnail/tessar-brendel",
-        "/api/export/png",
+        "/api/outline?ghost=8-6", "/api/coating?row=0", "/api/map?ghost=8-6", "/api/thumbnail/lens/tessar-brendel",
+        "/api/thumbnail/look/low-sun", "/api/export/png",
     }  # fmt: skip
     kinds = {b"\xff\xd8": "jpeg", b"\x89P": "png", b"<s": "svg"}
     # so far from the axis what the sensor mirrors ends on rims
@@ -82,7 +82,10 @@ def test_the_page_and_every_question_it_asks(desk):
     assert told(desk, "/api/pick?u=0.5&v=0.5")[1]["ghosts"]
     assert told(desk, "/api/places")[1]["places"]
     assert "N-BK7" in str(told(desk, "/api/glasses?q=n-bk")[1])
-    assert len(told(desk, "/api/library")[1]["lenses"]) >= 12
+    library = told(desk, "/api/library")[1]
+    assert len(library["lenses"]) >= 12
+    assert len(library["looks"]) >= 12
+    assert b'name = "Flare"' in ask(desk, "/api/export/look")[1]
     assert told(desk, "/api/ghosts")[1]["ghosts"][0]["share"] == 1.0
     # a hand that has let go is shown no target any more
     assert ask(desk, "/api/target?at=0&revision=-1") == (204, b"")
@@ -116,8 +119,8 @@ def test_deeds_undo_and_what_is_refused(desk):
         assert "Traceback" not in answer["error"]
     assert told(desk, "/api/moving?light=7&x=1&y=1")[0] == 400
     assert told(desk, "/api/coating?row=5")[0] == 400
-    assert ask(desk, "/api/thumbnail/..%2f..%2fsecret")[0] in (400, 404)
-    assert told(desk, "/api/thumbnail/secret")[0] == 400
+    assert ask(desk, "/api/thumbnail/lens/..%2f..%2fsecret")[0] in (400, 404)
+    assert told(desk, "/api/thumbnail/lens/secret")[0] == 400
     assert told(desk, "/api/export/zip")[0] == 400
 
 

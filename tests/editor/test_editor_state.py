@@ -18,7 +18,7 @@ from flarewright.editor.view import View
 from flarewright.errors import FlarewrightError
 from flarewright.io.library import lens_path
 from flarewright.io.project_file import read_project
-from flarewright.model import Light, PerRow, QuarterWave, Stop, Surface
+from flarewright.model import BlackBody, Light, PerRow, Preset, QuarterWave, Stop, Surface
 from flarewright.render.prepare import as_lens, first_order, settle
 
 
@@ -371,9 +371,9 @@ def test_a_deed_on_a_row_is_none_on_a_row_of_another_lens():
 def test_every_deed_is_tried_here():
     tried = (
         "move_light set_light add_light remove_light set_camera set_quality set_fields set_iris set_dirt set_starburst "
-        "set_pass_gain set_coating set_row_wavelengths set_cell add_row duplicate_row remove_row move_stop choose_lens "
-        "set_lens_facts set_ghost set_solo reset_art set_wish add_ghost remove_wish set_new_wish set_design "
-        "clear_wishes set_key move_key remove_key clear_keys go_to set_holdout"
+        "set_pass_gain set_coating put_look set_row_wavelengths set_cell add_row duplicate_row remove_row move_stop "
+        "choose_lens set_lens_facts set_ghost set_solo reset_art set_wish add_ghost remove_wish set_new_wish "
+        "set_design clear_wishes set_key move_key remove_key clear_keys go_to set_holdout"
     )
     assert sorted(tried.split()) == sorted(DEEDS)
 
@@ -396,6 +396,10 @@ def test_lights_camera_iris_and_coating(project):
     gained = do(project, "set_pass_gain", name="ghosts", gain=2.0)
     assert gained.art.gain == {"ghosts": 2.0}
     assert do(gained, "set_pass_gain", name="ghosts", gain=1.0) == project
+    worn = do(project, "put_look", name="low-sun")
+    assert (worn.f_number, worn.coating) == (8.0, Preset(name="period"))
+    assert worn.lights[0].spectrum == BlackBody(temperature_k=3800.0)
+    assert worn.lights[0].field_deg == project.lights[0].field_deg
     assert do(project, "set_coating", text="quarter-wave:500").coating.coating == QuarterWave(center_wavelength_nm=500)
     mapped = do(project, "set_row_wavelengths", values={"0": 500.0, "4": 600.0})
     assert isinstance(mapped.coating, PerRow)

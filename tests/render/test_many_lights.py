@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from flarewright.editor.files import project_for_lens
 from flarewright.kernels.bundle import measure_bundle
 from flarewright.kernels.trace import WEIGHT
 from flarewright.model import (
@@ -20,6 +19,7 @@ from flarewright.model import (
     Light,
     Lines,
     Output,
+    Preset,
     Project,
     Quality,
     Rule,
@@ -302,7 +302,11 @@ def test_gathered_weights_keep_the_flux_of_every_wavelength():
 @pytest.mark.parametrize("one_color", [False, True])
 def test_a_dark_wavelength_leaves_its_light_to_bright_ones(one_color):
     """A coating that quenches the middle of the spectrum: drawn are its ends, or the brightest, with all the light."""
-    settled = settle(project_for_lens("canon-28-80"))
+    project = Project(
+        lens="canon-28-80", f_number=8.0, coating=Preset(name="single-coated"),
+        lights=(Light(field_deg=(16.327, 8.881)),), camera=Camera(size_px=(1920, 1080)),
+    )  # fmt: skip
+    settled = settle(project)
     (shot,) = make_shots(settled, make_opening(settled, None))
     tilt, opening = shot.incidence.tilt, shot.opening
     (path,) = [path for path in ghost_paths(settled.lens) if path.name == "14-8"]

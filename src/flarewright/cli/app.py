@@ -6,7 +6,7 @@ import gc
 import os
 import sys
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager, nullcontext, suppress
 from typing import Annotated, Any
 
 import typer
@@ -25,12 +25,14 @@ from . import (
     design_solve,
     design_target,
     edit,
+    gallery,
     ghosts,
     lens_check,
     lens_convert,
     lens_schema,
     lens_show,
     lenses,
+    looks,
     measure_explain,
     measure_replay,
     measure_report,
@@ -63,6 +65,7 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 lens_app = typer.Typer(help="Look at, check and convert lens files.")
+looks_app = typer.Typer(help="Looks: coatings, iris, dirt and colours together, for any lens and light.")
 coating_app = typer.Typer(help="Look at coatings: the standard ones, and what any coating reflects.")
 project_app = typer.Typer(help="Project files: everything a render needs, in one TOML file.")
 scene_app = typer.Typer(help="Scene files: cameras and lights in space, for `flarewright predict`.")
@@ -73,9 +76,13 @@ app.command("render", epilog=render.EPILOG)(render.render)
 app.command("ghosts", epilog=ghosts.EPILOG)(ghosts.ghosts)
 app.command("predict", epilog=predict.EPILOG)(predict.predict)
 app.command("lenses", epilog=lenses.EPILOG)(lenses.lenses)
+app.command("gallery", epilog=gallery.EPILOG)(gallery.gallery)
 app.command("edit", epilog=edit.EPILOG)(edit.edit)
 app.command("warm-up", epilog=warm_up.EPILOG)(warm_up.warm_up)
 app.add_typer(lens_app, name="lens")
+app.add_typer(looks_app, name="looks")
+looks_app.callback(invoke_without_command=True, epilog=looks.EPILOG)(looks.looks)
+looks_app.command("save", epilog=looks.SAVE_EPILOG)(looks.save)
 app.add_typer(coating_app, name="coating")
 app.add_typer(project_app, name="project")
 app.add_typer(scene_app, name="scene")
@@ -156,6 +163,8 @@ def run(arguments: Sequence[str]) -> int:
             stream.reconfigure(errors="replace")
     words = list(arguments)
     if words in ([], ["lens"], ["coating"], ["project"], ["scene"], ["design"], ["measure"]):
+        if not words:
+            _show_gallery()
         words.append("--help")
     try:
         with head_start(_rings(words)) if _traces(words) else nullcontext():
@@ -166,6 +175,15 @@ def run(arguments: Sequence[str]) -> int:
         # Whoever read our output went away (`| head`); the interpreter's last flush must not complain again.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
+
+
+def _show_gallery() -> None:
+    """Lay out the pictures that ship, and say where; without a place for them the help says enough."""
+    from ..io.state_folder import state_folder
+
+    with suppress(FlarewrightError, OSError):
+        page = gallery.shipped_gallery(state_folder() / "gallery")
+        print(f"flarewright: pictures of every lens and look: {page.as_uri()}", file=sys.stderr)
 
 
 def _traces(words: Sequence[str]) -> bool:

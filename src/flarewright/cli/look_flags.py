@@ -9,7 +9,7 @@ from ..io.ghost_model_file import names_ghost_model
 from ..io.look_file import read_look
 from ..io.project_file import read_project
 from ..model import Light, Project
-from ..render.looks import with_look
+from ..render.looks import look_says, with_look
 from ..render.photographed import as_photographed
 from .render_flags import Flags, light_of
 
@@ -53,8 +53,7 @@ def put_look(flags: Flags, name: str) -> tuple[Flags, frozenset[str], tuple[str,
     else:
         shot = base.replace(lens=lens, lights=lights)
     found, remarks = with_look(shot, look)
-    says = {"lights" if key in ("lights.diameter_deg", "lights.shape") else key for key in look.says}
-    return replace(flags, lens=None, light=[], project=None, resumed=found), frozenset(says), remarks
+    return replace(flags, lens=None, light=[], project=None, resumed=found), look_says(look), remarks
 
 
 def said_by(flags: Flags) -> frozenset[str]:

@@ -21,8 +21,8 @@ def name_values(app: typer.Typer) -> None:
     app : Typer
         Its commands' options are changed, and those of the groups below it.
     """
-    for command in app.registered_commands:
-        if command.callback is None:
+    for command in (*app.registered_commands, app.registered_callback):
+        if command is None or command.callback is None:
             continue
         hints = get_type_hints(command.callback, include_extras=True)
         for hint in hints.values():

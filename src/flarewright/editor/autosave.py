@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
-import sys
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -14,6 +12,7 @@ from pydantic import ValidationError
 
 from ..errors import FlarewrightError
 from ..io.atomic import write_atomically
+from ..io.state_folder import state_folder
 from ..model import Project
 from .history import History, Moment
 from .view import View
@@ -44,17 +43,6 @@ class Saved:
     file: str | None
     clean: bool
     stamps: dict[str, str] = field(default_factory=dict)
-
-
-def state_folder() -> Path:
-    """Return where the editor keeps its state: FLAREWRIGHT_STATE, or the system's place for such things."""
-    if given := os.environ.get("FLAREWRIGHT_STATE"):
-        return Path(given)
-    if sys.platform == "win32":
-        return Path(os.environ.get("LOCALAPPDATA", str(Path.home()))) / "flarewright"
-    if sys.platform == "darwin":
-        return Path.home() / "Library" / "Application Support" / "flarewright"
-    return Path(os.environ.get("XDG_STATE_HOME", str(Path.home() / ".local" / "state"))) / "flarewright"
 
 
 def autosave_path(what: str | None, number: int = 1) -> Path:

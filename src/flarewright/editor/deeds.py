@@ -33,6 +33,7 @@ DEEDS: dict[str, tuple[str, Deed]] = {
     "set_starburst": ("Change the starburst", edit_shot.set_starburst),
     "set_pass_gain": ("Grade a pass", edit_shot.set_pass_gain),
     "set_coating": ("Coat the lens", edit_shot.set_coating),
+    "put_look": ("Put on a look", edit_shot.put_look),
     "set_row_wavelengths": ("Coat mirrors", edit_shot.set_row_wavelengths),
     "set_cell": ("Edit the prescription", edit_lens.set_cell),
     "add_row": ("Add a row", edit_lens.add_row),

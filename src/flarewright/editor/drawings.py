@@ -1,8 +1,7 @@
-"""Drawings beside the picture: cross-section, coatings, colour maps, the library's thumbnails."""
+"""Drawings beside the picture: cross-section, coatings, colour maps, what the library holds."""
 
 from __future__ import annotations
 
-import hashlib
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -11,10 +10,10 @@ import numpy as np
 from ..design.colors import indices_of, pair_map
 from ..design.ghosts import placed_ghosts
 from ..design.prescription import structure_of
-from ..errors import FlarewrightError, OutputError, ProjectError
-from ..io.atomic import write_atomically
+from ..errors import FlarewrightError, ProjectError
 from ..io.coating_text import format_coating
-from ..io.library import lens_path, shipped
+from ..io.library import shipped
+from ..io.look_file import read_look, shipped_looks
 from ..io.mask_image import read_mask
 from ..model import Coating, Project, Surface
 from ..model.design import Bounds
@@ -25,16 +24,7 @@ from ..render.coating_plot import PANEL, PLOT_ANGLES_DEG, STRIP_ANGLES_DEG, coat
 from ..render.cross_section import cross_section
 from ..render.figure import to_svg
 from ..render.prepare import as_lens, load_lens, settle
-from .autosave import state_folder
-from .files import project_for_lens
-from .jobs import Gate
-from .shown import jpeg, pixels_of, png
-from .studio import exposure_of, take
-from .view import View
-
-THUMB_SCALE = 0.25
-# thumbnails are drawn one at a time: they are many, and the picture in the viewport comes first
-_THUMBS = Gate()
+from .shown import png
 
 
 def mask_png(project: Project) -> bytes:
@@ -163,37 +153,11 @@ def library() -> tuple[dict[str, object], ...]:
     return tuple(out)
 
 
-def thumbnail(name: str) -> bytes:
-    """Draw a lens' flare small; kept on disk, for a lens file that does not change has one flare.
-
-    Parameters
-    ----------
-    name : str
-        Of a lens that ships.
-
-    Returns
-    -------
-    bytes
-        JPEG.
-    """
-    if name not in shipped():
-        raise ProjectError(f"{name!r} is no lens of the library")
-    stamp = hashlib.sha256(lens_path(name).read_bytes()).hexdigest()[:16]
-    path = state_folder() / "thumbnails" / f"{name}.{stamp}.jpg"
-    if path.is_file():
-        return path.read_bytes()
-    with _THUMBS:
-        picture = take(project_for_lens(name), "draft", View(), scale=THUMB_SCALE)
-        data = jpeg(pixels_of(picture.ghosts + picture.rest, exposure_of(picture), View()), 85)
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        write_atomically(path, lambda temporary: _write(temporary, data))
-    except (OSError, OutputError):
-        # without a place to keep it, it is drawn anew next time
-        return data
-    return data
-
-
-def _write(path: object, data: bytes) -> None:
-    assert hasattr(path, "write_bytes")
-    path.write_bytes(data)
+@lru_cache(maxsize=1)
+def looks() -> tuple[dict[str, object], ...]:
+    """Return the looks that ship: name, title, notes, and what is searched for."""
+    known = {name: read_look(name) for name in shipped_looks()}
+    return tuple(
+        {"name": name, "title": look.name, "notes": look.notes, "words": f"{name} {look.name} {look.notes}".lower()}
+        for name, look in known.items()
+    )

@@ -21,6 +21,7 @@ from ..model.art import Art
 from ..optics.image_height import image_heights
 from ..optics.paraxial import FirstOrder
 from ..optics.shape import sag
+from ..render.photographed import as_photographed, plausible_preset
 from ..render.prepare import as_lens, first_order
 from .words import sentence, spoken
 
@@ -364,7 +365,8 @@ def choose_lens(project: Project, lens: str | Lens) -> Project:
         lens=lens, f_number=stopped, iris=iris, coating=first_coating(known), lights=lights, art=Art(), zoom=None,
         design=None,
     )  # fmt: skip
-    return changed
+    # blades of a lens of the library are rounded and a little rough
+    return as_photographed(changed, {"f_number", "coating", "lights"})[0]
 
 
 def _efl(project: Project) -> float:
@@ -373,9 +375,8 @@ def _efl(project: Project) -> float:
 
 
 def first_coating(lens: Lens) -> CoatingChoice:
-    """Return the first of a lens' coating presets; as its rows say where it has none."""
-    name = next(iter(lens.coating_presets), None)
-    return AsLens() if name is None else Preset(name=name)
+    """Return the coating preset that a lens is shown with; as its rows say where it has none."""
+    return Preset(name=plausible_preset(lens)) if lens.coating_presets else AsLens()
 
 
 def _kept_angles(field_deg: tuple[float, float], zoom: float) -> tuple[float, ...]:

@@ -6,10 +6,12 @@ from itertools import count
 from typing import Any
 
 from ..errors import ProjectError
+from ..io.look_file import read_look, shipped_looks
 from ..io.project_file import parse_coating_choice
 from ..io.spectrum_text import parse_spectrum
 from ..measure.rendering import check_measured, is_measured
 from ..model import BlackBody, Everywhere, Holdout, Iris, Light, PerRow, Project, QuarterWave, Surface
+from ..render.looks import with_look
 from ..render.prepare import as_lens, settle
 
 # a drag goes no further out than this: beyond it a flat picture has no place for the light
@@ -143,6 +145,17 @@ def set_pass_gain(project: Project, name: str, gain: float) -> Project:
 def set_coating(project: Project, text: str) -> Project:
     """Choose the coating of the whole lens by a short text, as `--coating` does."""
     changed = _with(project, coating=parse_coating_choice(text))
+    settle(changed)
+    return changed
+
+
+def put_look(project: Project, name: str) -> Project:
+    """Put a look that ships on the lens and the lights."""
+    if is_measured(project):
+        raise ProjectError("a measured flare has the look of its own lens; choose a lens first")
+    if name not in shipped_looks():
+        raise ProjectError(f"the library has no look {name!r}")
+    changed, _ = with_look(project, read_look(name))
     settle(changed)
     return changed
 

@@ -16,49 +16,63 @@ from .. import __version__
 from ..errors import FlarewrightError, LensError, OutputError, ProjectError
 from ..io.atomic import write_atomically
 from ..io.exr import write_exr
+from ..io.file_kind import kind_of
 from ..io.ghost_model_file import names_ghost_model
 from ..io.lens_writer import format_lens
 from ..io.library import lens_path, near_names, shipped
+from ..io.look_file import look_text, read_look
 from ..io.project_file import project_from_data, project_text, read_project
 from ..io.project_text import LENS_SUFFIXES
 from ..io.text_file import read_toml
 from ..measure.rendering import render_any
-from ..model import Camera, Iris, Lens, Light, Preset, Project
+from ..model import Camera, Iris, Lens, Light, Look, Project
+from ..render.looks import look_of
+from ..render.photographed import as_photographed
 from ..render.prepare import complete_lens, first_order, load_lens
 from .edit_lens import first_coating, own_lens
 from .measured import check_any, project_for_measured
 from .pictures import pictures
 from .seen import Seen
 
-SAMPLE = "heliar-tronnier"
-# of a new project: where the light is imaged, and how far it is stopped down
+SAMPLE = "takumar-50-f1.4"
+SAMPLE_DEG = (-9.0, 5.0)
+# of a new project: where the light is imaged, and how far a lens of a person's own is stopped down
 PLACE_MM = (10.5, 5.6)
 F_NUMBER = 8.0
 PICTURES = (".exr", ".png", ".jpg", ".jpeg")
-Kind = Literal["exr", "png", "lens", "project", "csv"]
-SUFFIXES: dict[str, str] = {"exr": ".exr", "png": ".png", "lens": ".lens.toml", "project": ".toml", "csv": ".csv"}
+Kind = Literal["exr", "png", "lens", "project", "look", "csv"]
+SUFFIXES: dict[str, str] = {
+    "exr": ".exr", "png": ".png", "lens": ".lens.toml", "project": ".toml", "look": ".look.toml", "csv": ".csv",
+}  # fmt: skip
 
 
 def sample_project() -> Project:
-    """Return the project that the first run shows: a lens of few, large ghosts, coated as the thesis has it."""
+    """Return the project that the first run shows: the picture of the README."""
     base = project_for_lens(SAMPLE)
-    shown: Project = base.replace(
-        f_number=16.0, iris=Iris(blades=6, rotation_deg=10.0), coating=Preset(name="thesis"),
-        lights=(Light(field_deg=(8.0, 4.4)),),
-    )  # fmt: skip
+    shown: Project = base.replace(lights=(base.lights[0].replace(field_deg=SAMPLE_DEG),))
     return shown
 
 
 def project_for_lens(lens: str | Lens) -> Project:
-    """Return a project with a lens, a light in the picture's upper right and six blades where the lens says nothing."""
+    """Return a project with a lens and a light in the picture's upper right, a lens of the library as photographed.
+
+    Six blades where a lens says nothing of its iris.
+    """
     known = load_lens(lens) if isinstance(lens, str) else complete_lens(lens)
     iris = known.iris if known.iris != Iris() else Iris(blades=6)
     efl = first_order(known).efl
     x, y = (round(degrees(atan(mm / efl)), 3) for mm in PLACE_MM)
-    return Project(
+    plain = Project(
         lens=lens, iris=iris, coating=first_coating(known), f_number=max(known.f_number, F_NUMBER),
-        lights=(Light(field_deg=(x, y)),), camera=Camera(size_px=(1920, 1080)),
+        lights=(Light(field_deg=(x, y)),), camera=Camera(size_px=(1920, 1080), desqueeze=known.squeeze is not None),
     )  # fmt: skip
+    return as_photographed(plain)[0]
+
+
+def look_of_project(project: Project, name: str) -> str:
+    """Return the look of a project as a look's file."""
+    look, _ = look_of(project, name.replace("-", " ").replace("_", " ").capitalize())
+    return look_text(look)
 
 
 def open_any(text: str) -> tuple[Project, str | None]:
@@ -141,9 +155,10 @@ def _is_project(data: dict[str, object]) -> bool:
 
 @dataclass(frozen=True)
 class Imported:
-    """What a dropped file holds: one of a project, a lens and a picture (its path), and what was noticed."""
+    """What a dropped file holds: one of a project, a look, a lens and a picture (its path), and what was noticed."""
 
     project: Project | None = None
+    look: Look | None = None
     lens: Lens | None = None
     picture: str | None = None
     remarks: tuple[str, ...] = ()
@@ -173,8 +188,8 @@ def imported(name: str, data: bytes, folder: Path) -> Imported:
     plain = Path(name).name or "dropped"
     if suffix not in (*LENS_SUFFIXES, *PICTURES):
         raise LensError(
-            f"{plain} cannot be opened here: drop a lens (.toml, .lens, .zmx), a measured flare (.json), a project "
-            "(.toml), or a background picture (.exr, .png, .jpg)"
+            f"{plain} cannot be opened here: drop a lens (.toml, .lens, .zmx), a measured flare (.json), a project or "
+            "a look (.toml), or a background picture (.exr, .png, .jpg)"
         )
     # a name of its own for other contents: what undo leads back to must stay as it was
     folder = folder / hashlib.sha256(data).hexdigest()[:12]
@@ -187,6 +202,8 @@ def imported(name: str, data: bytes, folder: Path) -> Imported:
     try:
         if suffix == ".toml":
             table = read_toml_of(path)
+            if kind_of(table) == "look":
+                return Imported(look=read_look(path))
             if _is_project(table):
                 found = project_from_data(table, folder=folder, where=plain)
                 check_any(found)

@@ -8,7 +8,8 @@ from typing import Any
 from ..errors import FlarewrightError, ProjectError
 from ..io.mask_image import read_mask
 from ..io.plate_image import read_depth, read_matte
-from .autosave import state_folder
+from ..io.state_folder import state_folder
+from ..render.looks import with_look
 from .edit_lens import choose_lens
 from .edit_shot import iris_of
 from .files import imported
@@ -56,6 +57,10 @@ def take_in(session: Session, name: str, data: bytes, use: str = "", light: int 
         raise ProjectError(f"{name} is no picture; give a PNG, JPEG or EXR file")
     elif found.project is not None:
         session.put(found.project, f"Import {name}", begins=True)
+    elif found.look is not None:
+        changed, remarks = with_look(session.project, found.look)
+        session.put(changed, f"Look {found.look.name}")
+        return remarks
     elif found.lens is not None:
         session.put(choose_lens(session.project, found.lens), f"Import {name}")
     return found.remarks

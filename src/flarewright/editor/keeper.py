@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import IO, Any
 
 from ..errors import FlarewrightError
-from .autosave import Saved, autosave_path, state_folder, write_autosave
+from ..io.state_folder import state_folder
+from .autosave import Saved, autosave_path, write_autosave
 from .jobs import Lane
 
 # editors of one project at once

@@ -22,6 +22,7 @@ from starlette.staticfiles import StaticFiles
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from ..errors import FlarewrightError, ProjectError
+from ..io.thumbnails import thumbnail
 from ..model import Project
 from . import drawings, files, viewing
 from .desk import Desk
@@ -219,11 +220,11 @@ def _places(desk: Desk, _request: Request, _body: Any) -> Any:
 
 
 def _library(_desk: Desk, _request: Request, _body: Any) -> Any:
-    return {"lenses": list(drawings.library())}
+    return {"lenses": list(drawings.library()), "looks": list(drawings.looks())}
 
 
 def _thumbnail(_desk: Desk, request: Request, _body: Any) -> Any:
-    return _jpeg(drawings.thumbnail(request.path_params["name"]))
+    return _jpeg(thumbnail(request.path_params["kind"], request.path_params["name"]))
 
 
 def _glasses(_desk: Desk, request: Request, _body: Any) -> Any:
@@ -289,6 +290,8 @@ def _export(desk: Desk, request: Request, _body: Any) -> Any:
         text = files.lens_text(project)
     elif kind == "project":
         text = project_text(project)
+    elif kind == "look":
+        text = files.look_of_project(project, stem)
     else:
         assert desk.screen.seen is not None
         text = files.ghost_csv(desk.screen.seen)
@@ -348,7 +351,7 @@ _GET = {
     "/api/pick": _pick, "/api/outline": _outline, "/api/ghosts": _ghosts, "/api/section": _section,
     "/api/coating": _coating, "/api/map": _colour_map, "/api/mask": _mask,
     "/api/places": _places, "/api/library": _library,
-    "/api/thumbnail/{name}": _thumbnail, "/api/glasses": _glasses, "/api/command": _command,
+    "/api/thumbnail/{kind}/{name}": _thumbnail, "/api/glasses": _glasses, "/api/command": _command,
     "/api/export/{kind}": _export, "/api/candidate/{k}": _candidate,
 }  # fmt: skip
 _POST = {

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any, Literal
 
-Kind = Literal["lens", "project", "scene"]
+Kind = Literal["lens", "look", "project", "scene"]
 
 
 def refuse_other_kind(path: str | Path, table: dict[str, Any], wanted: Kind) -> None:
@@ -16,7 +16,7 @@ def refuse_other_kind(path: str | Path, table: dict[str, Any], wanted: Kind) -> 
     path : str or Path
     table : dict
         What it holds.
-    wanted : {"lens", "project", "scene"}
+    wanted : {"lens", "look", "project", "scene"}
 
     Raises
     ------
@@ -24,6 +24,11 @@ def refuse_other_kind(path: str | Path, table: dict[str, Any], wanted: Kind) -> 
         With the command that checks it; the message is one sentence.
     """
     kind = kind_of(table)
+    if kind == "look" != wanted:
+        raise ValueError(
+            f"{path} is a look, not a {wanted} file: put it on a lens with flarewright render LENS --light X,Y "
+            f"--look {path}"
+        )
     if kind is not None and kind != wanted:
         use = f", render it with flarewright render --project {path}" if kind == "project" else ""
         raise ValueError(
@@ -43,7 +48,8 @@ def kind_of(table: dict[str, Any]) -> Kind | None:
     if isinstance(table.get("rows"), list) and "lights" not in table:
         kinds.append("lens")
     if "lens" in table and "rows" not in table:
-        kinds.append("project")
+        # a project has no name
+        kinds.append("look" if "name" in table else "project")
     if "cameras" in table:
         kinds.append("scene")
     return kinds[0] if len(kinds) == 1 else None

@@ -14,6 +14,7 @@ from pydantic import ValidationError
 from ..errors import ProjectError
 from ..model import Iris, Look
 from ..model.look import CAMERA_KEYS, LIGHT_KEYS, LOOK_SECTIONS
+from .file_kind import refuse_other_kind
 from .project_file import ProjectFileError, project_from_data
 from .project_text import project_data, toml_text
 from .sentences import did_you_mean, summary, validation_sentences
@@ -83,6 +84,7 @@ def read_look(name_or_path: str | os.PathLike[str]) -> Look:
     path = look_path(Path(name_or_path) if not isinstance(name_or_path, str) else name_or_path)
     try:
         data = read_toml(path, "a look")
+        refuse_other_kind(path, data, "look")
         check_version(data, _NEWEST, f"the look {path}")
     except ValueError as error:
         raise ProjectError(str(error)) from None

@@ -28,9 +28,13 @@ _WIDTHS = 8.0
 _NARROWEST = math.log(_WIDTHS) / (_WIDTHS - 1.0)
 # ... and scatter in so many classes of like width, each with fringes of its own
 _CLASSES = 6
-# orders of a scratch's fringes: up to the first all are drawn, from the last on their mean; white light has none so far
-# out, for a channel's band of 60 to 100 nm spans whole orders there; lines have, and what draws them has to follow each
-_FADE = (12.0, 20.0)
+RAGGED = 0.1
+"""Rms by which each edge of a scratch leaves its line, in widths: its fringes fade from order to order."""
+
+# ... over so many widths along it
+_RAGGED_STEP = 2.0
+# order of a scratch's fringes beyond which raggedness leaves none
+_LAST_ORDER = 6.0
 
 __all__ = ["Elements", "Veil", "VeilTerm", "lay_elements", "rasterise", "scattered", "spread_area"]
 
@@ -193,11 +197,12 @@ def rasterise(elements: Elements, at: Floats) -> tuple[Floats, Floats]:
         qx, qy = px - (x - R * math.cos(normal)), py[:, None] - (y - R * math.sin(normal))
         turn = np.arctan2(qy, qx) - normal
         off = np.abs((turn + np.pi) % (2.0 * np.pi) - np.pi)
-        across = np.abs(np.hypot(qx, qy) - R)
         ends = _softened((R * (off - bend)) / spacing)
         # a band below a sample keeps its area
         drawn = max(0.5 * width, 0.5 * spacing)
-        cover = _softened((across - drawn) / spacing) * ends * (0.5 * width / drawn)
+        inner, outer = _ragged(turn * R, length, width, bend)
+        across = np.abs(np.hypot(qx, qy) - R - 0.5 * (outer - inner))
+        cover = _softened((across - drawn - 0.5 * (outer + inner)) / spacing) * ends * (0.5 * width / drawn)
         _cover(amplitude, light, rows, columns, cover, 0.0)
     return amplitude, light
 
@@ -205,6 +210,14 @@ def rasterise(elements: Elements, at: Floats) -> tuple[Floats, Floats]:
 def _cover(amplitude: Floats, light: Floats, rows: slice, columns: slice, cover: Floats, part: float) -> None:
     amplitude[rows, columns] *= 1.0 - (1.0 - math.sqrt(part)) * cover
     light[rows, columns] *= 1.0 - (1.0 - part) * cover
+
+
+def _ragged(along: Floats, length: float, width: float, bend: float) -> tuple[Floats, Floats]:
+    """Return how far the edges of a scratch stand out at places along it, by chance that its bend begins."""
+    knots = np.arange(-0.6 * length, 0.6 * length, _RAGGED_STEP * width)
+    # between knots that are joined by straight lines two thirds of the variance are left
+    heights = np.random.default_rng(int(1e12 * bend)).normal(0.0, RAGGED * width * math.sqrt(1.5), (2, len(knots)))
+    return np.interp(along, knots, heights[0]), np.interp(along, knots, heights[1])
 
 
 def _softened(distance: Floats) -> Floats:
@@ -255,8 +268,10 @@ def scattered(elements: Elements, inside: NDArray[np.bool_], inside_arcs: NDArra
     -----
     Babinet: far from the image of the opening, dirt scatters as openings of its shape would. A disc of radius a that
     takes the amplitude d scatters d^2 (pi a^2)^2 (2 J1(x) / x)^2, x = 2 pi a s. A band of width w along an arc of
-    radius R scatters d^2 w^2 sinc^2(w s) R / s along its normals (stationary phase). Pieces lie at random, so their
-    waves add in light. Each carries as much light as it takes: d^2 times its area (tested). Overlaps are not counted.
+    radius R scatters d^2 w^2 sinc^2(w s) R / s along its normals (stationary phase). Its edges are ragged, each for
+    itself by the rms r w, so that sinc^2(o) becomes (1 - exp(-(2 pi r o)^2) cos(2 pi o)) / (2 pi^2 o^2), the mean of
+    |e1 - e2|^2 of two edges' waves. Pieces lie at random, so their waves add in light. Each carries as much light as it
+    takes: d^2 times its area (tested). Overlaps are not counted.
     """
     s = np.geomspace(1.0, 1e6, 1201)
     terms = []
@@ -290,7 +305,7 @@ def _fans(arcs: Floats, s: Floats, power: float) -> VeilTerm:
     mean = float(angular.mean())
     widths = arcs[:, 4]
     # as fine as their fringes need
-    fine = np.geomspace(0.02 / widths.max(), _FADE[1] / widths.min(), 2400)
+    fine = np.geomspace(0.02 / widths.max(), _LAST_ORDER / widths.min(), 2400)
     s = np.concatenate([s[s < fine[0]], fine, s[s > fine[-1]]])
     share = arcs[:, 3] / arcs[:, 3].sum()
     slits = sum(part * w * w * _slit(w * s) for part, w in zip(share, widths, strict=True))
@@ -298,11 +313,9 @@ def _fans(arcs: Floats, s: Floats, power: float) -> VeilTerm:
 
 
 def _slit(order: Floats) -> Floats:
-    """sinc^2, far out the mean over its fringes; a step between the two would be seen, so they fade slowly."""
-    t = np.clip((order - _FADE[0]) / (_FADE[1] - _FADE[0]), 0.0, 1.0)
-    left = 1.0 - t * t * (3.0 - 2.0 * t)
-    far = 0.5 * (1.0 - left * np.cos(2.0 * math.pi * order)) / (math.pi * np.maximum(order, 1.0)) ** 2
-    return np.where(order < 1.0, np.sinc(order) ** 2, far)
+    """Return what a slit with ragged edges scatters, over what it would straight ahead with straight ones."""
+    phase = 2.0 * math.pi * np.maximum(order, 1e-3)
+    return 2.0 * (1.0 - np.exp(-((RAGGED * phase) ** 2)) * np.cos(phase)) / phase**2
 
 
 def _airy(x: Floats) -> Floats:

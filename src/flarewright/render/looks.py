@@ -10,6 +10,7 @@ from ..model import Art, Bare, Camera, Everywhere, InTurn, Iris, Light, Look, Pr
 from ..model.look import CAMERA_KEYS, LIGHT_KEYS
 from ..model.project import AsLens, CoatingChoice
 from ..optics.pack import preset_names, resolve_coatings, rows_in_air
+from .photographed import as_photographed
 from .prepare import as_lens
 
 
@@ -137,3 +138,30 @@ def _carried(example: Project, project: Project) -> CoatingChoice:
     lens = as_lens(example.lens)
     worn = resolve_coatings(lens, choice)
     return InTurn(coatings=tuple(worn[k] or Bare() for k in rows_in_air(lens)))
+
+
+def shown(look: Look, size_px: tuple[int, int] | None = None) -> Project:
+    """Return a look on the lens and in the light that it is shown with; what it leaves open is as photographed.
+
+    Parameters
+    ----------
+    look : Look
+    size_px : tuple of int, optional
+        Of the picture; the project's own where left out.
+
+    Returns
+    -------
+    Project
+    """
+    stage = Project(lens=look.example.lens, lights=look.example.lights, zoom=look.example.zoom)
+    project, _ = as_photographed(with_look(stage, look)[0], look_says(look))
+    if size_px is None:
+        return project
+    found: Project = project.replace(camera=project.camera.replace(size_px=size_px))
+    return found
+
+
+def look_says(look: Look) -> frozenset[str]:
+    """Return what a look says, in the words of `render.photographed.as_photographed`."""
+    sized = ("lights.diameter_deg", "lights.shape")
+    return frozenset("lights" if key in sized else key for key in look.says)

@@ -267,6 +267,7 @@ const exports = [
   ['PNG as shown', () => download('png')],
   ['Lens file', () => download('lens')],
   ['Project file', () => download('project')],
+  ['Look', () => download('look'), 'Coatings, iris, dirt and colours of this project, for other lenses and lights.'],
   ['Ghosts as CSV', () => download('csv')],
   ['Copy as command line', copyCommand],
 ];

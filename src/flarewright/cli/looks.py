@@ -1,0 +1,104 @@
+"""`flarewright looks`: the looks that ship, and a look taken from any project."""
+
+from __future__ import annotations
+
+from io import BytesIO
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from .common import check_free, check_place, console, print_json, tell, write_text
+
+if TYPE_CHECKING:
+    from rich.text import Text
+
+    from ..render.gallery import Card
+
+EPILOG = (
+    "Use one with: flarewright render --look low-sun -o flare.exr\n\n"
+    "On your own lens and light: flarewright render my.lens --light -9,5 --look low-sun -o flare.exr"
+)
+SAVE_EPILOG = "Then: flarewright render takumar-50-f1.4 --light -9,5 --look dusk.toml -o flare.exr"
+
+# columns of a picture in the terminal; each character shows two pixels, one above the other
+_COLUMNS = 32
+
+
+def looks(
+    context: typer.Context,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+) -> None:
+    """List the looks that ship, with a picture of each where the terminal has the colours."""
+    if context.invoked_subcommand is not None:
+        return
+    from ..io.look_file import read_look, shipped_looks
+    from ..io.thumbnails import thumbnail_path
+    from ..render.gallery import cards
+
+    known = {name: read_look(name) for name in shipped_looks()}
+    if as_json:
+        print_json({
+            "looks": [
+                {
+                    "name": name, "title": look.name, "notes": look.notes, "lens": look.example.lens,
+                    "says": list(look.says), "picture": str(thumbnail_path("look", name)),
+                }
+                for name, look in known.items()
+            ]
+        })  # fmt: skip
+        return
+    from rich.table import Table
+
+    terminal = console()
+    pictured = terminal.is_terminal and terminal.color_system == "truecolor"
+    out = Table(caption="flarewright gallery -o DIR makes a page of all lenses and looks.", show_lines=pictured)
+    if pictured:
+        out.add_column("")
+    out.add_column("name", no_wrap=True)
+    out.add_column("shown with", no_wrap=True)
+    out.add_column("what it is")
+    for card in (card for card in cards() if card.kind == "look"):
+        picture = [_picture(card)] if pictured else []
+        out.add_row(*picture, card.name, str(known[card.name].example.lens), card.caption)
+    terminal.print(out)
+
+
+def save(
+    project: Annotated[Path, typer.Argument(metavar="PROJECT", help="A project file.")],
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="LOOK.toml", help="The look.")],
+    name: Annotated[str | None, typer.Option(help="Its name; that of the file when left out.")] = None,
+    notes: Annotated[str, typer.Option(help="A sentence on what it is made of.")] = "",
+    force: Annotated[bool, typer.Option("--force", help="Replace a file of this name.")] = False,
+) -> None:
+    """Take the look of a project: coatings, iris, f-number, dirt, scatter, colours, changes by hand."""
+    from ..io.look_file import look_text
+    from ..io.project_file import read_project
+    from ..render.looks import look_of
+
+    check_place(output, ".toml")
+    check_free(output, force)
+    title = name if name is not None else output.stem.replace("-", " ").replace("_", " ").capitalize()
+    look, remarks = look_of(read_project(project), title, notes)
+    write_text(output, look_text(look, output.parent))
+    tell([*remarks, f"the look has {', '.join(look.says)}", f"wrote {output}"])
+
+
+def _picture(card: Card) -> Text:
+    """Draw a small picture in half blocks: the upper pixel in the letter's colour, the lower one behind it."""
+    import numpy as np
+    from PIL import Image
+    from rich.text import Text
+
+    from ..io.thumbnails import thumbnail
+
+    with Image.open(BytesIO(thumbnail(card.kind, card.name))) as image:
+        rows = 2 * round(0.5 * _COLUMNS * image.height / image.width)
+        pixels = np.asarray(image.convert("RGB").resize((_COLUMNS, rows), Image.Resampling.BOX))
+    out = Text()
+    for upper, lower in zip(pixels[0::2], pixels[1::2], strict=True):
+        for above, below in zip(upper, lower, strict=True):
+            out.append("▀", style=f"rgb({above[0]},{above[1]},{above[2]}) on rgb({below[0]},{below[1]},{below[2]})")
+        out.append("\n")
+    out.right_crop(1)
+    return out

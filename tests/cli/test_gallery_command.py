@@ -1,0 +1,126 @@
+"""`flarewright gallery`, `flarewright looks` and what `flarewright` alone shows."""
+
+import json
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from flarewright.cli import gallery as gallery_module
+from flarewright.cli.app import run
+from flarewright.io.look_file import read_look, shipped_looks
+from flarewright.render import gallery as pictures
+from flarewright.render.gallery import cards
+
+KNOWN = cards()
+
+
+@pytest.fixture
+def two_cards(monkeypatch):
+    """A library of a lens and a look, drawn in no time; returns how often each was drawn."""
+    drawn = []
+
+    def picture(card, size_px):
+        drawn.append(card.name)
+        return np.full((size_px[1], size_px[0], 3), 10 * len(drawn), np.uint8)
+
+    monkeypatch.setattr(pictures, "cards", lambda: (KNOWN[0], KNOWN[-1]))
+    monkeypatch.setattr(pictures, "card_picture", picture)
+    monkeypatch.setattr("flarewright.render.first_run.compile_for_render", lambda *_: None)
+    return drawn
+
+
+def test_a_gallery_goes_on_where_it_was_and_draws_anew_what_changed(two_cards, tmp_path, capsys):
+    folder = tmp_path / "new" / "gallery"
+    assert run(["gallery", "-o", str(folder), "--size", "32x18", "--json"]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert [each["kind"] for each in said["pictures"]] == ["lens", "look"]
+    page = (folder / "index.html").read_text("utf-8")
+    for card in (KNOWN[0], KNOWN[-1]):
+        assert card.title in page
+        assert f'src="{card.kind}-{card.name}.png"' in page
+    with Image.open(folder / "contact-sheet.png") as sheet:
+        assert sheet.size == (4 * 32, 18 + 26)
+    assert two_cards == [KNOWN[0].name, KNOWN[-1].name]
+    (folder / f"lens-{KNOWN[0].name}.png").unlink()
+    assert run(["gallery", "-o", str(folder), "--size", "32x18"]) == 0
+    assert two_cards == [KNOWN[0].name, KNOWN[-1].name, KNOWN[0].name]
+    assert run(["gallery", "-o", str(folder), "--size", "16x9"]) == 0
+    assert len(two_cards) == 5
+
+
+def test_words_on_the_page_are_escaped():
+    from flarewright.io.contact_sheet import Figure, sheet_page
+
+    pixels = np.zeros((2, 2, 3), np.uint8)
+    page = sheet_page("<b>", [Figure("A & B", "<i>", "x", 'say "y"', "a.png", pixels)])
+    assert "<b>" not in page
+    assert "<i>" not in page
+    assert "A &amp; B" in page
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["gallery"], "-o"),
+        (["gallery", "-o", "file.txt"], "cannot write into file.txt: it is a file"),
+        (["gallery", "-o", "g", "--size", "x"], "--size 'x' is not two numbers"),
+        (["looks", "save", "none.toml", "-o", "a.toml"], "none.toml"),
+        (["looks", "save", "shot.toml", "-o", "a.exr"], "must be named *.toml"),
+        (["looks", "save", "bare.toml", "-o", "a.toml"], "there is nothing in it for a look"),
+    ],
+)
+def test_what_cannot_be_done_is_told(words, told, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "file.txt").write_text("")
+    (tmp_path / "bare.toml").write_text('lens = "tessar-brendel"\n[[lights]]\nfield_deg = [1, 2]\n')
+    assert run(words) == 2
+    assert told in capsys.readouterr().err
+
+
+def test_looks_are_listed_and_saved(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert run(["looks", "--json"]) == 0
+    said = json.loads(capsys.readouterr().out)["looks"]
+    assert [look["name"] for look in said] == list(shipped_looks())
+    assert run(["looks"]) == 0
+    listed = capsys.readouterr().out
+    assert all(name in listed for name in shipped_looks())
+    (tmp_path / "shot.toml").write_text(
+        'lens = "tessar-brendel"\nf_number = 8\ncoating = "modern-broadband"\n[[lights]]\nfield_deg = [1, 2]\n'
+        'spectrum = "black-body:3000"\n'
+    )
+    assert run(["looks", "save", "shot.toml", "-o", "blue-hour.toml", "--notes", "Cool."]) == 0
+    look = read_look("blue-hour.toml")
+    assert (look.name, look.notes) == ("Blue hour", "Cool.")
+    assert set(look.says) == {"f_number", "coating", "lights.spectrum"}
+    assert run(["looks", "save", "shot.toml", "-o", "blue-hour.toml"]) == 2
+    assert "exists already" in capsys.readouterr().err
+
+
+def test_the_terminal_shows_a_look_in_half_blocks():
+    from flarewright.cli.looks import _picture
+
+    drawn = _picture(KNOWN[-1])
+    lines = drawn.plain.split("\n")
+    assert len(lines) == 9
+    assert set(drawn.plain) == {"▀", "\n"}
+    assert len({span.style for span in drawn.spans}) > 20
+
+
+def test_the_program_alone_lays_out_the_pictures_that_ship(tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv("FLAREWRIGHT_STATE", str(tmp_path))
+    assert run([]) == 0
+    page = tmp_path / "gallery" / "index.html"
+    said = capsys.readouterr()
+    assert page.as_uri() in said.err
+    assert "Usage" in said.out
+    assert page.read_text("utf-8").count("<figure>") == len(KNOWN)
+    # without a place for them the help is enough
+    monkeypatch.setattr(gallery_module, "shipped_gallery", _full)
+    assert run([]) == 0
+    assert "pictures of every" not in capsys.readouterr().err
+
+
+def _full(_folder):
+    raise OSError("no space left")
