@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from .errors import LensError as LensError
     from .errors import OutputError as OutputError
     from .errors import ProjectError as ProjectError
+    from .io.coating_text import parse_coating_choice as parse_coating_choice
     from .io.exr import write_exr as write_exr
     from .io.project_file import read_project as read_project
     from .measure.rendering import render_measured as render_measured
@@ -30,6 +31,8 @@ if TYPE_CHECKING:
     from .model import Bare as Bare
     from .model import BlackBody as BlackBody
     from .model import Camera as Camera
+    from .model import Coating as Coating
+    from .model import CoatingChoice as CoatingChoice
     from .model import EqualEnergy as EqualEnergy
     from .model import Everywhere as Everywhere
     from .model import Film as Film
@@ -65,11 +68,12 @@ if TYPE_CHECKING:
 _HOMES = {
     ".errors": ("FlarewrightError", "GlassError", "LensError", "OutputError", "ProjectError"),
     ".model": (
-        "D65", "Art", "AsLens", "Bare", "BlackBody", "Camera", "EqualEnergy", "Everywhere", "Film", "Iris", "Layer",
-        "Lens", "Light", "Lines", "Medium", "Output", "PerRow", "Polygon", "Preset", "Project", "Quality",
-        "QuarterWave", "Rectangle", "Rgb", "RowScatter", "Rule", "Scatter", "Stack", "Standard", "Stop", "Surface",
-        "Tabulated",
+        "D65", "Art", "AsLens", "Bare", "BlackBody", "Camera", "Coating", "CoatingChoice", "EqualEnergy", "Everywhere",
+        "Film", "Iris", "Layer", "Lens", "Light", "Lines", "Medium", "Output", "PerRow", "Polygon", "Preset",
+        "Project", "Quality", "QuarterWave", "Rectangle", "Rgb", "RowScatter", "Rule", "Scatter", "Stack", "Standard",
+        "Stop", "Surface", "Tabulated",
     ),
+    ".io.coating_text": ("parse_coating_choice",),
     ".io.exr": ("write_exr",),
     ".io.project_file": ("read_project",),
     ".measure.rendering": ("render_measured",),

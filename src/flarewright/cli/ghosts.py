@@ -77,8 +77,8 @@ def ghosts(
     Rays are traced, not paraxial, to the unbounded sensor plane. The throughput is the flux on it when the light gives
     an irradiance of 1 on a plane facing it; the peak irradiance is relative to the direct image's flux.
     """
+    from ..io.coating_text import parse_coating_choice
     from ..io.plate_text import parse_imperfection, parse_plate
-    from ..io.project_file import parse_coating_choice
     from .render_flags import check_focus, scatter_flags
 
     if len(light) > 1:

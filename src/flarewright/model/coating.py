@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
@@ -55,5 +55,11 @@ class Standard(Frozen):
     kind: Literal["standard"] = "standard"
     name: StandardName
 
+    def __init__(self, word: StandardName | None = None, /, **fields: Any) -> None:
+        """Take the name with or without its keyword: it is all that there is to say."""
+        super().__init__(**({} if word is None else {"name": word}), **fields)
+
 
 Coating = Annotated[Bare | QuarterWave | Film | Stack | Standard, Field(discriminator="kind")]
+COATINGS = (Bare, QuarterWave, Film, Stack, Standard)
+"""What a `Coating` may be."""
