@@ -33,6 +33,7 @@ from .prepare import Settled, settle
 from .room import need, spare_bytes
 from .scatter import dimmed, render_scatter, scatter_facts, scatter_of
 from .shot import Shot, make_opening, make_shots, soiled_opening
+from .shown_layer import ShownLayer, shown_layers
 from .starburst_pass import OUT_OF_FOCUS_PX, read_soil, starburst_of
 
 if TYPE_CHECKING:
@@ -56,7 +57,7 @@ class Rendering:
     Attributes
     ----------
     project : Project
-    layers : tuple of Layer
+    layers : tuple of ShownLayer
         "beauty" first, then the passes and single ghosts that were asked for.
     summary : dict
         Facts about lens and picture, ready for JSON.
@@ -67,19 +68,16 @@ class Rendering:
     """
 
     project: Project
-    layers: tuple[Layer, ...]
+    layers: tuple[ShownLayer, ...]
     summary: dict[str, Any]
     remarks: tuple[str, ...]
     ledger: Ledger | None = None
 
     def _repr_png_(self) -> bytes:
         """Show the beauty in a notebook, as the PNG beside an EXR does."""
-        from ..io.png import encode_png
-        from .display import layers_exposure, view
+        from .display import layers_exposure
 
-        colorspace = self.project.output.colorspace
-        stops = layers_exposure(self.layers, colorspace)
-        return encode_png(view(self.layers[0].pixels, stops, "filmic", colorspace), {})
+        return self.layers[0].png(layers_exposure(self.layers, self.project.output.colorspace))
 
 
 @naming_settings
@@ -190,7 +188,7 @@ def render(
     summary = {**_summary(settled, shots, stars, art), **drawn.facts, **scattered}
     return Rendering(
         settled.project,
-        layers,
+        shown_layers(layers, settled.project),
         {**summary, "ledger": account.as_data()} if ledger and account is not None else summary,
         (
             *settled.remarks, *drawn.remarks, *told, *outside(shots, images), *_veiled(drawn.passes),
