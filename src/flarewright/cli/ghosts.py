@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..errors import ProjectError
-from .common import chosen_fstop, console, field_angles, print_json, tell
+from .common import chosen_fstop, console, field_angles, first_run_bar, print_json, tell
 
 if TYPE_CHECKING:
     from ..optics.ghosts import GhostRow, GhostTable
@@ -120,7 +120,7 @@ def ghosts(
     for name, value in (("--focus", focus), ("--sensor-distance", sensor_distance), ("--distance", distance)):
         if value is not None and not (math.isfinite(value) and value > 0.0):
             raise ProjectError(f"{name} {value:g} is no distance; give millimetres above 0")
-    compile_for_analysis()
+    compile_for_analysis(first_run_bar)
     table = analyse(
         prescription,
         angles,

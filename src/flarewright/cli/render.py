@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..errors import ProjectError
-from .common import check_place, print_json, tell
+from .common import check_place, first_run_bar, print_json, tell
 from .preview import PreviewLook, preview_look, write_preview
 
 if TYPE_CHECKING:
@@ -541,7 +541,7 @@ def _renderer(
     from ..render.first_run import compile_for_render
     from ..render.render import render as render_project
 
-    compile_for_render(project, threads, lambda sentence: tell([sentence]))
+    compile_for_render(project, threads, lambda sentence: tell([sentence]), first_run_bar)
     return partial(render_project, project, threads=threads, run=run, ledger=ledger)
 
 
