@@ -9,7 +9,7 @@ import typer
 
 from ..errors import ProjectError
 from .common import check_place, first_run_bar, print_json, tell
-from .preview import PreviewLook, preview_look, write_preview
+from .preview import PreviewLook, check_exposure, preview_look, write_preview
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -415,6 +415,7 @@ def render(
     )  # fmt: skip
     flags, defaults = (flags, None) if ideal else as_photographed(flags)
     settings = build_project(flags)
+    check_exposure(look, settings)
     only = {
         "--resume": state, "--time-limit": time_limit, "--error": error, "--error-of": error_of, "--samples": samples,
         "--rays-from": rays_from,
