@@ -314,7 +314,7 @@ def test_an_exposure_value_without_an_f_number_is_refused_before_anything_is_dra
     with monkeypatch.context() as patch:
         patch.setattr("flarewright.measure.rendering.render_measured", drawn)
         assert run(["render", "unknown.json", *words, "--ev", "12"]) == 2
-    assert "--ev needs an f-number, and unknown.json does not tell" in capfd.readouterr().err
+    assert "--ev needs an f-number, and unknown.json does not know that of its captures" in capfd.readouterr().err
     assert not (tmp_path / "out.exr").exists()
     # a shutter needs none
     for lens, exposure in (("unknown.json", ["--shutter", "1/250"]), ("model.json", ["--ev", "9.9657843"])):

@@ -264,7 +264,7 @@ def progress_bar() -> Iterator[Callable[[str], Callable[[float, str], None]]]:
 
 @contextmanager
 def first_run_bar() -> Iterator[Callable[[float, str], None] | None]:
-    """Show a first run's compiling as `progress_bar` shows work; None where nobody looks at it."""
+    """Show a first run's compiling as a `progress_bar`; yields None off a terminal."""
     if not sys.stderr.isatty():
         yield None
         return

@@ -64,7 +64,7 @@ def part_done(plan: Schedule, finished: int, finished_at_s: float, now_s: float)
     -------
     float
         0 to 0.99. It never falls while `finished` and `now_s` rise, and waits at the end of a kernel that takes longer
-        than expected; those that are finished tell how fast this machine is.
+        than expected; finished kernels correct for the speed of the machine.
     """
     if not plan.whole_s > 0.0:
         return 0.0
@@ -84,7 +84,7 @@ def reporting(
     ----------
     plan : Schedule
     progress : callable or None
-        Called with the part done and a few words; None: nobody looks.
+        Called with the part done and a few words; None: no reports.
     clock : callable
         Returns seconds.
 

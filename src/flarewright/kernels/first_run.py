@@ -139,7 +139,7 @@ def compile_together(names: Sequence[str], processes: int, shown: Shown | None =
     """Compile roots that are not in the cache, some of them in other processes.
 
     Returns at once when the cache holds them, when Numba does not compile or has nowhere to cache, or when there is
-    only one process to use and nobody looks: then each root is compiled when it is first called.
+    only one process to use and no progress to show: then each root is compiled when it is first called.
 
     Parameters
     ----------
@@ -148,8 +148,8 @@ def compile_together(names: Sequence[str], processes: int, shown: Shown | None =
     processes : int
         Largest number of processes, this one included.
     shown : callable, optional
-        Called only when something is to be compiled. Returns a context whose value is told the part done (0 to 1) and a
-        few words, or is None where nobody looks.
+        Called only when something is to be compiled. Returns a context; its value is called with the part done (0 to 1)
+        and a few words, or is None to show nothing.
     """
     if is_helper():
         return
