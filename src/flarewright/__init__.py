@@ -21,7 +21,9 @@ if TYPE_CHECKING:
     from .errors import LensError as LensError
     from .errors import OutputError as OutputError
     from .errors import ProjectError as ProjectError
+    from .io.coating_text import parse_coating_choice as parse_coating_choice
     from .io.exr import write_exr as write_exr
+    from .io.look_file import read_look as read_look
     from .io.project_file import read_project as read_project
     from .measure.rendering import render_measured as render_measured
     from .model import D65 as D65
@@ -30,6 +32,8 @@ if TYPE_CHECKING:
     from .model import Bare as Bare
     from .model import BlackBody as BlackBody
     from .model import Camera as Camera
+    from .model import Coating as Coating
+    from .model import CoatingChoice as CoatingChoice
     from .model import EqualEnergy as EqualEnergy
     from .model import Everywhere as Everywhere
     from .model import Film as Film
@@ -39,6 +43,7 @@ if TYPE_CHECKING:
     from .model import Lens as Lens
     from .model import Light as Light
     from .model import Lines as Lines
+    from .model import Look as Look
     from .model import Medium as Medium
     from .model import Output as Output
     from .model import PerRow as PerRow
@@ -59,6 +64,9 @@ if TYPE_CHECKING:
     from .model import Tabulated as Tabulated
     from .render.analysis import ghosts as ghosts
     from .render.analysis import paraxial as paraxial
+    from .render.looks import look_of as look_of
+    from .render.looks import with_look as with_look
+    from .render.photographed import as_photographed as as_photographed
     from .render.prepare import load_lens as load_lens
     from .render.render import Rendering as Rendering
     from .render.render import render as render
@@ -66,15 +74,19 @@ if TYPE_CHECKING:
 _HOMES = {
     ".errors": ("FlarewrightError", "GlassError", "LensError", "OutputError", "ProjectError"),
     ".model": (
-        "D65", "Art", "AsLens", "Bare", "BlackBody", "Camera", "EqualEnergy", "Everywhere", "Film", "InTurn", "Iris",
-        "Layer", "Lens", "Light", "Lines", "Medium", "Output", "PerRow", "Polygon", "Preset", "Project", "Quality",
-        "QuarterWave", "Rectangle", "Rgb", "RowScatter", "Rule", "Scatter", "Stack", "Standard", "Stop", "Surface",
-        "Tabulated",
+        "D65", "Art", "AsLens", "Bare", "BlackBody", "Camera", "Coating", "CoatingChoice", "EqualEnergy", "Everywhere",
+        "Film", "InTurn", "Iris", "Layer", "Lens", "Light", "Lines", "Look", "Medium", "Output", "PerRow", "Polygon",
+        "Preset", "Project", "Quality", "QuarterWave", "Rectangle", "Rgb", "RowScatter", "Rule", "Scatter", "Stack",
+        "Standard", "Stop", "Surface", "Tabulated",
     ),
+    ".io.coating_text": ("parse_coating_choice",),
     ".io.exr": ("write_exr",),
+    ".io.look_file": ("read_look",),
     ".io.project_file": ("read_project",),
     ".measure.rendering": ("render_measured",),
     ".render.analysis": ("ghosts", "paraxial"),
+    ".render.looks": ("look_of", "with_look"),
+    ".render.photographed": ("as_photographed",),
     ".render.prepare": ("load_lens",),
     ".render.render": ("Rendering",),
     # The package itself, which may be called: a function of its name could not live beside it.

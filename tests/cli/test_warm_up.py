@@ -8,7 +8,7 @@ def test_what_is_missing_is_compiled_and_told(monkeypatch, capsys):
     """In this process too: where no helper may start, on one core, it is all there is."""
     missing, compiled = ["row sums", "pixels"], []
     monkeypatch.setattr(first_run, "absent", lambda _: [name for name in missing if name not in compiled])
-    monkeypatch.setattr(first_run, "compile_together", lambda names, _: compiled.append(names[0]))
+    monkeypatch.setattr(first_run, "compile_together", lambda names, *_: compiled.append(names[0]))
     monkeypatch.setattr(first_run, "compile_roots", compiled.extend)
     assert run(["warm-up"]) == 0
     assert compiled == missing

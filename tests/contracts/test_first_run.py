@@ -45,7 +45,7 @@ import flarewright.render.first_run as plan
 plan.cores = helpers.cores
 planned = set()
 together = plan.compile_together
-plan.compile_together = lambda names, processes: (planned.update(names), together(names, processes))
+plan.compile_together = lambda names, *others: (planned.update(names), together(names, *others))
 code = run(sys.argv[2:])
 found = {}
 for name in first_run.ROOTS:
@@ -101,7 +101,7 @@ def watched_here(monkeypatch):
     planned = set()
     # as if nothing were compiled
     monkeypatch.setattr("flarewright.render.first_run.absent", list)
-    monkeypatch.setattr("flarewright.render.first_run.compile_together", lambda names, _: planned.update(names))
+    monkeypatch.setattr("flarewright.render.first_run.compile_together", lambda names, *_: planned.update(names))
     monkeypatch.setattr("flarewright.cli.app.head_start", lambda rings: nullcontext())
     # scatter is gathered at a few places: which kernels are called does not depend on how many
     for name in ("RINGS", "SPOKES", "FAN"):

@@ -9,7 +9,8 @@ import jsonschema
 import pytest
 
 from flarewright.errors import ProjectError
-from flarewright.io.project_file import parse_coating_choice, project_json_schema, project_text, read_project
+from flarewright.io.coating_text import parse_coating_choice
+from flarewright.io.project_file import project_json_schema, project_text, read_project
 from flarewright.io.spectrum_text import parse_spectrum, spectrum_text
 from flarewright.model import (
     D65,

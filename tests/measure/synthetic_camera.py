@@ -198,7 +198,7 @@ def render_pose(setup: Setup, pose: Pose, *, layers: str = "passes") -> fw.Rende
 
 
 def _coating(text: str) -> Any:
-    from flarewright.io.project_file import parse_coating_choice
+    from flarewright.io.coating_text import parse_coating_choice
 
     return parse_coating_choice(text)
 

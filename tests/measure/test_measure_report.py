@@ -3,6 +3,7 @@
 import base64
 import json
 import re
+from dataclasses import replace
 from io import BytesIO
 from math import cos, radians, sin, tan
 
@@ -12,14 +13,17 @@ from measured_run import Measured
 from PIL import Image
 from test_replay import planted
 
+import flarewright as fw
 from flarewright.cli.app import run
 from flarewright.io.ghost_model_file import write_ghost_model
-from flarewright.io.merged import write_frame, write_run
+from flarewright.io.merged import read_frame, write_frame, write_run
+from flarewright.measure.overview import write_overview
 from flarewright.measure.replay import replay
 from flarewright.measure.report import write_report
-from flarewright.measure.report_frames import outlines_section, replays_section
+from flarewright.measure.report_frames import frames_section, outlines_section, replays_section
 from flarewright.model.capture import CameraNoise, FrameInfo, MergedFrame, MergedRun
 from flarewright.model.ghost_model import Halo
+from flarewright.render.display import auto_exposure, view, view_text
 
 
 def test_the_report_of_a_merged_run_stands_alone(measured: Measured, tmp_path, capsys):
@@ -71,7 +75,7 @@ def test_a_replay_is_laid_on_its_frame_at_both_sides_and_any_roll(tmp_path, caps
     assert float(next(low for name, low, _ in rows if name == "2")) == pytest.approx(5.0, abs=1.0)
 
 
-def run_of(folder, model, angles=(6.0, 12.0, 18.0), noise=1e-3, **changes):
+def run_of(folder, model, angles=(6.0, 12.0, 18.0), noise=1e-3, gain=None, **changes):
     """Write a run of frames that show a model's flare, and return it."""
     width, height = model.size_px
     infos = []
@@ -81,7 +85,7 @@ def run_of(folder, model, angles=(6.0, 12.0, 18.0), noise=1e-3, **changes):
         noisy = drawn + np.random.default_rng(k).normal(size=drawn.shape) * noise
         light = model.axis_px[0] + model.focal_px * tan(radians(angle)), model.axis_px[1]
         info = FrameInfo(file=f"frames/{k}.exr", constellation_deg=angle, nominal_deg=angle, light_px=light,
-                         axis_px=model.axis_px, exposures_s=(0.5, 2.0), gain=1.0 + 0.01 * k)  # fmt: skip
+                         axis_px=model.axis_px, exposures_s=(0.5, 2.0), gain=gain or 1.0 + 0.01 * k)  # fmt: skip
         infos.append(info)
         facts = {"ratios": [{"value": 1.02, "error": 0.001}, {"value": 1.0, "error": 0.0}]}
         (folder / "frames" / f"{k}.json").write_text(json.dumps(facts))
@@ -113,6 +117,56 @@ def test_a_ghost_that_a_replay_lacks_is_plain_to_see_in_the_difference(tmp_path)
     assert np.abs(off[y : y + h, x : x + w][lit] - 127).mean() > 40
     assert np.abs(off[:20, -20:] - 127).max() < 10
     assert "black to white: ± " in replays_section(tmp_path, written, written.frames[1:2], lacking)
+
+
+def test_frames_and_replays_are_shown_as_a_render_of_the_model_is(tmp_path):
+    """The page's pictures are the PNG of `flarewright render model.json`: exposure, camera colours and all."""
+    colours = ((1.5, -0.4, -0.1), (-0.2, 1.4, -0.2), (0.05, -0.6, 1.55))
+    model = planted().replace(to_rec709=colours)
+    written = run_of(tmp_path, model, (12.0,), noise=0.0, gain=1.0, to_rec709=colours)
+    (info,) = written.frames
+    frame = read_frame(tmp_path, info)
+    write_frame(tmp_path, replace(frame, variance=np.where(frame.radiance > 9.0, np.inf, 1e-12).astype(np.float32)))
+    clipped = (frame.radiance > 9.0).any(axis=2)
+    assert 0 < clipped.sum() < 200
+    write_ghost_model(tmp_path / "model.json", model)
+    light = fw.Light(field_deg=(12.0, 0.0))
+    camera = fw.Camera(size_px=model.size_px, sensor_mm=(36.0, 36.0 * 90 / 160))
+    rendered = fw.render_measured(fw.Project(lens=str(tmp_path / "model.json"), lights=[light], camera=camera))
+    html = replays_section(tmp_path, written, written.frames, model)
+    (stops,) = (float(found) for found in re.findall(r"measured, ([+-][\d.]+) stops<", html))
+    assert stops == pytest.approx(auto_exposure(rendered.layers[0].pixels), abs=0.1)
+    measured, replayed, _ = pictures_of(html)
+    expected = view(rendered.layers[0].pixels, auto_exposure(rendered.layers[0].pixels)).astype(int)
+    for shown in (measured, replayed):
+        assert np.abs(shown - expected)[~clipped].max() <= 2
+        assert (shown[clipped] == 255).all()
+    (alone,) = pictures_of(frames_section(tmp_path, written, written.frames))
+    np.testing.assert_array_equal(alone, measured)
+
+
+def test_a_frame_with_noise_below_black_is_seen(tmp_path):
+    """A scale that begins at the darkest pixels has no beginning there."""
+    model = planted()
+    written = run_of(tmp_path, model, (18.0,), noise=0.01)
+    measured, _, _ = pictures_of(replays_section(tmp_path, written, written.frames, model))
+    lit = replay(model, 18.0)[1].pixels.max(axis=2) > 1.0
+    dark = np.hypot(*np.meshgrid(np.arange(160) - 135, np.arange(90) - 44)) > 100
+    assert measured[lit].mean() > 100
+    assert measured[dark].mean() < 20
+
+
+def test_the_overview_says_how_it_is_exposed(tmp_path):
+    model = planted()
+    written = run_of(tmp_path, model)
+    write_overview(tmp_path, written)
+    with Image.open(tmp_path / "merged.png") as picture:
+        told, shown = picture.info["Description"], np.asarray(picture).astype(int)
+    light = np.max([np.zeros((90, 160, 3)), *(read_frame(tmp_path, info).radiance for info in written.frames)], axis=0)
+    assert told.startswith(view_text(auto_exposure(light), "filmic", "rec709", automatic=True))
+    # above the mirror line and below it nothing is drawn
+    expected = view(light, auto_exposure(light))
+    np.testing.assert_array_equal(shown[:30], expected[:30])
 
 
 def test_ghosts_are_outlined_and_named_over_frames_and_curves_say_whose_they_are(tmp_path):

@@ -298,3 +298,26 @@ def test_commands_refuse_in_one_sentence_what_they_cannot_do(project, tmp_path, 
     assert told in said
     assert said.count("error:") == 1
     assert not (tmp_path / "out.exr").exists()
+
+
+def test_an_exposure_value_without_an_f_number_is_refused_before_anything_is_drawn(
+    project, tmp_path, capfd, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    model = model_of(project)
+    write_ghost_model(tmp_path / "unknown.json", model.replace(reference=model.reference.replace(f_number=None)))
+    words = ["--light", "5,2", "--size", "40x22", "-o", "out.exr"]
+
+    def drawn(*_, **__):
+        raise AssertionError("it was drawn")
+
+    with monkeypatch.context() as patch:
+        patch.setattr("flarewright.measure.rendering.render_measured", drawn)
+        assert run(["render", "unknown.json", *words, "--ev", "12"]) == 2
+    assert "--ev needs an f-number, and unknown.json does not know that of its captures" in capfd.readouterr().err
+    assert not (tmp_path / "out.exr").exists()
+    # a shutter needs none
+    for lens, exposure in (("unknown.json", ["--shutter", "1/250"]), ("model.json", ["--ev", "9.9657843"])):
+        assert run(["render", lens, *words, *exposure, "--json"]) == 0
+        # 0.18 of white for 10 / ISO lux seconds: log2(0.18 * 100000 lx / 250 s * 100 / 10); at f/2 that is EV 9.966
+        assert json.loads(capfd.readouterr().out)["exposure_stops"] == pytest.approx(9.492, abs=2e-3)

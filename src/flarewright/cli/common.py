@@ -263,6 +263,16 @@ def progress_bar() -> Iterator[Callable[[str], Callable[[float, str], None]]]:
 
 
 @contextmanager
+def first_run_bar() -> Iterator[Callable[[float, str], None] | None]:
+    """Show a first run's compiling as a `progress_bar`; yields None off a terminal."""
+    if not sys.stderr.isatty():
+        yield None
+        return
+    with progress_bar() as begin:
+        yield begin("first run")
+
+
+@contextmanager
 def interruptible() -> Iterator[Callable[[], bool]]:
     """Turn Ctrl-C into a wish to end, which the search hears after its round."""
     asked: list[bool] = []

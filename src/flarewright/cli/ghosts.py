@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..errors import ProjectError
-from .common import chosen_fstop, console, field_angles, print_json, tell
+from .common import chosen_fstop, console, field_angles, first_run_bar, print_json, tell
 
 if TYPE_CHECKING:
     from ..optics.ghosts import GhostRow, GhostTable
@@ -77,8 +77,8 @@ def ghosts(
     Rays are traced, not paraxial, to the unbounded sensor plane. The throughput is the flux on it when the light gives
     an irradiance of 1 on a plane facing it; the peak irradiance is relative to the direct image's flux.
     """
+    from ..io.coating_text import parse_coating_choice
     from ..io.plate_text import parse_imperfection, parse_plate
-    from ..io.project_file import parse_coating_choice
     from .render_flags import check_focus, scatter_flags
 
     if len(light) > 1:
@@ -120,7 +120,7 @@ def ghosts(
     for name, value in (("--focus", focus), ("--sensor-distance", sensor_distance), ("--distance", distance)):
         if value is not None and not (math.isfinite(value) and value > 0.0):
             raise ProjectError(f"{name} {value:g} is no distance; give millimetres above 0")
-    compile_for_analysis()
+    compile_for_analysis(first_run_bar)
     table = analyse(
         prescription,
         angles,

@@ -319,7 +319,8 @@ def _project(
     """Return a project of what the flags say, its light on the axis."""
     from pydantic import ValidationError
 
-    from ..io.project_file import explain, parse_coating_choice
+    from ..io.coating_text import parse_coating_choice
+    from ..io.project_file import explain
     from ..io.spectrum_text import parse_spectrum
     from ..model import Project
     from .render_flags import in_flags

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any, get_args
 from ..errors import ProjectError
 
 if TYPE_CHECKING:
+    from ..model import Project
     from ..render.render import Rendering
 
-__all__ = ["PreviewLook", "preview_look", "write_preview"]
+__all__ = ["PreviewLook", "check_exposure", "preview_look", "write_preview"]
 
 
 @dataclass(frozen=True)
@@ -82,6 +83,27 @@ def preview_look(
     )  # fmt: skip
 
 
+def check_exposure(look: PreviewLook | None, project: Project) -> None:
+    """Refuse `--ev` for a measured flare whose f-number is not known, before it is drawn.
+
+    Raises
+    ------
+    FlarewrightError
+        That, or the file is no ghost model.
+    """
+    from ..io.ghost_model_file import names_ghost_model
+
+    if look is None or look.ev is None or not names_ghost_model(project.lens):
+        return
+    from ..measure.rendering import flare_of, opening_of
+
+    if opening_of(project, flare_of(project).model) is None:
+        raise ProjectError(
+            f"--ev needs an f-number, and {project.lens} does not know that of its captures; give "
+            "--shutter instead"
+        )
+
+
 def _number(flag: str, text: str, example: str, low: float, high: float) -> float:
     """Read a number or a fraction."""
     above, _, below = text.partition("/")
@@ -108,11 +130,8 @@ def write_preview(rendering: Rendering, path: Path, look: PreviewLook) -> dict[s
     elif look.stops is not None:
         stops = look.stops
     else:
-        f_number = rendering.summary.get("f_number")
-        if f_number is None:
-            if look.ev is not None:
-                raise ProjectError("--ev needs an f-number, which this flare has not; give --shutter instead")
-            f_number = 1.0
+        # a shutter needs none, and `check_exposure` has refused an exposure value without one
+        f_number = rendering.summary["f_number"] or 1.0
         stops = photographic_stops(f_number, ev=look.ev, shutter_s=look.shutter_s, iso=look.iso, lux=look.lux)
     stated = view_text(stops, look.transform, colorspace, automatic=automatic)
     pixels = view(layers[0].pixels, stops, look.transform, colorspace)

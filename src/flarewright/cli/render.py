@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..errors import ProjectError
-from .common import check_place, print_json, tell
-from .preview import PreviewLook, preview_look, write_preview
+from .common import check_place, first_run_bar, print_json, tell
+from .preview import PreviewLook, check_exposure, preview_look, write_preview
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -429,6 +429,7 @@ def render(
     if not plain:
         settings, filled = photographed(settings, said)
         remarks = [*filled, *remarks]
+    check_exposure(view_of, settings)
     only = {
         "--resume": state, "--time-limit": time_limit, "--error": error, "--error-of": error_of, "--samples": samples,
         "--rays-from": rays_from,
@@ -555,7 +556,7 @@ def _renderer(
     from ..render.first_run import compile_for_render
     from ..render.render import render as render_project
 
-    compile_for_render(project, threads, lambda sentence: tell([sentence]))
+    compile_for_render(project, threads, lambda sentence: tell([sentence]), first_run_bar)
     return partial(render_project, project, threads=threads, run=run, ledger=ledger)
 
 

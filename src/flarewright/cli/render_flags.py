@@ -10,8 +10,9 @@ from typing import Any
 from pydantic import ValidationError
 
 from ..errors import ProjectError
+from ..io.coating_text import parse_coating_choice
 from ..io.plate_text import parse_grating, parse_imperfection, parse_plate
-from ..io.project_file import ProjectFileError, explain, parse_coating_choice, read_project
+from ..io.project_file import ProjectFileError, explain, read_project
 from ..io.spectrum_text import parse_spectrum
 from ..model import Art, Holdout, Iris, Lens, Light, Project, Scatter
 from ..model.light import SUN_DEG

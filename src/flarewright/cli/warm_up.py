@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 
-from .common import tell
+from .common import first_run_bar, tell
 
 EPILOG = "In a container's recipe, after the installation: flarewright warm-up"
 
@@ -23,7 +23,7 @@ def warm_up() -> None:
     else:
         tell([f"compiling {len(names)} kernels on {cores()} cores, once for this installation"])
         begun = time.perf_counter()
-        first_run.compile_together(names, cores())
+        first_run.compile_together(names, cores(), first_run_bar)
         # on one core, and in a process that may start no other, they are left
         first_run.compile_roots(first_run.absent(names))
         tell([f"compiled in {time.perf_counter() - begun:.0f} s"])

@@ -14,6 +14,7 @@ from ..render.figure import Figure
 from ..render.page import figures, image, page, paragraph, section, table
 from .benchmark import BenchmarkRun
 from .benchmark_colors import ColorRun
+from .picture import screen_pixels
 from .trials import Measure, Trial, figures_shown
 
 Floats = NDArray[np.float64]
@@ -248,7 +249,5 @@ def _named(title: str, figure: str) -> str:
 
 
 def _shown(picture: Floats) -> NDArray[np.uint8]:
-    """Return a picture, row 0 at the bottom, as eight bits, at a gamma of 2.2 and half its size."""
-    small = 0.25 * (picture[::2, ::2] + picture[1::2, ::2] + picture[::2, 1::2] + picture[1::2, 1::2])
-    eight = (np.power(np.clip(small[::-1], 0.0, 1.0), 1.0 / 2.2) * 255.0 + 0.5).astype(np.uint8)
-    return eight if eight.ndim == 3 else np.repeat(eight[..., None], 3, axis=2)
+    """Return a picture, row 0 at the bottom, as eight bits at half its size."""
+    return screen_pixels(0.25 * (picture[::2, ::2] + picture[1::2, ::2] + picture[::2, 1::2] + picture[1::2, 1::2]))

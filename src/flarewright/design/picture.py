@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from io import BytesIO
-
 import numpy as np
 from numpy.typing import NDArray
 
+from ..io.png import encode_png
 from ..kernels import design_ghosts as columns
+from ..render.display import view
 from .ghosts import evaluate
 from .prescription import Structure
 
@@ -186,25 +186,23 @@ def ssim(target: Floats, found: Floats) -> float:
     return float(alike.mean())
 
 
-def png_bytes(picture: Floats | NDArray[np.uint8]) -> bytes:
-    """Encode a picture as PNG.
+def screen_pixels(picture: Floats) -> NDArray[np.uint8]:
+    """Return a picture for a screen, 1 as white: a wanted picture comes out as in its file.
 
     Parameters
     ----------
     picture : ndarray, shape (H, W), (H, W, 1) or (H, W, 3)
-        uint8 with row 0 at the top, or float in [0, 1] with row 0 at the bottom, shown at a gamma of 2.2.
+        Linear, row 0 at the bottom.
 
     Returns
     -------
-    bytes
+    ndarray, shape (H, W, 3), uint8
+        Row 0 at the top.
     """
-    from PIL import Image
+    light = picture[::-1] if picture.ndim == 3 else picture[::-1, :, None]
+    return view(np.broadcast_to(light, (*light.shape[:2], 3)), 0.0, "srgb")
 
-    if picture.dtype != np.uint8:
-        shown = np.power(np.clip(np.asarray(picture[::-1], dtype=np.float64), 0.0, 1.0), 1.0 / 2.2)
-        picture = (shown * 255.0 + 0.5).astype(np.uint8)
-    if picture.ndim == 3 and picture.shape[2] == 1:
-        picture = picture[..., 0]
-    buffer = BytesIO()
-    Image.fromarray(picture).save(buffer, format="PNG", optimize=True)
-    return buffer.getvalue()
+
+def png_bytes(picture: Floats) -> bytes:
+    """Return `screen_pixels` of a picture as the bytes of a PNG file."""
+    return encode_png(screen_pixels(picture), {})

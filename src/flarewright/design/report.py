@@ -220,6 +220,7 @@ def _discs(ghosts: Floats, light: int, project: Project) -> Floats:
 
 def _draft(path: Path, outcome: Outcome, project: Project, remarks: list[str]) -> bytes | None:
     """Render a lens in draft quality: the proof that its file is a lens."""
+    from ..io.png import encode_png
     from ..render.display import view
     from ..render.render import render
 
@@ -235,7 +236,7 @@ def _draft(path: Path, outcome: Outcome, project: Project, remarks: list[str]) -
     except FlarewrightError as error:
         remarks.append(f"{path.name} was not rendered: {error}")
         return None
-    data = png_bytes(view(rendering.layers[0].pixels))
+    data = encode_png(view(rendering.layers[0].pixels), {})
     write_atomically(path, lambda temporary: _write_bytes(temporary, data))
     return data
 

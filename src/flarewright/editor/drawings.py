@@ -9,6 +9,7 @@ import numpy as np
 
 from ..design.colors import indices_of, pair_map
 from ..design.ghosts import placed_ghosts
+from ..design.picture import png_bytes
 from ..design.prescription import structure_of
 from ..errors import FlarewrightError, ProjectError
 from ..io.coating_text import format_coating
@@ -104,9 +105,7 @@ def colour_map(project: Project, ghost: str) -> bytes:
     """
     j, i = (int(part) for part in ghost.split("-"))
     lens = as_lens(project.lens)
-    picture = pair_map(indices_of(lens), (j, i), Bounds())
-    coded = np.power(np.clip(picture[::-1], 0.0, 1.0), 1.0 / 2.2)
-    return png((coded * 255.0 + 0.5).astype(np.uint8))
+    return png_bytes(pair_map(indices_of(lens), (j, i), Bounds()))
 
 
 def places(project: Project) -> list[dict[str, object]]:

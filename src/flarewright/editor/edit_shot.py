@@ -6,8 +6,8 @@ from itertools import count
 from typing import Any
 
 from ..errors import ProjectError
+from ..io.coating_text import parse_coating_choice
 from ..io.look_file import read_look, shipped_looks
-from ..io.project_file import parse_coating_choice
 from ..io.spectrum_text import parse_spectrum
 from ..measure.rendering import check_measured, is_measured
 from ..model import BlackBody, Everywhere, Holdout, Iris, Light, PerRow, Project, QuarterWave, Surface

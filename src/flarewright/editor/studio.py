@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from math import log, sqrt
@@ -226,7 +226,7 @@ def moving_stage(project: Project, scale: float, levels: Levels) -> Project:
     return found
 
 
-def spread(layers: list[Layer], size_px: tuple[int, int]) -> Floats:
+def spread(layers: Sequence[Layer], size_px: tuple[int, int]) -> Floats:
     """Add layers on a sheet of the picture's size."""
     sheet = np.zeros((size_px[1], size_px[0], 3), dtype=np.float32)
     for layer in layers:

@@ -11,12 +11,16 @@
 | `stack:1.38:96.4,2.1:120` | several films, from the air to the glass |
 | `modern-broadband` | a standard coating: `uncoated-1930s`, `single-1950s`, `early-multicoat`, `modern-broadband` |
 | `modern-broadband*1.05` | the same with every film 5 % thicker: its colours lie at wavelengths 5 % longer |
+
+What all surfaces of a lens carry (`--coating`, a project's `coating`, `flarewright.render(..., coating=...)`) may also
+be `lens`, `preset:NAME` or a coating file.
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from os import PathLike, fspath
 from pathlib import Path
 from typing import Any, get_args
 
@@ -24,6 +28,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from flarewright.errors import ProjectError
 from flarewright.model import (
+    AsLens,
     Bare,
     Coating,
     CoatingChoice,
@@ -31,11 +36,13 @@ from flarewright.model import (
     Film,
     InTurn,
     PerRow,
+    Preset,
     QuarterWave,
     Stack,
     Standard,
-)
+)  # fmt: skip
 from flarewright.model.coating import StandardName
+from flarewright.model.project import CHOICES, everywhere
 
 from .sentences import did_you_mean, shorten, validation_sentences
 from .taken_for import record_of
@@ -98,6 +105,69 @@ def parse_coating(text: str) -> Coating:
     except ValueError:
         pass
     raise ProjectError(f"coating {text!r} is not understood{did_you_mean(plain, STANDARD_NAMES)}: {HELP}")
+
+
+def parse_coating_choice(text: str, *, folder: Path | None = None) -> CoatingChoice:
+    """Return the coatings that a short text means.
+
+    Parameters
+    ----------
+    text : str
+        `lens`, `preset:NAME`, a coating file (`*.toml`), or a form of the table above, for every surface between glass
+        and air.
+    folder : path, optional
+        Where a relative file starts; None: the working folder.
+
+    Returns
+    -------
+    CoatingChoice
+
+    Raises
+    ------
+    FlarewrightError
+        When the text is none of the forms.
+    """
+    word, _, rest = text.strip().partition(":")
+    if text.strip() == "lens":
+        return AsLens()
+    if word == "preset":
+        if not rest.strip():
+            raise ProjectError(f"the coating {text!r} names no preset: write preset:NAME, a name from the lens file")
+        return Preset(name=rest.strip())
+    if text.strip().lower().endswith(".toml"):
+        return read_coating_file((folder or Path()) / text.strip())
+    return Everywhere(coating=parse_coating(text))
+
+
+def coating_choice(coating: str | PathLike[str] | Coating | CoatingChoice | None) -> CoatingChoice:
+    """Return the coatings that a caller of the library means.
+
+    Parameters
+    ----------
+    coating : str or path
+        As `parse_coating_choice`; relative files start at the working folder.
+    coating : Coating
+        The same on every surface between glass and air.
+    coating : CoatingChoice
+        As it is.
+    coating : None
+        As the lens file says.
+
+    Returns
+    -------
+    CoatingChoice
+
+    Raises
+    ------
+    FlarewrightError
+        When it is none of these, or a text that is not understood.
+    """
+    if isinstance(coating, str | PathLike):
+        return parse_coating_choice(fspath(coating))
+    choice = AsLens() if coating is None else everywhere(coating)
+    if isinstance(choice, CHOICES):
+        return choice
+    raise ProjectError(f"coating {shorten(coating)} is neither a text nor a coating: {HELP}")
 
 
 def coating_from(value: object) -> Coating | None:

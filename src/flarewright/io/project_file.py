@@ -35,8 +35,8 @@ from ..model.imperfection import Imperfection
 from ..model.iris import Iris
 from ..model.lens import Lens, Surface
 from ..model.plate import Plate
-from ..model.project import CoatingChoice, Output, Project, Quality
-from .coating_text import coating_from, parse_coating, read_coating_file
+from ..model.project import Output, Project, Quality
+from .coating_text import coating_from, parse_coating, parse_coating_choice
 from .file_kind import refuse_lens_suffix, refuse_other_kind
 from .lens_file import lens_from_table
 from .plate_text import parse_plate
@@ -54,7 +54,6 @@ __all__ = [
     "expand_light",
     "explain",
     "lens_location",
-    "parse_coating_choice",
     "project_from_data",
     "project_json_schema",
     "project_text",
@@ -246,37 +245,6 @@ def expand_light(light: Any, where: str, folder: Path, problems: list[str]) -> A
     except FlarewrightError as error:
         problems.append(f"{where}.spectrum: {error}")
         return {key: value for key, value in light.items() if key != "spectrum"}
-
-
-def parse_coating_choice(text: str, *, folder: Path | None = None) -> CoatingChoice:
-    """Return the coatings that a short text means.
-
-    Parameters
-    ----------
-    text : str
-        `lens`, `none`, `preset:NAME`, `quarter-wave:NM` and the other forms of `io.coating_text`, or a coating file.
-    folder : path, optional
-        Where a relative file starts; None: the working folder.
-
-    Returns
-    -------
-    CoatingChoice
-
-    Raises
-    ------
-    FlarewrightError
-        When the text is none of the forms.
-    """
-    word, _, rest = text.strip().partition(":")
-    if text.strip() == "lens":
-        return choices.AsLens()
-    if word == "preset":
-        if not rest.strip():
-            raise ProjectError(f"the coating {text!r} names no preset: write preset:NAME, a name from the lens file")
-        return choices.Preset(name=rest.strip())
-    if text.strip().lower().endswith(".toml"):
-        return read_coating_file((folder or Path()) / text.strip())
-    return choices.Everywhere(coating=parse_coating(text))
 
 
 # ---------------------------------------------------------------------------------------------------------------------

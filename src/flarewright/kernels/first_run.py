@@ -8,14 +8,17 @@ the helpers: a root that is not in the cache when it is first called is compiled
 from __future__ import annotations
 
 import gc
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from importlib import import_module
 from typing import Any
 
 from numba.core.sigutils import normalize_signature
 
+from .compile_progress import Progress, reporting, schedule
 from .helpers import ahead, helping, is_helper
+
+Shown = Callable[[], AbstractContextManager[Progress | None]]
 
 _GEOMETRY = "i8[::1], i8[::1], f8[::1], f8[::1], f8[::1], f8[::1]"
 _BUNDLE = "f8[:,::1], f8[:,::1], i8[:,::1]"
@@ -132,11 +135,11 @@ KIN = {
 _START = 0.7
 
 
-def compile_together(names: Sequence[str], processes: int) -> None:
+def compile_together(names: Sequence[str], processes: int, shown: Shown | None = None) -> None:
     """Compile roots that are not in the cache, some of them in other processes.
 
     Returns at once when the cache holds them, when Numba does not compile or has nowhere to cache, or when there is
-    only one process to use: then each root is compiled when it is first called.
+    only one process to use and no progress to show: then each root is compiled when it is first called.
 
     Parameters
     ----------
@@ -144,6 +147,9 @@ def compile_together(names: Sequence[str], processes: int) -> None:
         Keys of `ROOTS` that the command will call.
     processes : int
         Largest number of processes, this one included.
+    shown : callable, optional
+        Called only when something is to be compiled. Returns a context; its value is called with the part done (0 to 1)
+        and a few words, or is None to show nothing.
     """
     if is_helper():
         return
@@ -151,12 +157,24 @@ def compile_together(names: Sequence[str], processes: int) -> None:
     begun = [helper for helper in ahead() if set(helper.names) & set(missing)]
     others = {name for helper in begun for name in helper.names}
     shares = divided([name for name in missing if name not in others], max(processes - len(begun), 1))
-    if len(shares) + len(begun) < 2:
+    alone = len(shares) + len(begun) < 2
+    if not missing or (alone and shown is None):
         return
-    with helping(shares[1:]) as helpers:
-        compile_roots(shares[0] if shares else ())
-        for helper in (*helpers, *begun):
-            helper.wait()
+    # the others are at work before this process gets something to show
+    with helping(shares[1:]) as helpers, nullcontext() if shown is None else shown() as progress:
+        if alone and progress is None:
+            return
+        own, *theirs = shares or [[]]
+        busy = [_START + sum(_each(share)) for share in theirs] + [sum(_each(helper.names)) for helper in begun]
+        with reporting(schedule(_each(own), busy), progress) as compiled:
+            compile_roots(own, compiled)
+            for helper in (*helpers, *begun):
+                helper.wait()
+
+
+def _each(share: Sequence[str]) -> list[float]:
+    """Return how long each root of a share takes after those before it, seconds."""
+    return [_seconds(name, share[:k]) for k, name in enumerate(share)]
 
 
 def divided(names: Sequence[str], processes: int) -> list[list[str]]:
@@ -213,19 +231,22 @@ def _held(dispatcher: Any) -> bool:
         return True
 
 
-def compile_roots(names: Sequence[str]) -> None:
+def compile_roots(names: Sequence[str], compiled: Callable[[], None] = lambda: None) -> None:
     """Compile roots for the types that a render calls them with, into the cache on disk.
 
     Parameters
     ----------
     names : sequence of str
         Keys of `ROOTS`.
+    compiled : callable, optional
+        Called after each.
     """
     with _uncollected():
         for name in names:
             # what cannot be compiled ahead tells so when it is called
             with suppress(Exception):
                 kernel(name).compile(types(name))
+            compiled()
 
 
 @contextmanager

@@ -11,6 +11,7 @@ from ..errors import FlarewrightError
 from ..io.merged import read_frame
 from ..io.png import write_png
 from ..model.capture import FrameInfo, MergedFrame, MergedRun
+from ..render.display import auto_exposure, view, view_text
 from .evenly import evenly
 
 Floats = NDArray[np.float64]
@@ -18,8 +19,6 @@ Floats = NDArray[np.float64]
 OVERVIEW = "merged.png"
 # at most so wide, and so many frames
 _WIDTH, _FRAMES = 960, 24
-# decades of light from black to white
-_DECADES = 4.0
 _AXIS, _LIGHT, _GUESSED, _PATH = (90, 220, 255), (255, 90, 60), (160, 120, 255), (90, 220, 120)
 
 
@@ -37,12 +36,14 @@ def write_overview(folder: Path, run: MergedRun) -> None:
     FlarewrightError
         When a frame cannot be read or the picture not be written.
     """
-    about = {"Description": "logarithmic, four decades; red: light, blue: optical axis, green: mirror lines"}
-    write_png(folder / OVERVIEW, overview_picture(folder, run), about)
+    picture, stops = overview_picture(folder, run)
+    seen = view_text(stops, "filmic", "rec709", automatic=True)
+    about = {"Description": f"{seen}; red: light, blue: optical axis, green: mirror lines"}
+    write_png(folder / OVERVIEW, picture, about)
 
 
-def overview_picture(folder: Path, run: MergedRun) -> NDArray[np.uint8]:
-    """Draw the brightest of all frames on a logarithmic scale, the axis, the light's places and mirror lines.
+def overview_picture(folder: Path, run: MergedRun) -> tuple[NDArray[np.uint8], float]:
+    """Draw the brightest of all frames, the axis, the light's places and mirror lines.
 
     Parameters
     ----------
@@ -52,8 +53,10 @@ def overview_picture(folder: Path, run: MergedRun) -> NDArray[np.uint8]:
 
     Returns
     -------
-    ndarray, shape (height, width, 3), uint8
+    picture : ndarray, shape (height, width, 3), uint8
         Reduced to at most 960 pixels across.
+    stops : float
+        Its exposure.
 
     Raises
     ------
@@ -66,7 +69,9 @@ def overview_picture(folder: Path, run: MergedRun) -> NDArray[np.uint8]:
     standard errors or at least 6 pixels; green: the mirror lines of the first and the last frame that shows the light.
     """
     picture, block = _laid_over(folder, run)
-    shown = _toned(picture)
+    light = in_rec709(picture, run)
+    stops = auto_exposure(light)
+    shown = view(light, stops)
     seen = [frame for frame in run.frames if frame.light_found]
     axis = run.axis_px[0] / block, run.axis_px[1] / block
     for frame in (seen[0], seen[-1]) if seen else ():
@@ -79,7 +84,24 @@ def overview_picture(folder: Path, run: MergedRun) -> NDArray[np.uint8]:
     for k, unit in enumerate(((1.0, 0.0), (0.0, 1.0))):
         arm = np.linspace(-1.0, 1.0, 200) * max(6.0, 3.0 * run.axis_error_px[k] / block)
         _dots(shown, axis[0] + arm * unit[0], axis[1] + arm * unit[1], _AXIS)
-    return shown
+    return shown, stops
+
+
+def in_rec709(light: Floats, run: MergedRun) -> NDArray[np.float32]:
+    """Return light of a run's frames as a screen takes it; without the camera's matrix its colours stand for Rec.709.
+
+    Parameters
+    ----------
+    light : ndarray, shape (..., 3)
+        In the captures' red, green and blue.
+    run : MergedRun
+
+    Returns
+    -------
+    ndarray, shape (..., 3), float32
+        Linear Rec.709.
+    """
+    return np.asarray(light if run.to_rec709 is None else light @ np.array(run.to_rec709).T, np.float32)
 
 
 def frame_of(folder: Path, run: MergedRun, info: FrameInfo) -> MergedFrame:
@@ -111,12 +133,6 @@ def _laid_over(folder: Path, run: MergedRun) -> tuple[Floats, int]:
         parts = part.reshape(brightest.shape[0], block, brightest.shape[1], block, 3)
         brightest = np.maximum(brightest, parts.mean(axis=(1, 3)))
     return brightest, block
-
-
-def _toned(light: Floats) -> NDArray[np.uint8]:
-    dark = max(float(np.percentile(light, 5)), 1e-12)
-    level = np.log10(np.maximum(light, dark) / dark) / _DECADES
-    return np.asarray(np.clip(level * 235.0 + 10.0, 0.0, 255.0).astype(np.uint8))
 
 
 def _dots(picture: NDArray[np.uint8], x: Floats, y: Floats, color: tuple[int, int, int], part: float = 1.0) -> None:

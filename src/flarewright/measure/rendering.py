@@ -30,6 +30,7 @@ from ..render.gamut import within
 from ..render.holdout import read_plates
 from ..render.render import BLACK, HIDDEN, PIXEL_BYTES, Progress, Rendering, refuse_endless, render
 from ..render.room import need, spare_bytes
+from ..render.shown_layer import shown_layers
 from .chosen import Rgb, ghost_gains
 from .numbers import fit_in
 from .placing import brightness
@@ -209,7 +210,7 @@ def render_measured(project: Project, *, progress: Progress | None = None) -> Re
     refuse_endless((total, *others))
     layers = (total,) if project.output.layers == "beauty" else (total, *passes, *others)
     summary = _summary(project, flare, seen, gains)
-    return Rendering(project, layers, summary, _remarks(project, flare, seen, total))
+    return Rendering(project, shown_layers(layers, project), summary, _remarks(project, flare, seen, total))
 
 
 def check_measured(project: Project) -> None:

@@ -138,7 +138,8 @@ def _captures(folder: Path, run: MergedRun) -> str:
         ("focal length, pixels", f"{run.px_per_rad:.1f}"),
         ("clipped in every exposure, at most", f"{max(frame.clipped_share for frame in run.frames):.2%}"),
     ]
-    picture = image(overview_picture(folder, run), "all frames laid over each other; red: the light where it was seen, "
+    pixels, stops = overview_picture(folder, run)
+    picture = image(pixels, f"all frames laid over each other, {stops:+.1f} stops; red: the light where it was seen, "
                     "violet: where it must be, blue: the axis, green: mirror lines", 640)  # fmt: skip
     remarks = [remark.replace("+-", "±") for remark in run.remarks]
     return section("Captures", table(("", ""), rows), remark_list(remarks), picture)

@@ -15,18 +15,21 @@ from ..io.sentences import count
 from ..model.capture import FrameInfo, MergedFrame, MergedRun
 from ..model.ghost_model import GhostModel
 from ..model.layer import Layer
+from ..render.display import auto_exposure, view
 from ..render.figure import Figure, Mark, Picture, Text
 from ..render.page import figures, image, paragraph, section
 from .blocks import reduced
 from .dimmed import AROUND_LIGHT
-from .overview import frame_of
+from .overview import frame_of, in_rec709
 from .replay import replay
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-# about as wide pictures of frames are, alone and three to a row, and decades of light from black to white
-_WIDE, _WIDTH, _DECADES = 480, 310, 4.0
+# about as wide pictures of frames are, alone and three to a row
+_WIDE, _WIDTH = 480, 310
+# below lines a frame is so many stops darker than by itself, so that they stand out
+_DARKER = 1.0
 # a ghost's rim is where this part of its usual light is; what counts for that is brighter than so much of its brightest
 _RIM, _LIT = 0.25, 0.02
 # rims of fewer pixels are not seen; so wide a ring is
@@ -35,13 +38,16 @@ _LEAST, _RING_PX = 60, 7.0
 _APART_PX, _SEEN = 14.0, 4.0
 _NAME_PX, _REST = 12.0, "#a9b4be"
 
-_TONE_WORDS = f"Logarithmic, {_DECADES:g} decades from black to white; what every exposure clipped is white."
+_TONE_WORDS = (
+    "Frames are shown as renders are: at an exposure found for each, bright light rolling off to white. What every "
+    "exposure clipped is white."
+)
 
 
 def frames_section(folder: Path, run: MergedRun, chosen: Sequence[FrameInfo]) -> str:
     """Return a report's section that shows frames alone, as HTML."""
-    frames = [_Shown.of(frame_of(folder, run, info), _WIDTH) for info in chosen]
-    pictures = [image(one.toned(one.light), f"{info.constellation_deg:.2f} degrees", _WIDTH)
+    frames = [_Shown.of(frame_of(folder, run, info), run, _WIDTH) for info in chosen]
+    pictures = [image(one.seen(one.light), f"{info.constellation_deg:.2f} degrees, {one.stops:+.1f} stops", _WIDTH)
                 for one, info in zip(frames, chosen, strict=True)]  # fmt: skip
     return section("Frames", paragraph(_TONE_WORDS), *pictures)
 
@@ -59,28 +65,34 @@ class _Shown:
         Usual standard deviation of its pixels.
     block : int
         Pixels of the frame a side.
+    run : MergedRun
+        Knows the camera's colours.
+    stops : float
+        The exposure at which it is shown, and its replay with it.
     """
 
     light: Floats
     clipped: Mask
     noise: float
     block: int
+    run: MergedRun
+    stops: float
 
     @staticmethod
-    def of(frame: MergedFrame, width: int) -> _Shown:
+    def of(frame: MergedFrame, run: MergedRun, width: int) -> _Shown:
         """Reduce a frame to about this width, if it is wider."""
         block = max(1, round(frame.radiance.shape[1] / width))
         seen = frame.variance[frame.valid]
         noise = float(np.sqrt(np.median(seen))) / block if seen.size else 0.0
         clipped = np.asarray(reduced(~frame.valid, block).any(axis=2))
-        return _Shown(reduced(frame.radiance, block), clipped, noise, block)
+        light = reduced(frame.radiance, block)
+        return _Shown(light, clipped, noise, block, run, auto_exposure(in_rec709(light, run)))
 
-    def toned(self, light: Floats) -> NDArray[np.uint8]:
-        """Return light as 8 bits, dark and bright as this frame is, clipped places white."""
-        dark = max(0.5 * float(np.percentile(self.light, 2)), 1e-12)
-        level = np.log10(np.maximum(light, dark) / dark) / _DECADES
-        shown = np.where(self.clipped[..., None], 1.0, np.clip(level, 0.0, 1.0))
-        return np.asarray((shown * 255.0).astype(np.uint8))
+    def seen(self, light: Floats, darker: float = 0.0) -> NDArray[np.uint8]:
+        """Return light as 8 bits at this frame's exposure or some stops below it, clipped places white."""
+        shown = view(in_rec709(light, self.run), self.stops - darker)
+        shown[self.clipped] = 255
+        return shown
 
 
 def place_of(info: FrameInfo, model: GhostModel) -> tuple[float, float] | None:
@@ -136,22 +148,26 @@ def outlines_section(
         Of ghosts by name, as in the charts; the others are grey.
     """
     ghosts = bare(model)
-    drawn = [_outlined(frame, ghosts, place, colours) for frame, place in _placed(folder, run, chosen, model)]
-    words = f"Rims are where a quarter of a ghost's usual light is. {_TONE_WORDS}"
+    drawn = [_outlined(frame, run, ghosts, place, colours) for frame, place in _placed(folder, run, chosen, model)]
+    words = (
+        f"Rims are where a quarter of a ghost's usual light is. {_TONE_WORDS} Here all is {_DARKER:g} stop darker, for "
+        "lines to stand out."
+    )
     if len(colours) < len(model.ghosts):
         words += f" In colour are the {len(colours)} ghosts that the charts show."
     return section("Found ghosts over frames", paragraph(words), figures(*drawn)) if drawn else ""
 
 
-def _outlined(frame: MergedFrame, ghosts: GhostModel, place: tuple[float, float], colours: Mapping[str, str]) -> Figure:
-    shown = _Shown.of(frame, _WIDE)
-    # darker than elsewhere, so that lines stand out
-    toned = (0.7 * shown.toned(shown.light)).astype(np.uint8)
-    width, height = _WIDE, round(_WIDE * toned.shape[0] / toned.shape[1])
+def _outlined(
+    frame: MergedFrame, run: MergedRun, ghosts: GhostModel, place: tuple[float, float], colours: Mapping[str, str]
+) -> Figure:
+    shown = _Shown.of(frame, run, _WIDE)
+    seen = shown.seen(shown.light, _DARKER)
+    width, height = _WIDE, round(_WIDE * seen.shape[0] / seen.shape[1])
     row, column = (
-        ((np.arange(n) + 0.5) * m / n).astype(np.int64) for n, m in zip((height, width), toned.shape, strict=False)
+        ((np.arange(n) + 0.5) * m / n).astype(np.int64) for n, m in zip((height, width), seen.shape, strict=False)
     )
-    pixels = toned[row][:, column]
+    pixels = seen[row][:, column]
     names: list[Mark] = []
     taken: list[tuple[float, float]] = []
     drawn = ghosts_alone(ghosts, *place, (width, height))
@@ -234,16 +250,19 @@ def _free_place(
 def replays_section(folder: Path, run: MergedRun, chosen: Sequence[FrameInfo], model: GhostModel) -> str:
     """Return a report's section with frames, their replays and the differences, as HTML."""
     ghosts = bare(model)
-    rows = [_compared(frame, model, ghosts, place) for frame, place in _placed(folder, run, chosen, model)]
+    rows = [_compared(frame, run, model, ghosts, place) for frame, place in _placed(folder, run, chosen, model)]
     words = (
-        f"{_TONE_WORDS} Decibels: squares of the measured light over squares of the difference, farther than "
+        f"{_TONE_WORDS} A replay has its frame's exposure. "
+        "Decibels: squares of the measured light over squares of the difference, farther than "
         f"{AROUND_LIGHT * run.size_px[0]:.3g} pixels (1/18 of the width) from the light. Noise is part of the "
         "difference. Differences are linear: middle grey is none, and nothing is told where every exposure was clipped."
     )
     return section("Replay", paragraph(words), *(f"<div>{row}</div>" for row in rows))
 
 
-def _compared(frame: MergedFrame, model: GhostModel, ghosts: GhostModel, place: tuple[float, float]) -> str:
+def _compared(
+    frame: MergedFrame, run: MergedRun, model: GhostModel, ghosts: GhostModel, place: tuple[float, float]
+) -> str:
     height, width = frame.radiance.shape[:2]
     layers = replay(model, place[0], roll_deg=place[1], size_px=(width, height))
     drawn = layers[0].pixels.astype(np.float64) + np.array(model.background)
@@ -253,13 +272,14 @@ def _compared(frame: MergedFrame, model: GhostModel, ghosts: GhostModel, place: 
     counted = frame.valid & (np.hypot(x, y) > AROUND_LIGHT * width)[..., None]
     squares = float(np.square(frame.radiance[counted], dtype=np.float64).sum())
     off_db = 10.0 * log10(max(squares, 1e-300) / max(float(np.square(off[counted]).sum()), 1e-300))
-    shown = _Shown.of(frame, _WIDTH)
+    shown = _Shown.of(frame, run, _WIDTH)
     levels = [usual_light(layer) for layer in ghosts_alone(ghosts, *place, (width, height)).values()]
     scale, words = _scale(levels, shown)
     left = 0.5 + 0.5 * reduced(np.where(frame.valid, off, 0.0), shown.block) / scale
     return (
-        image(shown.toned(shown.light), f"{frame.constellation_deg:.2f} degrees, measured", _WIDTH)
-        + image(shown.toned(reduced(drawn, shown.block)), f"replayed, {off_db:.1f} dB", _WIDTH)
+        image(shown.seen(shown.light), f"{frame.constellation_deg:.2f} degrees, measured, {shown.stops:+.1f} stops",
+              _WIDTH)
+        + image(shown.seen(reduced(drawn, shown.block)), f"replayed, {off_db:.1f} dB", _WIDTH)
         + image((np.clip(left, 0.0, 1.0) * 255.0).astype(np.uint8),
                 f"measured less replayed, black to white: ± {scale:.2g}, {words}", _WIDTH)
     )  # fmt: skip

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
@@ -60,5 +60,11 @@ class Standard(Frozen):
     name: StandardName
     thickness: float = Field(1.0, ge=0.5, le=2.0)
 
+    def __init__(self, word: StandardName | None = None, /, **fields: Any) -> None:
+        """Take the name with or without its keyword: it is all that there is to say."""
+        super().__init__(**({} if word is None else {"name": word}), **fields)
+
 
 Coating = Annotated[Bare | QuarterWave | Film | Stack | Standard, Field(discriminator="kind")]
+COATINGS = (Bare, QuarterWave, Film, Stack, Standard)
+"""What a `Coating` may be."""

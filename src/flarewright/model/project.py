@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, StrictBool, field_validator
 
 from .art import Art
 from .base import Frozen
 from .camera import Camera, Colorspace
-from .coating import Coating
+from .coating import COATINGS, Coating
 from .design import Design
 from .holdout import Holdout
 from .imperfection import Imperfection
@@ -56,6 +56,13 @@ class PerRow(Frozen):
 
 
 CoatingChoice = Annotated[AsLens | Preset | Everywhere | InTurn | PerRow, Field(discriminator="kind")]
+CHOICES = (AsLens, Preset, Everywhere, InTurn, PerRow)
+"""What a `CoatingChoice` may be."""
+
+
+def everywhere(coating: Any) -> Any:
+    """Return the choice that a coating by itself stands for, on every surface between glass and air; others as is."""
+    return Everywhere(coating=coating) if isinstance(coating, COATINGS) else coating
 
 
 class Quality(Frozen):
@@ -157,6 +164,8 @@ class Project(Frozen):
         None: wide open.
     iris : Iris or None
         None: the lens file's.
+    coating : CoatingChoice
+        A coating by itself stands for `Everywhere`; `flarewright.parse_coating_choice` reads the command line's texts.
     dirt : Dirt
         What lies in the pupil; nothing by default.
     starburst : Starburst
@@ -195,6 +204,16 @@ class Project(Frozen):
     holdout: Holdout | None = None
     art: Art = Art()
     design: Design | None = None
+
+    @field_validator("coating", mode="before")
+    @classmethod
+    def _coating_is_no_text(cls, coating: Any) -> Any:
+        if isinstance(coating, str):
+            raise ValueError(
+                f"{coating!r} is a text; write coating=flarewright.parse_coating_choice({coating!r}), or give it to "
+                "flarewright.render beside the project"
+            )
+        return everywhere(coating)
 
     @field_validator("zoom")
     @classmethod

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import ProjectError
-from ..model import CoatingChoice, Imperfection, Lens, Plate
+from ..io.coating_text import coating_choice
+from ..model import Coating, CoatingChoice, Imperfection, Lens, Plate
 from ..optics.bundle import least_distance
 from ..optics.ghosts import GhostTable, ghost_table
 from ..optics.pack import SensorMirror, pack_lens, resolve_coatings
@@ -56,7 +57,7 @@ def ghosts(
     field_deg: tuple[float, float],
     *,
     f_number: float | None = None,
-    coating: CoatingChoice | None = None,
+    coating: str | Path | Coating | CoatingChoice | None = None,
     wavelength_nm: float = D_LINE_NM,
     paths: str = "all",
     sensor_distance: float | None = None,
@@ -82,8 +83,9 @@ def ghosts(
         (X, Y) of the light.
     f_number : float, optional
         None: wide open.
-    coating : CoatingChoice, optional
-        None: as the lens file says.
+    coating : str, path, Coating or CoatingChoice, optional
+        A text as the command line's `--coating` takes it, one coating for all surfaces between glass and air, or one a
+        row. None: as the lens file says.
     wavelength_nm : float
     paths : {"all", "same-side"}
     sensor_distance, focus_distance : float, optional
@@ -118,8 +120,9 @@ def ghosts(
     """
     known = as_lens(lens, remarks=remarks)
     built = build(
-        known, coating, zoom=zoom, filter_plate=filter_plate, cover_glass=cover_glass, imperfection=imperfection,
-        sensor_distance=sensor_distance, focus_distance=focus_distance,
+        known, coating_choice(coating), zoom=zoom, filter_plate=filter_plate,
+        cover_glass=cover_glass, imperfection=imperfection, sensor_distance=sensor_distance,
+        focus_distance=focus_distance,
     )  # fmt: skip
     if remarks is not None:
         remarks.extend(built.remarks)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from ..kernels.first_run import absent, compile_together
+from ..kernels.first_run import Shown, absent, compile_together
 from ..kernels.helpers import TRACING, cores
 from ..model import Bare, Project
 from ..optics.pack import resolve_coatings
@@ -19,7 +19,10 @@ _SCATTERING = ("hits", "scatter", "scatter picture", "scatter share")
 
 
 def compile_for_render(
-    project: Project, threads: int | None = None, report: Callable[[str], None] | None = None
+    project: Project,
+    threads: int | None = None,
+    report: Callable[[str], None] | None = None,
+    shown: Shown | None = None,
 ) -> None:
     """Compile what a render calls, unless it is compiled.
 
@@ -30,6 +33,8 @@ def compile_for_render(
         Most processes to use; None: one a core.
     report : callable, optional
         Told a sentence when something has to be compiled.
+    shown : callable, optional
+        As of `kernels.first_run.compile_together`.
 
     Raises
     ------
@@ -67,9 +72,9 @@ def compile_for_render(
             names += ["ghosts' light"]
     if project.output.starburst:
         names += ["fan wings" if iris.blades == 0 or iris.mask is not None else "blade wings"]
-    compile_together(names, min(threads or cores(), cores()))
+    compile_together(names, min(threads or cores(), cores()), shown)
 
 
-def compile_for_analysis() -> None:
-    """Compile what the ghost analysis calls, unless it is compiled."""
-    compile_together([*_TRACING, "draw", "densities"], cores())
+def compile_for_analysis(shown: Shown | None = None) -> None:
+    """Compile what the ghost analysis calls, unless it is compiled; `shown` as of `compile_for_render`."""
+    compile_together([*_TRACING, "draw", "densities"], cores(), shown)

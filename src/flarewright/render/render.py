@@ -9,7 +9,8 @@ from dataclasses import dataclass, replace
 from functools import partial
 from itertools import groupby
 from math import isfinite, pi, prod
-from typing import TYPE_CHECKING, Any
+from os import PathLike
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +18,7 @@ from numpy.typing import NDArray
 from ..errors import ProjectError
 from ..io.mask_image import read_mask
 from ..kernels.trace import REFRACT
-from ..model import Layer, Project, Stop
+from ..model import Layer, Lens, Project, Stop
 from ..optics.grating import grating_orders
 from ..optics.paths import direct_path, ghost_paths
 from ..optics.shape import ideal
@@ -26,11 +27,13 @@ from .compose import beauty
 from .direct import DirectImage, direct_image, widest_defocus_mm
 from .gamut import within
 from .ghosts import plain_level, render_ghosts
+from .given import Settings, naming_settings, project_of
 from .placing import outside, veiled
 from .prepare import Settled, settle
 from .room import need, spare_bytes
 from .scatter import dimmed, render_scatter, scatter_facts, scatter_of
 from .shot import Shot, make_opening, make_shots, soiled_opening
+from .shown_layer import ShownLayer, shown_layers
 from .starburst_pass import OUT_OF_FOCUS_PX, read_soil, starburst_of
 
 if TYPE_CHECKING:
@@ -54,7 +57,7 @@ class Rendering:
     Attributes
     ----------
     project : Project
-    layers : tuple of Layer
+    layers : tuple of ShownLayer
         "beauty" first, then the passes and single ghosts that were asked for.
     summary : dict
         Facts about lens and picture, ready for JSON.
@@ -65,34 +68,34 @@ class Rendering:
     """
 
     project: Project
-    layers: tuple[Layer, ...]
+    layers: tuple[ShownLayer, ...]
     summary: dict[str, Any]
     remarks: tuple[str, ...]
     ledger: Ledger | None = None
 
     def _repr_png_(self) -> bytes:
         """Show the beauty in a notebook, as the PNG beside an EXR does."""
-        from ..io.png import encode_png
-        from .display import layers_exposure, view
+        from .display import layers_exposure
 
-        colorspace = self.project.output.colorspace
-        stops = layers_exposure(self.layers, colorspace)
-        return encode_png(view(self.layers[0].pixels, stops, "filmic", colorspace), {})
+        return self.layers[0].png(layers_exposure(self.layers, self.project.output.colorspace))
 
 
+@naming_settings
 def render(
-    project: Project,
+    project: Project | Lens | str | PathLike[str],
     *,
     threads: int | None = None,
     progress: Progress | None = None,
     run: ReferenceRun | None = None,
     ledger: bool = False,
+    **settings: Unpack[Settings],
 ) -> Rendering:
-    """Render the flare of a project.
+    """Render the flare of a project, or of a lens with a few settings.
 
     Parameters
     ----------
-    project : Project
+    project : Project, Lens, str or path
+        A project; or a prescription, a shipped lens' name or a lens file, with `lights` among the settings.
     threads : int, optional
         None: all cores. The pixels do not depend on it.
     progress : callable, optional
@@ -101,6 +104,9 @@ def render(
         Reference quality: where to go on, where to keep the state, how long to run.
     ledger : bool
         Whether to tell what became of the light; costs a second or so, nothing in reference quality.
+    **settings : Settings
+        Fields of `Project` by name; they win over those of a project that is given. `coating` takes what the command
+        line's `--coating` takes too, such as "early-multicoat", "preset:staggered" or a coating file.
 
     Returns
     -------
@@ -114,7 +120,13 @@ def render(
         When the project cannot be rendered; the message says what, where, and the remedy.
     MemoryError
         When its layers are more than the memory holds.
+
+    Examples
+    --------
+    >>> from flarewright import Light, render
+    >>> render("canon-28-80", f_number=8, coating="early-multicoat", lights=[Light(field_deg=(10, 5))]) # doctest: +SKIP
     """
+    project = project_of(project, **settings)
     # beauty, ghosts and starburst, whatever else
     need(prod(project.camera.size_px) * PIXEL_BYTES * (3 if project.output.starburst else 2), spare_bytes())
     settled = settle(project)
@@ -176,7 +188,7 @@ def render(
     summary = {**_summary(settled, shots, stars, art), **drawn.facts, **scattered}
     return Rendering(
         settled.project,
-        layers,
+        shown_layers(layers, settled.project),
         {**summary, "ledger": account.as_data()} if ledger and account is not None else summary,
         (
             *settled.remarks, *drawn.remarks, *told, *outside(shots, images), *_veiled(drawn.passes),
