@@ -117,3 +117,20 @@ def test_the_quick_view_is_the_view():
     # the order in which three numbers are multiplied may round one of them over a border
     assert np.abs(found.astype(int) - wanted).max() <= 1
     assert (found != wanted).mean() < 1e-3
+
+
+def test_small_discs_light_ghosts_as_points_while_a_hand_moves_and_their_starbursts_as_discs(project):
+    disc, large = at(project, 6.0, 3.0, diameter_deg=0.5), at(project, 6.0, 3.0, diameter_deg=1.5)
+    found = moving_picture(disc, ())
+    # a disc's middle is found to the sixth digit
+    np.testing.assert_allclose(found.ghosts, layers(project)["ghosts"], rtol=5e-3)
+    wanted = layers(disc)
+    np.testing.assert_allclose(found.rest, wanted["starburst"], rtol=2e-4, atol=1e-7 * wanted["starburst"].max())
+    # the light is that of the disc, only its borders are sharper
+    np.testing.assert_allclose(found.ghosts.sum(axis=(0, 1)), wanted["ghosts"].sum(axis=(0, 1)), rtol=5e-3)
+    # one sheet serves other places, as for points
+    later = at(project, -4.0, -1.7, diameter_deg=0.5)
+    along, star = moving_picture(later, found.sheets), layers(later)["starburst"]
+    assert along.sheets == found.sheets
+    np.testing.assert_allclose(along.rest.sum(axis=(0, 1)), star.sum(axis=(0, 1)), rtol=5e-3)
+    assert moving_picture(large, ()) is None

@@ -20,7 +20,8 @@ def spread_marks(
     Parameters
     ----------
     marks : (H + 2 a, W + 2 b, 3) float64
-        Differences along the rows of a picture with a border (`raster.fill_polygon`).
+        Differences along the rows of a picture with a border (`raster.fill_polygon`); 0 when it is done, so that one
+        sheet serves many spreads.
     rows, columns : (N,) int64
         Where the kernel's differences along its rows are not 0, from its upper left corner.
     values : (N,) float64
@@ -43,6 +44,7 @@ def spread_marks(
             red, green, blue = marks[r, c, 0], marks[r, c, 1], marks[r, c, 2]
             if red == 0.0 and green == 0.0 and blue == 0.0:
                 continue
+            marks[r, c, 0] = marks[r, c, 1] = marks[r, c, 2] = 0.0
             for e in range(rows.size):
                 y, x, v = r + rows[e] - up, c + columns[e] - back, values[e]
                 if y < 0 or y >= height or x >= width:

@@ -44,7 +44,7 @@ from .ghosts_final import (
 from .looking import kindred, looking
 from .room import need, spare_bytes
 from .shot import Shot
-from .sources import halvings, motion, spread_border
+from .sources import DRAFT_ROUNDING, halvings, motion, spread_border
 
 if TYPE_CHECKING:
     from .surroundings import Surroundings
@@ -337,12 +337,14 @@ def _add_spread_drafts(
 ) -> None:  # fmt: skip
     """Add paraxial ghosts of area lights, those of one spread together, to a picture of each resolution."""
     marked: list[NDArray[np.float64] | None] = [None] * DETAILS
+    scratch: NDArray[np.float64] | None = None
     for shot in shots:
         alike: dict[object, list[tuple[LightPath, PathArt, NDArray[np.float64]]]] = {}
         for path in paths:
             changed, moved = art.get(path.name, PLAIN), motion(shot, path, draft=True)
             if moved is not None:
-                border = spread_border(shot, moved[0], shot.to_pixels * [1.0, 1.0, changed.scale, changed.scale])
+                place = shot.to_pixels * [1.0, 1.0, changed.scale, changed.scale]
+                border = spread_border(shot, moved[0], place, DRAFT_ROUNDING)
                 key = (path.name if changed.ramps else None, changed.blur, border.tobytes())
                 alike.setdefault(key, []).append((path, changed, border))
         for together in alike.values():
@@ -352,7 +354,7 @@ def _add_spread_drafts(
             if changes[0].alone:
                 _add_to(planes, 0, draft_alone(ghosts, changes, source, halved))
             else:
-                mark_spread(ghosts, changes, source, halved, marked)
+                scratch = mark_spread(ghosts, changes, source, halved, marked, scratch)
     for detail, marks in enumerate(marked):
         if marks is not None:
             _add_to(planes, detail, spread_light(marks))

@@ -259,8 +259,8 @@ def draft_alone(
 
 def mark_spread(
     ghosts: Sequence[tuple[Shot, LightPath]], art: Sequence[PathArt], source: Floats, halved: int,
-    sheets: list[Floats | None],
-) -> None:  # fmt: skip
+    sheets: list[Floats | None], scratch: Floats | None = None,
+) -> Floats:  # fmt: skip
     """Mark paraxial ghosts of an area light that share a spread, and nothing else is done to.
 
     Parameters
@@ -270,12 +270,22 @@ def mark_spread(
     sheets : list of ndarray or None
         One a resolution; made where there is none, and added to: `kernels.raster.sum_rows` twice turns them into flux
         per pixel.
+    scratch : ndarray of float64, optional
+        Zeros from the call before, to be used again where they suffice.
+
+    Returns
+    -------
+    ndarray of float64
+        Scratch for the next call.
     """
     shot = ghosts[0][0]
     width, height = (-(-side // 2**halved) for side in shot.size_px)
     kernel = shape_kernel(source, 0.5**halved)
     my, mx = (side // 2 for side in kernel.shape)
-    marks = np.zeros((height + 2 * my, width + 2 * mx, 3))
+    sides = height + 2 * my, width + 2 * mx, 3
+    if scratch is None or scratch.size < np.prod(sides):
+        scratch = np.zeros(sides).ravel()
+    marks = scratch[: np.prod(sides)].reshape(sides)
     for (lit, path), each in zip(ghosts, art, strict=True):
         placed = each.place(shot.to_pixels, _frame(lit, path) if each.framed else None) / 2.0**halved
         moved = replace(lit, to_pixels=placed + np.array([mx, my, 0.0, 0.0]))
@@ -287,6 +297,7 @@ def mark_spread(
     steps[np.abs(steps) < ROUNDING * kernel.max()] = 0.0
     rows, columns = np.nonzero(steps)
     spread_marks(marks, rows, columns, steps[rows, columns], np.array([my, mx]), held)
+    return scratch
 
 
 def spread_light(sheet: Floats) -> Floats:

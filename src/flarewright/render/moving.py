@@ -33,6 +33,11 @@ Floats = NDArray[np.float32]
 # a picture of more lights takes long by its ghosts alone, and their sheets much memory
 MOST_LIGHTS = 4
 
+SMALL_DEG = 0.6
+"""Discs up to this angle, the sun's with some room, light the ghosts of a moving picture as points do: to spread each
+ghost over its own disc takes several times as long as to draw it, and softens its border by a few pixels. Their
+starbursts are moved along as those of points: at another angle a disc's image is a few per cent longer."""
+
 __all__ = ["Sheet", "Star", "Still", "moving_picture"]
 
 
@@ -143,7 +148,7 @@ def moving_picture(project: Project, kept: Sequence[Sheet]) -> Still | None:
             return None
         stars.append(star)
     paths = ghost_paths(settled.lens, project.quality.paths, sensor=settled.sensor is not None)
-    layer = render_ghosts(shots, paths, project.quality, art=art.paths).total
+    layer = render_ghosts([_as_a_point(shot) for shot in shots], paths, project.quality, art=art.paths).total
     by_hand = art.gain.get("ghosts", 1.0)
     ghosts = layer.pixels if by_hand == 1.0 else layer.pixels * np.float32(by_hand)
     width, height = shots[0].size_px
@@ -178,10 +183,19 @@ def _star(
     return Star(sheet, (height - row, width - column), (red, green, blue))
 
 
+def _as_a_point(shot: Shot) -> Shot:
+    """Let a small disc light ghosts from its middle alone."""
+    return replace(shot, border=None) if _small(shot.light) else shot
+
+
+def _small(light: Light) -> bool:
+    return light.shape is None and light.diameter_deg <= SMALL_DEG
+
+
 def _alike_everywhere(project: Project) -> bool:
     """Tell whether each starburst is one pattern wherever its light is, as far as the project itself says."""
     plain = project.holdout is None and all(
-        light.distance is None and not light.extended and light.holdout is None for light in project.lights
+        light.distance is None and (_small(light) or not light.extended) and light.holdout is None for light in project.lights
     )
     return (
         plain and len(project.lights) <= MOST_LIGHTS and not project.starburst.cats_eye and project.output.starburst
@@ -190,7 +204,7 @@ def _alike_everywhere(project: Project) -> bool:
 
 
 def _scene(project: Project, light: Light) -> Project:
-    placed = Light(field_deg=(0.0, 0.0), spectrum=light.spectrum)
+    placed = Light(field_deg=(0.0, 0.0), spectrum=light.spectrum, diameter_deg=light.diameter_deg)
     scene: Project = project.replace(lights=(placed,), art=Art(physical=project.art.physical), design=None)
     return scene
 

@@ -20,7 +20,10 @@ from .shot import Shot, moved
 Floats = NDArray[np.float64]
 
 # what a spread may be rounded by: pixels, and part of its own size; ghosts of one rounded spread are spread together
-ROUND_PX, ROUND_PART = 0.3, 0.03
+Rounding = tuple[float, float]
+ROUNDING: Rounding = (0.3, 0.03)
+# ... of drafts, whose ghosts are matrices' anyway: fewer spreads, so that a hand may drag a lamp
+DRAFT_ROUNDING: Rounding = (0.6, 0.12)
 # a spread narrower than this many pixels is not seen
 NARROW_PX = 0.35
 # coarse pixels that a spread and a ghost must keep across before either is drawn at half the resolution
@@ -136,7 +139,7 @@ def traced_centre(shot: Shot, path: LightPath, slope: Floats, *, draft: bool = F
     return np.array([x, y]), float(np.sqrt(max(sums[3] / sums[0] - x * x - y * y, 0.0)))
 
 
-def spread_border(shot: Shot, matrix: Floats, to_pixels: Floats) -> Floats:
+def spread_border(shot: Shot, matrix: Floats, to_pixels: Floats, rounding: Rounding = ROUNDING) -> Floats:
     """Map the outline of a part of a light to what its ghost is spread over.
 
     Parameters
@@ -147,6 +150,8 @@ def spread_border(shot: Shot, matrix: Floats, to_pixels: Floats) -> Floats:
         From `motion`; rounded a little, so that ghosts with much the same spread have the same.
     to_pixels : ndarray, shape (4,)
         The ghost's own.
+    rounding : tuple of float
+        What it may be rounded by: pixels, and part of its size.
 
     Returns
     -------
@@ -154,11 +159,12 @@ def spread_border(shot: Shot, matrix: Floats, to_pixels: Floats) -> Floats:
         Columns and rows from the ghost's place.
     """
     assert shot.border is not None
+    round_px, round_part = rounding
     extent = 0.5 * np.ptp(points(shot.border), axis=0)
     pixels = matrix * np.array([[to_pixels[2]], [-to_pixels[3]]]) * extent
     largest = float(np.abs(pixels).max())
-    unit = 2.0 * ROUND_PX
-    while unit < ROUND_PART * largest:
+    unit = 2.0 * round_px
+    while unit < round_part * largest:
         unit *= 2.0
     # rounded once more, so that parts of one shape have the same border to the bit
     return np.asarray(np.round(mapped(shot.border, np.round(pixels / unit) * unit / extent), 6) + 0.0)
