@@ -195,7 +195,8 @@ def _small(light: Light) -> bool:
 def _alike_everywhere(project: Project) -> bool:
     """Tell whether each starburst is one pattern wherever its light is, as far as the project itself says."""
     plain = project.holdout is None and all(
-        light.distance is None and (_small(light) or not light.extended) and light.holdout is None for light in project.lights
+        light.distance is None and light.holdout is None and (_small(light) or not light.extended)
+        for light in project.lights
     )
     return (
         plain and len(project.lights) <= MOST_LIGHTS and not project.starburst.cats_eye and project.output.starburst
