@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from .errors import OutputError as OutputError
     from .errors import ProjectError as ProjectError
     from .io.exr import write_exr as write_exr
+    from .io.half import exr_scale as exr_scale
     from .io.project_file import read_project as read_project
     from .measure.rendering import render_measured as render_measured
     from .model import D65 as D65
@@ -71,6 +72,7 @@ _HOMES = {
         "Tabulated",
     ),
     ".io.exr": ("write_exr",),
+    ".io.half": ("exr_scale",),
     ".io.project_file": ("read_project",),
     ".measure.rendering": ("render_measured",),
     ".render.analysis": ("ghosts", "paraxial"),
