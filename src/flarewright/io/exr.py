@@ -7,8 +7,8 @@ single-part file. Pixels are linear and scene-referred; `chromaticities` states 
 
 In a file of half floats all values are multiplied by a power of two (`half.half_scale`), which each part's attribute
 `flarewright.scale` records. A layer with values above half's range has 32-bit channels, rounded like half floats and
-compressed by PXR24, which keeps 16 bits of each and so all that is there: a fifth larger than a layer of halves, where
-ZIP makes it two thirds larger. The functions here that read pixels divide by the attribute.
+compressed by PXR24, which keeps 16 bits of each and so all that is there: about a quarter larger than a layer of half
+floats, where ZIP makes it about twice as large. The functions here that read pixels divide by the attribute.
 
 The parts of single ghosts cover their own data window only, which keeps files of small ghosts small. Wide open, where
 most ghosts fill the picture, 351 of them make large files all the same; `--brightest` is for that. Nuke,
