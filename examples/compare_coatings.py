@@ -35,9 +35,7 @@ def main(folder: Path) -> None:
     )
     for name, coating in COATINGS.items():
         rendering = fw.render(project.replace(coating=coating))
-        fw.write_exr(
-            folder / f"{name}.exr", rendering.layers, (320, 180), pixel_type="half", metadata={"coating": name}
-        )
+        fw.write_exr(folder / f"{name}.exr", rendering.layers, (320, 180), metadata={"coating": name})
         ghosts = next(layer for layer in rendering.layers if layer.name == "ghosts")
         red, green, blue = ghosts.pixels.sum(axis=(0, 1)) / (320 * 180)
         through = rendering.summary["lights"][0]["transmittance"]

@@ -42,7 +42,7 @@ def main(folder: Path) -> None:
             lens=str(path), lights=[fw.Light(field_deg=(4.0, 2.0))], camera=fw.Camera(size_px=(160, 90))
         )
         rendering = fw.render(project)
-        fw.write_exr(path.with_suffix(".exr"), rendering.layers, (160, 90), pixel_type="half", metadata={})
+        fw.write_exr(path.with_suffix(".exr"), rendering.layers, (160, 90), metadata={})
 
 
 if __name__ == "__main__":

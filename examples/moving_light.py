@@ -29,7 +29,11 @@ def main(folder: Path) -> None:
         rendering = fw.render(project.replace(lights=[light]))
         path = folder / f"flare.{frame + 1:04d}.exr"
         fw.write_exr(
-            path, rendering.layers, project.camera.size_px, pixel_type="half", metadata={"frame": str(frame + 1)}
+            path,
+            rendering.layers,
+            project.camera.size_px,
+            scale=fw.exr_scale(project),
+            metadata={"frame": str(frame + 1)},
         )
         x, y = rendering.summary["lights"][0]["direct_position_mm"]
         print(f"{path.name}: light at {light.field_deg[0]:+.1f} degrees, its image at {x:+.2f}, {y:+.2f} mm")

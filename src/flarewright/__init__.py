@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from .errors import ProjectError as ProjectError
     from .io.coating_text import parse_coating_choice as parse_coating_choice
     from .io.exr import write_exr as write_exr
+    from .io.half import exr_scale as exr_scale
     from .io.look_file import read_look as read_look
     from .io.project_file import read_project as read_project
     from .measure.rendering import render_measured as render_measured
@@ -82,6 +83,7 @@ _HOMES = {
     ".io.coating_text": ("parse_coating_choice",),
     ".io.exr": ("write_exr",),
     ".io.look_file": ("read_look",),
+    ".io.half": ("exr_scale",),
     ".io.project_file": ("read_project",),
     ".measure.rendering": ("render_measured",),
     ".render.analysis": ("ghosts", "paraxial"),

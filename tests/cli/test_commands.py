@@ -94,12 +94,10 @@ def projects(monkeypatch):
 
 
 def test_render_writes_exr_and_preview_and_tells(capsys, projects, folder):
-    said = call(
-        capsys, "render", "heliar-tronnier", "--ideal", "--light", "-3,4", "--size", "8x6", "--half", "-o", "a.exr"
-    )
+    said = call(capsys, "render", "heliar-tronnier", "--ideal", "--light", "-3,4", "--size", "8x6", "-o", "a.exr")
     assert said.out == ""
     assert said.err.splitlines()[0] == "flarewright: a remark"
-    assert "clipped" in said.err
+    assert "holds irradiances times 1024" in said.err
     assert "exposure" in said.err
     assert sorted(path.name for path in folder.iterdir()) == ["a.exr", "a.png"]
     (project,) = projects
@@ -120,7 +118,9 @@ def test_render_json_is_one_object_and_holds_no_infinity(capsys, projects, folde
     assert summary["far"] is None
     assert summary["output"] == "a.exr"
     assert summary["layers"] == ["beauty", "ghost.4-1"]
-    assert summary["remarks"] == ["a remark"]
+    assert summary["scale"] == 1024.0
+    assert summary["remarks"][0] == "a remark"
+    assert len(summary["remarks"]) == 2
     assert [path.name for path in folder.iterdir()] == ["a.exr"]
 
 
@@ -180,7 +180,7 @@ def test_flags_win_over_the_project_file_and_the_rest_of_it_stays(capsys, projec
     assert [(x.intensity, x.spectrum) for x in changed.lights] == [
         (3, plain.lights[0].spectrum), (3, plain.lights[1].spectrum)]  # fmt: skip
     assert changed.lights[0].spectrum == BlackBody(temperature_k=3200)
-    assert changed.output.pixel_type == "float"
+    assert (plain.output.pixel_type, changed.output.pixel_type) == ("half", "float")
     assert changed.camera == plain.camera
     assert (other.lens, other.coating, len(other.lights)) == ("tessar-brendel", AsLens(), 1)
     assert other.f_number == 5.6

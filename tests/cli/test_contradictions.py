@@ -75,8 +75,26 @@ def test_light_beyond_the_numbers_of_a_picture_is_refused(capsys, folder):
     assert [path.name for path in folder.iterdir()] == ["shot.toml"]
 
 
-def test_half_floats_hold_what_is_above_them_at_their_largest(capsys, folder):
-    assert run([*SMALL, "--intensity", "1e12", "--half"]) == 0
-    assert "were clipped to it because half floats end there" in capsys.readouterr().err
-    brightest = max(float(layer.pixels.max()) for layer in read_exr("a.exr").layers)
-    assert brightest == 65504.0
+@pytest.mark.parametrize("intensity", ["1", "1e12"])
+def test_half_floats_clip_no_light_however_bright(capsys, folder, intensity):
+    assert run([*SMALL, "--intensity", intensity, "--gain", "starburst=1e6"]) == 0
+    scale = 1024.0 / 2.0 ** (40 if intensity == "1e12" else 0)
+    halves, err = read_exr("a.exr"), capsys.readouterr().err
+    assert f"the EXR holds irradiances times {scale:.9g}, its attribute flarewright.scale" in err
+    assert run([*SMALL, "--intensity", intensity, "--gain", "starburst=1e6", "--float"]) == 0
+    floats = read_exr("a.exr")
+    assert "flarewright.scale" not in capsys.readouterr().err
+    assert (halves.scale, floats.scale) == (scale, 1.0)
+    assert floats.layers[0].pixels.max() * scale > 65504.0
+    for half, full in zip(halves.layers, floats.layers, strict=True):
+        for channel in range(3):
+            there, here = half.pixels[..., channel], full.pixels[..., channel]
+            np.testing.assert_allclose(there, here, rtol=2.0**-11, atol=2.0**-25 / scale)
+
+
+def test_a_light_s_path_through_the_picture_leaves_the_scale(folder):
+    scales = []
+    for place in ("0,0", "10,5"):
+        assert run([*SMALL, "--light", place, "--light", "-3,4", "--intensity", "100000", "--layers", "ghosts"]) == 0
+        scales.append(read_exr("a.exr").scale)
+    assert scales == [2.0**-7] * 2

@@ -15,6 +15,7 @@ from flarewright.editor.viewing import outline_png, picked
 from flarewright.errors import FlarewrightError
 from flarewright.io.exr import read_exr
 from flarewright.io.ghost_model_file import write_ghost_model
+from flarewright.io.half import rounded_to_half
 from flarewright.measure.numbers import NUMBERS, channel_of
 from flarewright.measure.replay import replay
 from flarewright.model.ghost_model import AberrationGhost, GhostModel, Halo, Reference
@@ -148,9 +149,18 @@ def test_it_is_saved_beside_its_project_exported_and_dropped(screen, tmp_path, p
     project, file = open_any(str(tmp_path / "shot.toml"))
     assert project == session.project
     assert file == str((tmp_path / "shot.toml").resolve())
-    small = session.project.replace(camera=session.project.camera.replace(size_px=(160, 90)))
+    bright = session.project.lights[0].replace(intensity=100.0)
+    small = session.project.replace(camera=session.project.camera.replace(size_px=(160, 90)), lights=(bright,))
     export_picture(small, tmp_path / "flare.exr")
-    assert [layer.name for layer in read_exr(tmp_path / "flare.exr").layers] == ["beauty", "ghosts", "halo"]
+    exported = read_exr(tmp_path / "flare.exr")
+    assert [layer.name for layer in exported.layers] == ["beauty", "ghosts", "halo"]
+    assert exported.scale == 2.0 ** (10 - 7)
+    whole = small.replace(output=small.output.replace(pixel_type="float"))
+    export_picture(whole, tmp_path / "float.exr")
+    plain = read_exr(tmp_path / "float.exr")
+    assert plain.scale == 1.0
+    for half, full in zip(exported.layers, plain.layers, strict=True):
+        np.testing.assert_array_equal(half.pixels, rounded_to_half(full.pixels * 8) / 8)
     dropped = imported("mine.json", (tmp_path / "model.json").read_bytes(), tmp_path / "drops").project
     assert dropped.lights == open_any(path)[0].lights
     with pytest.raises(FlarewrightError, match=r"^none\.json"):

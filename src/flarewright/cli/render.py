@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 EPILOG = (
     "Examples:\n\nflarewright render heliar-tronnier --light 10,5 -o flare.exr\n\n"
     "flarewright render canon-28-80 --light -8,3 --light 2,6 --intensity 1 --intensity 0.2 --spectrum black-body:3200 "
-    "--fstop 8 --blades 7 --coating quarter-wave:550 --size 1920x1080 --layers ghosts --brightest 30 --half "
+    "--fstop 8 --blades 7 --coating quarter-wave:550 --size 1920x1080 --layers ghosts --brightest 30 "
     "-o shot.exr\n\n"
     "flarewright render heliar-tronnier --light sun@10,5 --light -12,2 --light-size 3x2 --distance inf --distance 900 "
     "--spectrum d65 --spectrum rgb:1,0.6,0.2 -o room.exr\n\n"
@@ -344,9 +344,11 @@ def render(
         str | None,
         typer.Option(help="keep negative channels (when left out), or compress colours.", rich_help_panel=_OUT),
     ] = None,
-    half: Annotated[bool, typer.Option("--half", help="Write 16 bits a value.", rich_help_panel=_OUT)] = False,
+    half: Annotated[
+        bool, typer.Option("--half", help="Write 16 bits a value, as when left out.", rich_help_panel=_OUT)
+    ] = False,
     float32: Annotated[
-        bool, typer.Option("--float", help="Write 32 bits a value, as when left out.", rich_help_panel=_OUT)
+        bool, typer.Option("--float", help="Write 32 bits a value, irradiances as they are.", rich_help_panel=_OUT)
     ] = False,
     full_windows: Annotated[
         bool,
@@ -390,6 +392,7 @@ def render(
     """Render the flare of a lens into a layered, linear EXR, with a PNG to look at.
 
     Every value is an irradiance on the sensor relative to a light of irradiance 1, so layers add up to the beauty.
+    A file of half floats holds it times a power of two, its attribute flarewright.scale.
     """
     check_place(output, ".exr")
     view_of = preview_look(view=view, exposure=exposure, ev=ev, shutter=shutter, iso=iso, lux=lux, no_png=no_png)
@@ -566,17 +569,20 @@ def _write(
     """Write the EXR and its preview; return what was written where, and remarks."""
     from .. import __version__
     from ..io.exr import write_exr
+    from ..io.half import exr_scale
     from ..io.project_file import project_text
     from ..render.gamut import negative_share
 
     project = rendering.project
     width, height = project.camera.size_px
+    scale = exr_scale(project)
     remarks = list(
         write_exr(
             output,
             rendering.layers,
             (width, height),
             pixel_type=project.output.pixel_type,
+            scale=scale,
             metadata={"version": __version__, "project": project_text(project)},
             pixel_aspect=project.camera.pixel_aspect,
             colorspace=project.output.colorspace,
@@ -590,7 +596,8 @@ def _write(
             "the file's primaries; --gamut compress writes none"
         )
     files: dict[str, Any] = {
-        "output": str(output), "layers": [layer.name for layer in rendering.layers], "negative_pixels": outside
+        "output": str(output), "layers": [layer.name for layer in rendering.layers], "scale": scale,
+        "negative_pixels": outside,
     }  # fmt: skip
     if look is not None:
         files |= write_preview(rendering, output.with_suffix(".png"), look)

@@ -18,6 +18,7 @@ from ..io.atomic import write_atomically
 from ..io.exr import write_exr
 from ..io.file_kind import kind_of
 from ..io.ghost_model_file import names_ghost_model
+from ..io.half import exr_scale
 from ..io.lens_writer import format_lens
 from ..io.library import lens_path, near_names, shipped
 from ..io.look_file import look_text, read_look
@@ -288,7 +289,7 @@ def export_picture(project: Project, path: Path, progress: Callable[[float, str]
     rendering = render_any(project, progress=progress)
     write_exr(
         path, rendering.layers, project.camera.size_px, pixel_type=project.output.pixel_type,
-        metadata={"version": __version__, "project": project_text(project)},
+        scale=exr_scale(project), metadata={"version": __version__, "project": project_text(project)},
         pixel_aspect=rendering.project.camera.pixel_aspect, colorspace=project.output.colorspace,
     )  # fmt: skip
 

@@ -5,8 +5,13 @@ layer is a part of its own, named after the layer, with channels `layer.R`, `lay
 programs list it under its name whether they go by parts or by channel names. A file with one layer is an ordinary
 single-part file. Pixels are linear and scene-referred; `chromaticities` states the primaries.
 
+In a file of half floats all values are multiplied by a power of two (`half.half_scale`), which each part's attribute
+`flarewright.scale` records. A layer with values above half's range has 32-bit channels, rounded like half floats and
+compressed by PXR24, which keeps 16 bits of each and so all that is there: about a quarter larger than a layer of half
+floats, where ZIP makes it about twice as large. The functions here that read pixels divide by the attribute.
+
 The parts of single ghosts cover their own data window only, which keeps files of small ghosts small. Wide open, where
-most ghosts fill the picture, 351 of them make gigabytes all the same; `--brightest` and `--half` are for that. Nuke,
+most ghosts fill the picture, 351 of them make large files all the same; `--brightest` is for that. Nuke,
 Fusion, Natron and OpenImageIO place such a part where it belongs; Blender (up to 5 at least) puts it into the picture's
 corner, for which `full_windows=True` writes every layer at the size of the picture.
 """
@@ -16,6 +21,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from math import frexp, inf
 from os import PathLike
 from pathlib import Path
 from threading import Lock
@@ -28,10 +34,8 @@ from ..errors import FlarewrightError, OutputError
 from ..model.camera import Colorspace
 from ..model.layer import Layer
 from .atomic import write_atomically
+from .half import HALF_MAX, half_scale, rounded_to_half
 from .quiet import quiet
-
-HALF_MAX = 65504.0
-"""The largest number that 16-bit floating point holds."""
 
 # (red x, y, green x, y, blue x, y, white x, y): ITU-R BT.709-6 table 3; ACEScg as S-2014-004, AP1 with the ACES white.
 CHROMATICITIES: Mapping[Colorspace, tuple[float, ...]] = {
@@ -43,6 +47,7 @@ CHROMATICITIES: Mapping[Colorspace, tuple[float, ...]] = {
 _INTEROP_ID: Mapping[Colorspace, str] = {"rec709": "lin_rec709_scene", "acescg": "lin_ap1_scene"}
 
 _PREFIX = "flarewright."
+_SCALE = f"{_PREFIX}scale"
 _CHANNELS = "RGB"
 
 # the library prints to stdout what is wrong with a file; who redirects that does it for all threads
@@ -56,15 +61,17 @@ class ExrContents:
     Attributes
     ----------
     layers : tuple of Layer
-        In the order of the file, pixels as float32 within each part's data window.
+        In the order of the file, pixels as float32 within each part's data window, the file's scale undone.
     size_px : tuple of int
         Width and height of the display window.
     pixel_type : {"half", "float"}
-        Of the first part.
+        Of the first part; "float" in a file of half floats when its values are above their range.
     metadata : dict of str to str
         What `write_exr` was given.
     header : dict of str to object
         All attributes of the first part.
+    scale : float
+        By what the first part's values are multiplied in the file.
     """
 
     layers: tuple[Layer, ...]
@@ -72,6 +79,7 @@ class ExrContents:
     pixel_type: Literal["half", "float"]
     metadata: dict[str, str]
     header: dict[str, Any] = field(default_factory=dict)
+    scale: float = 1.0
 
 
 def write_exr(
@@ -79,7 +87,8 @@ def write_exr(
     layers: Sequence[Layer],
     size_px: tuple[int, int],
     *,
-    pixel_type: Literal["half", "float"] = "float",
+    pixel_type: Literal["half", "float"] = "half",
+    scale: float | None = None,
     metadata: Mapping[str, str] | None = None,
     pixel_aspect: float = 1.0,
     colorspace: Colorspace = "rec709",
@@ -95,6 +104,11 @@ def write_exr(
     size_px : tuple of int
         Width and height of the whole picture.
     pixel_type : {"half", "float"}
+        half: 16 bits a value, and for layers with values above their range, 32 bits rounded like them; variances keep
+        32 bits.
+    scale : float, optional
+        Power of two by which all values are multiplied, those of variances by its square: `exr_scale(project)`. None:
+        1024 for half floats, which suits lights of intensity 1 and loses nothing bright of others; 1 for floats.
     metadata : mapping of str to str, optional
         Goes into the first part's header, each name prefixed by "flarewright.".
     pixel_aspect : float
@@ -107,34 +121,44 @@ def write_exr(
     Returns
     -------
     tuple of str
-        Remarks for a person, e.g. that values had to be clipped to fit into half floats.
+        Remarks for a person: by what the values are multiplied, when it is not 1.
 
     Raises
     ------
     OutputError
         When the file cannot be written.
     FlarewrightError
-        When there is no layer, or two of the same name.
+        When there is no layer, two of the same name, or the scale is no power of two.
     """
     import OpenEXR
 
     names = [layer.name for layer in layers]
     if not names or len(set(names)) != len(names):
         raise FlarewrightError(f"an EXR file needs at least one layer and no name twice, not {names}")
-    clipped = 0
+    if scale is None:
+        scale = half_scale() if pixel_type == "half" else 1.0
+    if not _is_scale(scale):
+        raise FlarewrightError(f"scale {scale!r} is no power of two from 2^-63 to 2^63; give exr_scale(project)")
+    if "scale" in (metadata or {}):
+        raise FlarewrightError("metadata 'scale' would replace the file's own; choose another name")
     parts = []
     for k, layer in enumerate(layers):
         # Passes always cover the picture; only a single ghost has a window worth cropping to.
         whole = k == 0 or full_windows or not layer.name.startswith("ghost.")
         pixels, window = _over_picture(layer, size_px) if whole else (layer.pixels, layer.window)
         # a variance is an irradiance squared, far too small for half floats
-        kind: Literal["half", "float"] = "float" if layer.name.endswith(".variance") else pixel_type
-        channels, lost = _channels(pixels, "RGB" if k == 0 else layer.name, kind)
-        clipped += lost
+        squared = layer.name.endswith(".variance")
+        by, half = (scale * scale, False) if squared else (scale, pixel_type == "half")
         header = _header(layer, window, size_px, pixel_aspect, colorspace)
         if k == 0:
             header |= {f"{_PREFIX}{name}": text for name, text in (metadata or {}).items()}
-        parts.append(OpenEXR.Part(header, channels, layer.name))
+        header[_SCALE] = by
+        values = _stored(pixels, by, half)
+        if half and values.dtype == np.float32:
+            header["compression"] = OpenEXR.PXR24_COMPRESSION
+        # from one array of three channels, "RGB" as R, G, B and any other name as NAME.R, NAME.G, NAME.B: planes of
+        # their own would hold all layers in memory twice
+        parts.append(OpenEXR.Part(header, {"RGB" if k == 0 else layer.name: values}, layer.name))
 
     # the library compresses on one thread unless it is told otherwise; its oldest releases cannot be told
     if hasattr(OpenEXR, "set_global_thread_count"):
@@ -151,12 +175,9 @@ def write_exr(
             raise OSError(reason or told.replace(str(temporary), str(path))) from error
 
     write_atomically(Path(path), write)
-    if not clipped:
+    if scale == 1.0:
         return ()
-    return (
-        f"{clipped} values above {HALF_MAX:.0f} were clipped to it because half floats end there; "
-        "write floats (--float) to keep them",
-    )
+    return (f"the EXR holds irradiances times {scale:.9g}, its attribute {_SCALE}; --float writes them as they are",)
 
 
 def read_exr(path: str | PathLike[str]) -> ExrContents:
@@ -177,23 +198,25 @@ def read_exr(path: str | PathLike[str]) -> ExrContents:
     """
     try:
         file = _opened(path)
+        scales = [_scale(part) for part in file.parts]
     except OSError as error:
         raise OutputError(f"{path} cannot be read as an EXR file: {error}") from error
     layers = []
-    for k, part in enumerate(file.parts):
+    for k, (part, scale) in enumerate(zip(file.parts, scales, strict=True)):
         prefix = "" if k == 0 else f"{part.name()}."
         planes = [part.channels[f"{prefix}{name}"].pixels for name in _CHANNELS]
-        pixels = np.stack(planes, axis=-1).astype(np.float32, copy=False)
+        pixels = _unscaled(np.stack(planes, axis=-1).astype(np.float32, copy=False), scale)
         x, y = (int(value) for value in part.header["dataWindow"][0])
         about = _prefixed(part.header, f"{_PREFIX}layer.")
         name = part.name() or "beauty"
         layers.append(Layer(name, pixels, (x, y, pixels.shape[1], pixels.shape[0]), about))
     header = dict(file.parts[0].header)
     low, high = header["displayWindow"]
-    metadata = {k: str(v) for k, v in _prefixed(header, _PREFIX).items() if not k.startswith("layer.")}
+    ours = {k: v for k, v in header.items() if k != _SCALE and not k.startswith(f"{_PREFIX}layer.")}
+    metadata = {k: str(v) for k, v in _prefixed(ours, _PREFIX).items()}
     kind: Literal["half", "float"] = "half" if file.parts[0].channels["R"].pixels.dtype == np.float16 else "float"
     size = (int(high[0] - low[0]) + 1, int(high[1] - low[1]) + 1)
-    return ExrContents(tuple(layers), size, kind, metadata, header)
+    return ExrContents(tuple(layers), size, kind, metadata, header, scales[0])
 
 
 def _opened(path: str | PathLike[str]) -> Any:
@@ -234,7 +257,8 @@ def read_exr_plane(path: str | PathLike[str], choices: Sequence[Sequence[str]]) 
         When it has no such channels.
     """
     part, names = _part_with(path, choices)
-    return _over_display(part, np.mean([np.asarray(part.channels[name].pixels, float) for name in names], axis=0))
+    mean = np.mean([np.asarray(part.channels[name].pixels, float) for name in names], axis=0)
+    return _over_display(part, mean / _scale(part))
 
 
 def read_exr_colour(path: str | PathLike[str]) -> NDArray[np.float32]:
@@ -258,7 +282,8 @@ def read_exr_colour(path: str | PathLike[str]) -> NDArray[np.float32]:
         When it has no such channels.
     """
     part, names = _part_with(path, (("R", "G", "B"), ("Y",)))
-    planes = [_over_display(part, np.asarray(part.channels[name].pixels, dtype=np.float64)) for name in names]
+    values = [np.asarray(part.channels[name].pixels, dtype=np.float64) / _scale(part) for name in names]
+    planes = [_over_display(part, plane) for plane in values]
     colours = np.stack(planes if len(planes) == 3 else [planes[0]] * 3, axis=-1).astype(np.float32)
     return np.where(np.isfinite(colours), colours, np.float32(0.0))
 
@@ -330,18 +355,34 @@ def _over_picture(layer: Layer, size_px: tuple[int, int]) -> tuple[NDArray[np.fl
     return pixels, picture
 
 
-def _channels(
-    pixels: NDArray[np.float32], name: str, pixel_type: Literal["half", "float"]
-) -> tuple[dict[str, NDArray[Any]], int]:
-    """Return the pixels by name, and how many values half floats could not hold.
+def _stored(pixels: NDArray[np.float32], scale: float, half: bool) -> NDArray[Any]:
+    """Return the pixels as the file holds them: times the scale, in 16 bits where these reach."""
+    if scale != 1.0:
+        pixels = pixels * np.float32(scale)
+    if not half:
+        return np.ascontiguousarray(pixels)
+    rounded = rounded_to_half(pixels)
+    return rounded if np.any(np.abs(rounded) > HALF_MAX) else rounded.astype(np.float16)
 
-    The library takes the three channels from one array, "RGB" as R, G, B and any other name as NAME.R, NAME.G, NAME.B:
-    planes of their own would hold all layers in memory twice.
-    """
-    if pixel_type == "float":
-        return {name: np.ascontiguousarray(pixels)}, 0
-    lost = int(np.count_nonzero(np.abs(pixels) > HALF_MAX))
-    return {name: np.clip(pixels, -HALF_MAX, HALF_MAX).astype(np.float16)}, lost
+
+def _unscaled(pixels: NDArray[np.float32], scale: float) -> NDArray[np.float32]:
+    return pixels if scale == 1.0 else pixels / np.float32(scale)
+
+
+def _is_scale(scale: float) -> bool:
+    """Whether multiplying by the scale and by its square rounds nothing."""
+    return 2.0**-63 <= scale <= 2.0**63 and frexp(scale)[0] == 0.5
+
+
+def _scale(part: Any) -> float:
+    """Return by what the values of a part are multiplied, 1 in files of other programs; raises OSError."""
+    try:
+        scale = float(part.header.get(_SCALE, 1.0))
+    except (TypeError, ValueError):
+        scale = 0.0
+    if not 0.0 < scale < inf:
+        raise OSError(f"its attribute {_SCALE} is no number above 0")
+    return scale
 
 
 def _header(

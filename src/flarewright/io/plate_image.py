@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ProjectError
-from .exr import HALF_MAX, read_exr_plane
+from .exr import read_exr_plane
+from .half import HALF_MAX
 from .mask_image import read_grey
 
 # pixels a side

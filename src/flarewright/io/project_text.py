@@ -70,7 +70,7 @@ ABOUT = {
     "output.brightest": "20   # of the single ghosts only so many",
     "output.colorspace": '"rec709" or "acescg", linear',
     "output.gamut": '"keep" negative channels, or "compress" colours until there are none',
-    "output.pixel_type": '"half" or "float"',
+    "output.pixel_type": '"half": 16 bits a value, or "float": 32 bits',
 }
 
 _TEACH_DIRT = """

@@ -141,6 +141,8 @@ class Output(Frozen):
         keep: colours outside the primaries have negative channels; compress: they are moved towards white, and the
         beauty is the sum of the passes so moved.
     pixel_type : {"half", "float"}
+        half: 16 bits a value, irradiances times a constant of the lights (`io.half.exr_scale`); float: 32 bits,
+        irradiances as they are.
     starburst : bool
         Whether the direct image of the light with its diffraction pattern is part of the picture.
     """
@@ -149,7 +151,7 @@ class Output(Frozen):
     brightest: int | None = Field(None, ge=1)
     colorspace: Colorspace = "rec709"
     gamut: Literal["keep", "compress"] = "keep"
-    pixel_type: Literal["half", "float"] = "float"
+    pixel_type: Literal["half", "float"] = "half"
     starburst: StrictBool = True
 
 

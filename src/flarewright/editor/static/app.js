@@ -263,7 +263,7 @@ function header() {
 }
 const exports = [
   ['Save as…', saveAs, 'Save the project under another name, and go on with that file (Ctrl+Shift+S).'],
-  ['EXR with layers', () => download('exr'), 'Rendered at the size and quality of the project; takes as long as a render.'],
+  ['EXR with layers', () => download('exr'), 'Rendered at the size and quality of the project; takes as long as a render. Values are irradiances times its attribute flarewright.scale.'],
   ['PNG as shown', () => download('png')],
   ['Lens file', () => download('lens')],
   ['Project file', () => download('project')],
