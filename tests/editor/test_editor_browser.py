@@ -509,6 +509,28 @@ def test_a_ghost_beside_the_light_can_be_pulled_too(tab):
     assert tab.state()["lights"][0]["field_deg"][0] < 0.0
 
 
+def test_looks_are_put_on_by_a_click_and_saved_and_dropped(tab, tmp_path):
+    tab.tab("library")
+    tab.until("document.querySelectorAll('#looks button').length > 10")
+    tab.page.fill("input[name=search]", "low sun")
+    assert tab.page.locator("#looks button").count() == 1
+    assert tab.page.locator(".library button").count() == 1
+    tab.until("document.querySelector('#looks img').naturalWidth > 0")
+    before = tab.state()
+    tab.page.click("#looks button")
+    tab.until("flarewright.state.undo === 'Put on a look'")
+    worn = tab.state()
+    assert worn["lights"][0]["field_deg"] == before["lights"][0]["field_deg"]
+    assert worn["lights"][0]["spectrum"] != before["lights"][0]["spectrum"]
+    text = download(tab, "Look", tmp_path / "again.look.toml").read_bytes()
+    assert b"cleanliness_level = 450.0" in text
+    tab.page.click("#undo")
+    tab.until("flarewright.state.redo === 'Put on a look'")
+    drop(tab, "again.look.toml", text)
+    tab.until("flarewright.state.undo?.startsWith('Look ')")
+    assert tab.state()["lights"][0]["spectrum"] == worn["lights"][0]["spectrum"]
+
+
 def test_the_library_and_the_keys(tab):
     tab.tab("library")
     tab.until("document.querySelectorAll('.library button').length > 10")
