@@ -57,9 +57,9 @@ ERA = {
 """By the year of the patent or, where the maker is known to have changed it, of the lens as sold."""
 
 ROLL = {
-    "angenieux-50-f1.1": 5, "canon-28-80": 7, "canon-70-200": 1, "double-gauss-tronnier": 3, "fisheye-nikkor-10.5": 2,
+    "angenieux-50-f1.1": 5, "canon-28-80": 7, "canon-70-200": 1, "double-gauss-tronnier": 3, "fisheye-nikkor-10.5": 1,
     "flektogon-35": 3, "heliar-tronnier": 6, "nikkor-180-ed": 6, "nikkor-85-f1.4": 2, "nikon-28-75": 2,
-    "petzval-kodak": 4, "takumar-50-f1.4": 7, "tessar-brendel": 1,
+    "petzval-kodak": 7, "takumar-50-f1.4": 7, "tessar-brendel": 1,
 }  # fmt: skip
 """Which of several rolls of the dice a lens has: the one of eight that was liked best, by eye."""
 

@@ -6,7 +6,7 @@ import pytest
 
 from flarewright.cli.app import run
 from flarewright.model import AsLens, Bare, BlackBody, Everywhere, Layer, Preset, QuarterWave, Standard
-from flarewright.render.photographed import LIGHT_DEG, ROUGHNESS_UM, ROUNDING
+from flarewright.render.photographed import LIGHT_DEG, ROUGHNESS_LENGTH_UM, ROUGHNESS_UM, ROUNDING
 from flarewright.render.prepare import load_lens
 
 
@@ -39,7 +39,7 @@ def test_a_lens_of_the_library_is_as_photographed(projects, capsys):
     assert project.f_number == 4.0
     assert project.coating == Preset(name="period")
     assert project.iris.rounding == ROUNDING
-    assert project.iris.roughness_um == ROUGHNESS_UM
+    assert (project.iris.roughness_um, project.iris.roughness_length_um) == (ROUGHNESS_UM, ROUGHNESS_LENGTH_UM)
     assert project.iris.blades == load_lens("takumar-50-f1.4").iris.blades
     assert project.lights[0].diameter_deg == LIGHT_DEG
     told = capsys.readouterr().err

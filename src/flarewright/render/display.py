@@ -35,7 +35,7 @@ _PERCENTILE = 99.5
 _TARGET = 0.9
 # unless more of the whole picture than this would burn out, which spikes and scattered light do together with the core
 # of a star,
-_BURNT_OUT = 2.5
+_BURNT_OUT = 1.5
 # or a veil over all of it, its median, would come out brighter than this.
 _BRIGHTEST_VEIL = 0.03
 _DARKEST = 1e-30

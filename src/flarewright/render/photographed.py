@@ -19,13 +19,17 @@ STOPPED = 4.0
 THIRDS = (4.0, 4.5, 5.0, 5.6, 6.3, 7.1, 8.0, 9.0, 10.0, 11.0, 13.0, 14.0, 16.0, 18.0, 20.0, 22.0)
 """F-numbers engraved in thirds of a stop."""
 
-ROUNDING = 0.3
-ROUGHNESS_UM = 3.0
-"""Rms of the blades' edges: cut steel is true to some micrometres."""
+ROUNDING = 0.2
+ROUGHNESS_UM, ROUGHNESS_LENGTH_UM = 5.0, 25.0
+"""Rms of the blades' edges and how far along it hangs together: cut steel is true to some micrometres. Without it the
+fans of light that rounded blades make have hard borders, and widen; with it spikes taper and the core is round."""
 
 LIGHT_DEG = 0.25
 
-__all__ = ["LIGHT_DEG", "ROUGHNESS_UM", "ROUNDING", "as_photographed", "plausible_preset", "stopped_down"]
+__all__ = [
+    "LIGHT_DEG", "ROUGHNESS_LENGTH_UM", "ROUGHNESS_UM", "ROUNDING", "as_photographed", "plausible_preset",
+    "stopped_down",
+]  # fmt: skip
 
 
 def as_photographed(project: Project, said: AbstractSet[str] = frozenset()) -> tuple[Project, tuple[str, ...]]:
@@ -68,7 +72,7 @@ def as_photographed(project: Project, said: AbstractSet[str] = frozenset()) -> t
         worn = {"rounding": ROUNDING}
         told.append(f"blades rounded by {ROUNDING:g}")
         if "iris.roughness_um" not in said and iris.roughness_um == 0.0:
-            worn["roughness_um"] = ROUGHNESS_UM
+            worn |= {"roughness_um": ROUGHNESS_UM, "roughness_length_um": ROUGHNESS_LENGTH_UM}
             told.append(f"edges rough by {ROUGHNESS_UM:g} um")
         changes["iris"] = iris.replace(**worn)
     if "lights" not in said and all(_point(light) for light in project.lights):
