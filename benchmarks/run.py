@@ -55,10 +55,11 @@ from flarewright.optics.paraxial import first_order
 from flarewright.optics.paths import direct_path, ghost_paths
 from flarewright.optics.region import find_region, front_box
 from flarewright.render.montecarlo import HEROES, ray_source, run_batch
+from flarewright.render.opening import make_opening
 from flarewright.render.prepare import build, load_lens, settle
 from flarewright.render.reference import spectral_shots
 from flarewright.render.render import render
-from flarewright.render.shot import make_opening, make_shots
+from flarewright.render.shots import make_shots
 
 PARTS = (
     "yardsticks", "trace", "raster", "frame", "passes", "art", "built", "lights", "area", "surfaces", "scatter",

@@ -12,8 +12,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.optimize import minimize
 
+from flarewright.optics.cie1931 import cie_1931
 from flarewright.optics.coatings import stack_reflectance
-from flarewright.optics.spectrum import cie_1931
 from flarewright.optics.standard_coatings import BROADBAND_GLASS, BROADBAND_INDICES
 
 WAVELENGTHS_NM = np.linspace(420.0, 680.0, 66)[:, None]

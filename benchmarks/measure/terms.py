@@ -26,8 +26,9 @@ from synthetic_camera import Setup, poses
 
 from flarewright.measure.numbers import field, ten_terms
 from flarewright.optics.paths import ghost_paths
+from flarewright.render.opening import make_opening
 from flarewright.render.prepare import settle
-from flarewright.render.shot import make_opening, make_shots
+from flarewright.render.shots import make_shots
 
 Floats = NDArray[np.float64]
 

@@ -13,8 +13,10 @@ from flarewright.kernels.trace import ALIVE, REL, STOP_X, WEIGHT, X, Y
 from flarewright.optics.bundle import trace_points
 from flarewright.optics.paths import LightPath, ghost_paths
 from flarewright.optics.region import find_region
+from flarewright.render.opening import make_opening
 from flarewright.render.prepare import settle
-from flarewright.render.shot import Shot, make_opening, make_shots
+from flarewright.render.shot import Shot
+from flarewright.render.shots import make_shots
 
 sys.path.append(str(Path(__file__).parents[2] / "tests" / "measure"))
 

@@ -9,6 +9,7 @@ from flarewright.editor.files import export_picture, ghost_csv, imported, lens_t
 from flarewright.editor.hand import Hand
 from flarewright.editor.screen import Screen
 from flarewright.editor.session import begin
+from flarewright.editor.sharpening import sharpen
 from flarewright.editor.snapshot import ghosts_of, state_of
 from flarewright.editor.solving import Seeing, Solver
 from flarewright.editor.viewing import outline_png, picked
@@ -48,7 +49,7 @@ def path(tmp_path):
 @pytest.fixture
 def screen(path, screen_size):
     session, _ = begin(path)
-    screen = Screen(session)
+    screen = Screen(session, sharpen)
     screen.start()
     assert screen.wait(60.0)
     return screen

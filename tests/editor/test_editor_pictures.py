@@ -12,8 +12,8 @@ import pytest
 from PIL import Image
 from sample import plain_lens
 
+from flarewright.editor import draft_match, studio
 from flarewright.editor import ladder as ladder_module
-from flarewright.editor import studio
 from flarewright.editor.drawings import section
 from flarewright.editor.edit_shot import move_light
 from flarewright.editor.edit_wishes import target_project
@@ -24,6 +24,7 @@ from flarewright.editor.pictures import in_short
 from flarewright.editor.screen import Screen, packed, pixels_of_picture, shown_pixels
 from flarewright.editor.seen import Seen, SeenGhost, alone, is_there, outline, see, under
 from flarewright.editor.session import begin
+from flarewright.editor.sharpening import sharpen
 from flarewright.editor.shown import FALSE_COLOURS, jpeg, pixels_of, plate_for
 from flarewright.editor.snapshot import ghosts_of
 from flarewright.editor.view import View
@@ -145,7 +146,7 @@ def test_who_points_means_what_is_there(shot):
     """With a ghost alone, a click chose another one that was not to be seen."""
     session, _ = begin(None)
     session.put(shot, "Open")
-    screen = Screen(session)
+    screen = Screen(session, sharpen)
     screen.start()
     assert screen.wait(60.0)
     place = screen.seen.ghosts[0].centre
@@ -173,13 +174,13 @@ def test_who_points_means_what_is_there(shot):
 def test_drafts_are_as_bright_as_final_pictures(shot):
     look = View()
     draft, final = (studio.take(shot, grade, look) for grade in ("draft", "final"))
-    match = studio.matched(draft, final, studio.Match())
+    match = draft_match.matched(draft, final, draft_match.Match())
     shown = [studio.ghosts_of(picture, match).mean(axis=(0, 1), dtype=float) for picture in (draft, final)]
     assert shown[0] == pytest.approx(shown[1], rel=1e-4)
     # and stay so, everywhere in the picture, while the hand goes on
     lit = [{g.name: g.flux for g in see(shot, grade).ghosts} for grade in ("draft", "final")]
-    levels = studio.levels_of(*lit)
-    match = studio.matched(studio.take(shot, "draft", look, levels=levels), final, match)
+    levels = draft_match.levels_of(*lit)
+    match = draft_match.matched(studio.take(shot, "draft", look, levels=levels), final, match)
     moved = shot.replace(lights=(Light(field_deg=(6.5, 3.2)),))
     moving = studio.ghosts_of(studio.take(moved, "moving", look, scale=0.5, levels=levels), match)
     resting = studio.take(moved, "final", look, scale=0.5).ghosts
@@ -188,16 +189,16 @@ def test_drafts_are_as_bright_as_final_pictures(shot):
     assert np.abs(np.log2(blocks[0] / blocks[1])).max() < 0.5
     assert np.abs(np.log2(blocks[0] / blocks[1])).mean() < 0.15
     # pictures of other shots tell nothing
-    assert studio.matched(studio.take(moved, "draft", look), final, match) is match
+    assert draft_match.matched(studio.take(moved, "draft", look), final, match) is match
 
 
 def test_drafts_are_as_bright_wherever_a_hand_takes_the_light(shot, monkeypatch):
     """After jumps of 20 degrees they had been up to a stop off until the hand rested."""
     look, far = View(), 0.0
     seen = [{g.name: g.flux for g in see(shot, grade).ghosts} for grade in ("draft", "final")]
-    levels = studio.levels_of(*seen)
+    levels = draft_match.levels_of(*seen)
     draft, final = studio.take(shot, "draft", look, levels=levels), studio.take(shot, "final", look)
-    old = studio.matched(draft, final, studio.Match(), levels)
+    old = draft_match.matched(draft, final, draft_match.Match(), levels)
     # a small screen learns at every second angle as far as the light goes here
     if studio.WIDEST < 960:
         monkeypatch.setattr(ladder_module, "ANGLES_DEG", (0.0, 10.0, 20.0, 30.0, 40.0))
@@ -238,7 +239,7 @@ def test_a_screen_learns_of_other_places_while_it_rests(monkeypatch):
     if studio.WIDEST < 960:
         monkeypatch.setattr(ladder_module, "ANGLES_DEG", (0.0, 20.0, 40.0))
     session, _ = begin(None)
-    screen = Screen(session)
+    screen = Screen(session, sharpen)
     screen.start()
     assert screen.wait(60.0)
     ladder = screen.match.ladder
@@ -256,9 +257,10 @@ def test_a_screen_learns_of_other_places_while_it_rests(monkeypatch):
 
 def test_levels_are_the_ratio_of_each_ghost():
     drafted = {"2-1": 1.0, "3-1": 4.0, "4-1": 1.0, "3-2": 1.0, "5-1": 0.0}
-    levels = studio.levels_of(drafted, {"2-1": 1.0, "3-1": 2.0, "4-1": 1.2})
+    levels = draft_match.levels_of(drafted, {"2-1": 1.0, "3-1": 2.0, "4-1": 1.2})
     found = {name: gain for gain, names in levels for name in names}
-    assert found == {"3-1": pytest.approx(0.5), "4-1": pytest.approx(studio.STEP), "3-2": pytest.approx(studio.LEAST)}
+    expected = {"3-1": 0.5, "4-1": draft_match.STEP, "3-2": draft_match.LEAST}
+    assert found == pytest.approx(expected)
 
 
 @pytest.mark.usefixtures("screen_size")
@@ -397,7 +399,7 @@ def test_aces_agrees_with_opencolorio():
 @pytest.mark.usefixtures("screen_size")
 def test_the_screen_keeps_the_last_good_picture():
     session, _ = begin(None)
-    screen = Screen(session)
+    screen = Screen(session, sharpen)
     screen.start()
     assert screen.wait(60.0)
     good = screen.picture
@@ -420,7 +422,7 @@ def test_a_picture_that_is_gone_is_named_as_a_person_does(project, tmp_path):
     folder = tmp_path / "shot"
     (folder / "masks").mkdir(parents=True)
     session, _ = begin(None)
-    screen = Screen(session)
+    screen = Screen(session, sharpen)
     cases = {
         folder
         / "masks"
@@ -497,7 +499,7 @@ def test_a_zoom_that_is_final_for_the_screen_can_hardly_be_told_from_the_full_pi
 @pytest.mark.usefixtures("screen_size")
 def test_a_slow_picture_is_traced_for_the_screen_first():
     session, _ = begin(None)
-    screen = Screen(session)
+    screen = Screen(session, sharpen)
     grades = []
     show = screen.show
 
@@ -537,7 +539,7 @@ def test_a_slow_picture_is_traced_for_the_screen_first():
 def test_what_would_be_late_is_traced_for_the_screen_in_haste(monkeypatch):
     session, _ = begin(None)
     session.put(session.project.replace(quality=Quality(wavelengths=3)), "Rings")
-    screen = Screen(session)
+    screen = Screen(session, sharpen)
     screen.start()
     assert screen.wait(60.0)
     # the first of all says nothing of the next: it also loads what draws it
@@ -572,7 +574,7 @@ def test_the_target_follows_a_hand_and_is_that_of_its_place(monkeypatch, request
     session.put(session.project.replace(output=Output()), "Starburst")
     session.do("set_wish", {"ghost": "4-1", "values": {"move_mm": 3.0, "height": 0.5}})
     session.do("add_ghost", {"place_mm": -6.0, "radius_mm": 2.0})
-    screen = Screen(session)
+    screen = Screen(session, sharpen)
     screen.start()
     assert screen.wait(60.0)
     # so large that codec and starburst change little when the hand's picture is half as wide
@@ -600,7 +602,7 @@ def test_the_target_follows_a_hand_and_is_that_of_its_place(monkeypatch, request
 def test_the_target_is_as_bright_as_the_picture_and_from_scratch_has_new_ghosts_alone(screen_size):
     session, _ = begin(None)
     session.do("choose_lens", {"lens": "flektogon-35"})
-    screen = Screen(session)
+    screen = Screen(session, sharpen)
     screen.start()
     assert screen.wait(60.0)
 
@@ -621,7 +623,7 @@ def test_the_target_is_as_bright_as_the_picture_and_from_scratch_has_new_ghosts_
 @pytest.mark.usefixtures("screen_size")
 def test_a_hand_is_followed_and_let_go():
     session, _ = begin(None)
-    screen = Screen(session)
+    screen = Screen(session, sharpen)
     screen.start()
     screen.wait(60.0)
     before, exposure = screen.picture, screen.exposure_stops
@@ -657,7 +659,7 @@ def test_a_hand_is_followed_and_let_go():
 @pytest.mark.usefixtures("screen_size")
 def test_a_hand_whose_pictures_are_late_sees_smaller_ones():
     session, _ = begin(None)
-    hand = Hand(Screen(session))
+    hand = Hand(Screen(session, sharpen))
 
     def scale_after(*seconds):
         for each in seconds:
@@ -680,7 +682,7 @@ def test_what_takes_long_tells_how_far_it_is(monkeypatch):
     monkeypatch.setattr("flarewright.editor.sharpening.WAIT_S", 0.0)
     monkeypatch.setattr("flarewright.editor.sharpening.TELL_S", 0.0)
     session, _ = begin(None)
-    screen = Screen(session)
+    screen = Screen(session, sharpen)
     told = []
     session.listeners.append(lambda event: told.append(event) if event["type"] == "progress" else None)
     # nowhere else in these tests, so that it is drawn here
@@ -695,7 +697,7 @@ def test_what_takes_long_tells_how_far_it_is(monkeypatch):
 @pytest.mark.usefixtures("screen_size")
 def test_what_a_hand_holds_still_is_drawn_in_full():
     session, _ = begin(None)
-    screen = Screen(session)
+    screen = Screen(session, sharpen)
     screen.start()
     assert screen.wait(60.0)
     drawn = []
@@ -759,7 +761,7 @@ def test_what_a_hand_holds_still_is_drawn_in_full():
 @pytest.mark.usefixtures("screen_size")
 def test_a_view_that_changes_while_a_picture_is_packed_is_shown(monkeypatch):
     session, _ = begin(None)
-    screen = Screen(session)
+    screen = Screen(session, sharpen)
     screen.start()
     assert screen.wait(60.0)
     encode = [jpeg]
@@ -795,7 +797,7 @@ def test_grey_is_seen_at_the_exposure_of_the_lens(screen_size):
     """Films may leave a ten thousandth of what grey surfaces reflect: it was white all over."""
     session, _ = begin("flektogon-35")
     session.put(screen_size(session.project), "Open")
-    screen = Screen(session)
+    screen = Screen(session, sharpen)
     screen.start()
     assert screen.wait(60.0)
     plain, stops = screen.picture, screen.exposure_stops
@@ -851,7 +853,7 @@ def test_rounding_draws_no_border_beside_a_ghost():
 def test_a_black_picture_sets_no_exposure(shot):
     """An exposure of 0 was found, which left everything black when the light came back."""
     session, _ = begin(None)
-    screen = Screen(session)
+    screen = Screen(session, sharpen)
     session.put(shot.replace(f_number=16.0, lights=(Light(field_deg=(-80.0, 0.0)),)), "Begin in the dark")
     assert screen.wait(60.0)
     # nothing was found that could be kept for the next time
@@ -878,7 +880,7 @@ def test_a_black_picture_sets_no_exposure(shot):
 def test_undo_leads_back_to_the_exposure_of_the_lens_before():
     """It was found anew for where the light stands now, so brightness could not be compared."""
     session, _ = begin(None)
-    screen = Screen(session)
+    screen = Screen(session, sharpen)
     screen.start()
     assert screen.wait(60.0)
     session.do("move_light", {"light": 0, "x": 1.0, "y": 0.5})
@@ -921,7 +923,7 @@ def test_a_picture_that_rests_is_as_large_as_the_page_shows_it():
     session, _ = begin(None)
     # with a starburst, which a hand moves along with the light
     session.put(session.project.replace(output=Output()), "Starburst")
-    screen = Screen(session)
+    screen = Screen(session, sharpen)
     grades = []
     show = screen.show
     screen.show = lambda picture: (grades.append(picture.grade), show(picture))
@@ -966,7 +968,7 @@ def test_a_picture_that_rests_is_as_large_as_the_page_shows_it():
 @pytest.mark.usefixtures("screen_size")
 def test_a_page_fetches_what_is_final_for_the_screen_before_the_next_picture_is_begun(monkeypatch):
     session, _ = begin(None)
-    screen = Screen(session)
+    screen = Screen(session, sharpen)
     screen.start()
     assert screen.wait(60.0)
     begun = []

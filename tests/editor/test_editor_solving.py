@@ -12,7 +12,7 @@ from PIL import Image
 
 from flarewright.design.color_search import solve_colors
 from flarewright.design.colors import color_problem, own_colors, perceived_differences
-from flarewright.editor import solving, studio
+from flarewright.editor import draft_match, solving, studio
 from flarewright.editor.shown import pixels_of
 from flarewright.editor.solving import Seeing, Solver
 from flarewright.editor.view import View
@@ -224,7 +224,7 @@ def test_coatings_are_shown_as_they_will_be_once_they_are_taken(project, chosen,
     shown = np.asarray(Image.open(io.BytesIO(found.picture)), dtype=float)
 
     def off(other):
-        pixels = pixels_of(studio.light_of(other, studio.Match()), chosen or 7.0, View(look=look))
+        pixels = pixels_of(studio.light_of(other, draft_match.Match()), chosen or 7.0, View(look=look))
         return np.abs(shown - pixels).mean()
 
     assert off(picture) < 1.5

@@ -18,8 +18,10 @@ from flarewright.optics.region import find_region, front_box, tracing_arguments
 from flarewright.render.art import PLAIN
 from flarewright.render.canvas import blank, merge
 from flarewright.render.ghosts_final import draw_final, find_entry, find_final
+from flarewright.render.opening import make_opening
 from flarewright.render.prepare import load_lens, settle
-from flarewright.render.shot import Shot, make_opening, make_shots
+from flarewright.render.shot import Shot
+from flarewright.render.shots import make_shots
 
 
 def shot_of(lens: str, field_deg, f_number: float, wavelengths: int = 3) -> Shot:

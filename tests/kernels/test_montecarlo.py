@@ -10,8 +10,9 @@ from flarewright.kernels._jit import for_python
 from flarewright.kernels.montecarlo import AT_BARREL, AT_STOP, ENTERED, IN_PICTURE, LOST, RETURNED, TALLIES
 from flarewright.model import Camera, Light, Lines, Project
 from flarewright.render.montecarlo import BALANCE, Sums, ray_source, run_batch
+from flarewright.render.opening import make_opening
 from flarewright.render.prepare import load_lens, settle
-from flarewright.render.shot import make_opening, make_shots
+from flarewright.render.shots import make_shots
 
 philox = for_python(counted.philox)
 refill = for_python(counted.refill)

@@ -32,8 +32,9 @@ import flarewright as fw
 from flarewright.model.capture import FrameInfo, MergedFrame
 from flarewright.optics.color import xyz_to_rgb_matrix
 from flarewright.render.direct import direct_image
+from flarewright.render.opening import make_opening
 from flarewright.render.prepare import settle
-from flarewright.render.shot import make_opening, make_shots
+from flarewright.render.shots import make_shots
 
 Floats = NDArray[np.float64]
 Pixels = NDArray[np.float32]

@@ -20,8 +20,9 @@ from synthetic_camera import (
 )
 
 from flarewright.render.direct import direct_image
+from flarewright.render.opening import make_opening
 from flarewright.render.prepare import settle
-from flarewright.render.shot import make_opening, make_shots
+from flarewright.render.shots import make_shots
 
 SMALL = Setup(size_px=(90, 60), angles_deg=(0.0, 6.0, 12.0), sensor_width_mm=36.0, axis_offset_px=(1, -1))
 

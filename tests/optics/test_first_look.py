@@ -9,8 +9,9 @@ from flarewright.optics.bundle import trace_points
 from flarewright.optics.paths import ghost_paths, together
 from flarewright.optics.region import cells_across, find_region, first_look, front_box
 from flarewright.render.looking import TOGETHER, kindred
+from flarewright.render.opening import make_opening
 from flarewright.render.prepare import settle
-from flarewright.render.shot import make_opening, make_shots
+from flarewright.render.shots import make_shots
 
 
 @pytest.fixture(scope="module")

@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 
 from flarewright.model import D65, Bare, Everywhere, Film, InTurn, QuarterWave, Standard
+from flarewright.optics.cie1931 import cie_1931
 from flarewright.optics.coating_response import BAND_NM, coating_response
 from flarewright.optics.coatings import film_stack, stack_reflectance, stack_reflectance_transmittance
 from flarewright.optics.pack import resolve_coatings
-from flarewright.optics.spectrum import cie_1931, spectral_power
+from flarewright.optics.spectrum import spectral_power
 from flarewright.optics.standard_coatings import BROADBAND_GLASS, STANDARD_COATINGS, standard_films
 from flarewright.render.prepare import load_lens
 

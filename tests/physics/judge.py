@@ -17,9 +17,10 @@ from flarewright.kernels.montecarlo import BESIDE, IN_PICTURE
 from flarewright.model import Project
 from flarewright.optics.color import luminance_weights
 from flarewright.render.montecarlo import BLOCK, FOLLOWED, Sums, ray_source, run_batch
+from flarewright.render.opening import make_opening
 from flarewright.render.prepare import settle
 from flarewright.render.render import Rendering, render
-from flarewright.render.shot import make_opening, make_shots
+from flarewright.render.shots import make_shots
 
 STATED, STATED_DARK = 2e-3, 1e-4
 

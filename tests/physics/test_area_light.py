@@ -13,9 +13,10 @@ from flarewright.optics.border import closed, points
 from flarewright.optics.color import luminance_weights
 from flarewright.optics.source import outline, parts
 from flarewright.render.ghosts_draft import spread_light
+from flarewright.render.opening import make_opening
 from flarewright.render.prepare import settle
 from flarewright.render.render import render
-from flarewright.render.shot import make_opening, make_shots
+from flarewright.render.shots import make_shots
 from flarewright.render.sources import spread_border
 from flarewright.render.spread import covered, shape_kernel, spread, spread_within
 

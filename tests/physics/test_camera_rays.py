@@ -12,11 +12,12 @@ from flarewright.optics.border import closed, solid_angle
 from flarewright.optics.color import luminance_weights
 from flarewright.render import camera_rays, montecarlo, reference
 from flarewright.render.montecarlo import Sums, ray_source, run_batch, spectrum_of
+from flarewright.render.opening import make_opening
 from flarewright.render.prepare import settle
 from flarewright.render.reference import ReferenceRun
 from flarewright.render.reference_rays import reference_rays
 from flarewright.render.render import render
-from flarewright.render.shot import make_opening, make_shots
+from flarewright.render.shots import make_shots
 
 D_LINE = Lines(lines=((587.56, 1.0),))
 SIZE = (96, 64)

@@ -26,7 +26,8 @@ from flarewright.model import (
     QuarterWave,
     Standard,
 )
-from flarewright.optics.spectrum import VISIBLE_NM, cie_1931, spectral_power
+from flarewright.optics.cie1931 import cie_1931
+from flarewright.optics.spectrum import VISIBLE_NM, spectral_power
 from flarewright.render.render import render
 
 LINES_NM = np.linspace(*VISIBLE_NM, 61)

@@ -14,10 +14,11 @@ from flarewright.optics.border import brightness, centroid, closed, content, map
 from flarewright.optics.color import luminance_weights
 from flarewright.optics.holdout import behind, hidden_at
 from flarewright.render import ledger, montecarlo, reference
+from flarewright.render.opening import make_opening
 from flarewright.render.prepare import settle
 from flarewright.render.reference import ReferenceRun
 from flarewright.render.render import BLACK, HIDDEN, render
-from flarewright.render.shot import make_opening, make_shots
+from flarewright.render.shots import make_shots
 from flarewright.render.spread import covered
 
 D_LINE = Lines(lines=((587.56, 1.0),))

@@ -19,9 +19,10 @@ from flarewright.optics.region import front_box
 from flarewright.render.analysis import ghosts
 from flarewright.render.direct import defocus_mm, direct_image, traced_spot
 from flarewright.render.ledger import trace_ledger
+from flarewright.render.opening import make_opening
 from flarewright.render.prepare import settle
 from flarewright.render.render import render
-from flarewright.render.shot import make_opening, make_shots
+from flarewright.render.shots import make_shots
 
 D_LINE = Lines(lines=((587.56, 1.0),))
 

@@ -10,9 +10,10 @@ from scipy import stats
 from flarewright.kernels.montecarlo import IN_PICTURE
 from flarewright.model import Camera, Everywhere, Iris, Light, Lines, Output, Project, Quality, QuarterWave, Surface
 from flarewright.render.montecarlo import ray_source, run_batch
+from flarewright.render.opening import make_opening
 from flarewright.render.prepare import load_lens, settle
 from flarewright.render.render import render
-from flarewright.render.shot import make_opening, make_shots
+from flarewright.render.shots import make_shots
 
 D_LINE = Lines(lines=((587.56, 1.0),))
 

@@ -23,9 +23,10 @@ from flarewright.optics.color import luminance_weights
 from flarewright.render.direct import direct_image
 from flarewright.render.ledger import ledger_of
 from flarewright.render.montecarlo import Sums, ray_source, run_batch
+from flarewright.render.opening import make_opening
 from flarewright.render.prepare import complete_lens, settle
 from flarewright.render.scatter import render_scatter, scatter_of
-from flarewright.render.shot import make_opening, make_shots
+from flarewright.render.shots import make_shots
 
 NM, SIZE, BATCHES, MANY = 550.0, (96, 64), 16, 20_000
 # what the pass states for itself (docs/scatter.md), of a block's flux

@@ -6,8 +6,9 @@ import pytest
 from flarewright.errors import FlarewrightError
 from flarewright.model import D65, BlackBody, Camera, Everywhere, Light, Lines, Output, Project, Quality, QuarterWave
 from flarewright.model.light import Tabulated
+from flarewright.optics.cie1931 import cie_1931
 from flarewright.optics.color import luminance_weights
-from flarewright.optics.spectrum import band_weights, cie_1931, spectral_power
+from flarewright.optics.spectrum import band_weights, spectral_power
 from flarewright.predict.lens_flare import luminous, statistics_quality
 from flarewright.predict.wavelengths import luminous_lines
 from flarewright.render.render import render

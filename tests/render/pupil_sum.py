@@ -14,9 +14,11 @@ from flarewright.optics.bundle import trace_points
 from flarewright.optics.iris import transmission
 from flarewright.optics.paths import LightPath, direct_path, ghost_path
 from flarewright.optics.region import front_box
+from flarewright.render.opening import make_opening
 from flarewright.render.prepare import settle
 from flarewright.render.render import Rendering, render
-from flarewright.render.shot import Shot, make_opening, make_shots
+from flarewright.render.shot import Shot
+from flarewright.render.shots import make_shots
 
 D_LINE = Lines(lines=((587.56, 1.0),))
 

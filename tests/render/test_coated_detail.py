@@ -14,9 +14,10 @@ import pytest
 from flarewright.model import Light, Project
 from flarewright.model.coating import QuarterWave
 from flarewright.model.project import Everywhere
+from flarewright.render.opening import make_opening
 from flarewright.render.prepare import load_lens, settle
 from flarewright.render.render import render
-from flarewright.render.shot import make_opening, make_shots
+from flarewright.render.shots import make_shots
 
 ZOOM = ("canon-28-80", (320, 180), {"wavelengths": 7})
 """351 ghosts, most of them faint."""

@@ -8,9 +8,10 @@ from flarewright.model import Art, Camera, Light, Output, Project, Quality, Rule
 from flarewright.optics.color import luminance_weights
 from flarewright.optics.paths import ghost_paths
 from flarewright.render import ghosts, ghosts_draft
+from flarewright.render.opening import make_opening
 from flarewright.render.prepare import settle
 from flarewright.render.render import render
-from flarewright.render.shot import make_opening, make_shots
+from flarewright.render.shots import make_shots
 
 CANON = Project(
     lens="canon-28-80",

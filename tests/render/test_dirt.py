@@ -15,9 +15,10 @@ from flarewright.optics.dirt import FIELD, RAGGED, Elements, lay_elements, raste
 from flarewright.optics.pupil import FFT_SIZE, WINDOW, pupil_amplitude
 from flarewright.render import starburst_pass
 from flarewright.render.direct import PUPIL_SPAN, direct_image, traced_pupil
+from flarewright.render.opening import make_opening
 from flarewright.render.prepare import settle
 from flarewright.render.render import render
-from flarewright.render.shot import make_opening, make_shots
+from flarewright.render.shots import make_shots
 from flarewright.render.spread import shape_kernel, spread
 from flarewright.render.starburst import starburst_layer
 

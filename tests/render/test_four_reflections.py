@@ -14,9 +14,10 @@ from flarewright.model import Art, Camera, Rule
 from flarewright.optics.paths import four_path
 from flarewright.render import four_reflections
 from flarewright.render.four_reflections import find_fours
+from flarewright.render.opening import make_opening
 from flarewright.render.prepare import load_lens, settle
 from flarewright.render.render import render
-from flarewright.render.shot import make_opening, make_shots
+from flarewright.render.shots import make_shots
 
 SIZE = (96, 64)
 

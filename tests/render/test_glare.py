@@ -31,9 +31,10 @@ from flarewright.optics.paths import direct_path, ghost_paths
 from flarewright.render import glare
 from flarewright.render.glare import veiling_glare
 from flarewright.render.montecarlo import Sums, ray_source, run_batch
+from flarewright.render.opening import make_opening
 from flarewright.render.prepare import complete_lens, first_order, load_lens, settle
 from flarewright.render.render import render
-from flarewright.render.shot import make_opening, make_shots
+from flarewright.render.shots import make_shots
 
 NM = 587.56
 ANYWHERE = (Light(field_deg=(0.0, 0.0)),)

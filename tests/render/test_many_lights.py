@@ -34,10 +34,11 @@ from flarewright.render.few_colors import gathered_weights
 from flarewright.render.few_spectra import few_spectra
 from flarewright.render.ghosts_final import find_final
 from flarewright.render.many_stars import Stars, draw_stars
+from flarewright.render.opening import make_opening
 from flarewright.render.path_color import seen_of
 from flarewright.render.prepare import settle
 from flarewright.render.render import render
-from flarewright.render.shot import make_opening, make_shots
+from flarewright.render.shots import make_shots
 from flarewright.render.starburst import starburst_layer
 
 SIZE = (240, 160)

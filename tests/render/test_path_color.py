@@ -12,9 +12,10 @@ from flarewright.optics.paraxial import first_order
 from flarewright.optics.paths import direct_path, ghost_path
 from flarewright.render.canvas import blank, merge
 from flarewright.render.ghosts_final import _between, draw_final, find_final
+from flarewright.render.opening import make_opening
 from flarewright.render.path_color import direct_flux, direct_spectrum, seen_of, spread_rays, traced_spectrum
 from flarewright.render.prepare import load_lens, settle
-from flarewright.render.shot import make_opening, make_shots
+from flarewright.render.shots import make_shots
 
 FILM = Everywhere(coating=QuarterWave(center_wavelength_nm=550.0))
 SIZE = (160, 90)

@@ -13,10 +13,11 @@ from flarewright.model import BlackBody, Camera, Imperfection, Iris, Light, Outp
 from flarewright.optics.color import luminance_weights
 from flarewright.render import ledger as ledger_pass
 from flarewright.render import reference as reference_pass
+from flarewright.render.opening import make_opening
 from flarewright.render.prepare import load_lens, settle
 from flarewright.render.reference import FEWEST, ReferenceRun
 from flarewright.render.render import render
-from flarewright.render.shot import make_opening, make_shots
+from flarewright.render.shots import make_shots
 
 SIDE = 32
 BATCH = SIDE * SIDE

@@ -14,10 +14,11 @@ from flarewright.optics.paths import ghost_paths
 from flarewright.render import ripples
 from flarewright.render.canvas import blank, merge
 from flarewright.render.ghosts_final import draw_final, find_final
+from flarewright.render.opening import make_opening
 from flarewright.render.prepare import settle
 from flarewright.render.render import render
 from flarewright.render.ripples import narrowest
-from flarewright.render.shot import make_opening, make_shots
+from flarewright.render.shots import make_shots
 from flarewright.render.surroundings import COARSE, sketch
 
 LUMINANCE = (0.2126, 0.7152, 0.0722)

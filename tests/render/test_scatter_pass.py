@@ -20,10 +20,11 @@ from flarewright.model import (
 from flarewright.optics.color import luminance_weights
 from flarewright.render import ledger, scatter
 from flarewright.render.direct import direct_image
+from flarewright.render.opening import make_opening
 from flarewright.render.prepare import load_lens, settle
 from flarewright.render.render import render
 from flarewright.render.scatter import chosen_scatter, gather, render_scatter, scatter_of
-from flarewright.render.shot import make_opening, make_shots
+from flarewright.render.shots import make_shots
 
 GREEN = Lines(lines=((550.0, 1.0),))
 POLISH = Scatter(model="harvey-shack", roughness_nm=2.0)

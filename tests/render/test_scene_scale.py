@@ -9,9 +9,10 @@ from flarewright.kernels.trace import ALIVE, REL, WEIGHT
 from flarewright.model import Bare, Camera, Everywhere, Light, Output, Project, Quality
 from flarewright.optics.bundle import trace_points
 from flarewright.optics.paths import direct_path
+from flarewright.render.opening import make_opening
 from flarewright.render.prepare import settle
 from flarewright.render.render import render
-from flarewright.render.shot import make_opening, make_shots
+from flarewright.render.shots import make_shots
 
 
 @pytest.mark.parametrize("name", ["heliar-tronnier", "nikkor-180-ed"])

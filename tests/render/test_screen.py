@@ -10,9 +10,10 @@ from flarewright.optics.bundle import trace_bundle, trace_grid
 from flarewright.optics.paths import ghost_paths
 from flarewright.render.display import auto_exposure, view
 from flarewright.render.ghosts_final import find_final
+from flarewright.render.opening import make_opening
 from flarewright.render.prepare import settle
 from flarewright.render.render import render
-from flarewright.render.shot import make_opening, make_shots
+from flarewright.render.shots import make_shots
 
 
 @pytest.mark.parametrize("lens", ["tessar-brendel", pytest.param("nikkor-85-f1.4", marks=pytest.mark.slow)])

@@ -17,7 +17,7 @@ from ..model import Art, Project, Rule
 from ..model.art import PASSES
 
 if TYPE_CHECKING:
-    from .render_flags import Flags
+    from .flag_set import Flags
 
 
 def art_flags(flags: Flags, base: Art) -> dict[str, Any] | None:

@@ -11,7 +11,8 @@ from ..io.project_file import read_project
 from ..model import Light, Project
 from ..render.looks import look_says, with_look
 from ..render.photographed import as_photographed
-from .render_flags import Flags, light_of
+from .flag_set import Flags
+from .render_flags import light_of
 
 __all__ = ["put_look", "said_by"]
 

@@ -11,9 +11,10 @@ import typer
 
 from ..errors import ProjectError
 from .common import check_place, console, pair, print_json, progress_bar, remembered, tell, write_text
-from .predict_flares import SHOWN_PX, lens_flares
+from .predict_flares import lens_flares
 from .predict_measured import Counting, model_flares
 from .predict_scene import SceneWishes, is_scene, predict_scene
+from .predict_sizes import SHOWN_PX
 
 if TYPE_CHECKING:
     from ..model import Project

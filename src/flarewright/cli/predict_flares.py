@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from ..errors import ProjectError
+from .predict_sizes import SHOWN_PX, SIDE_PX
 
 if TYPE_CHECKING:
     from ..model import Project
@@ -12,8 +13,6 @@ if TYPE_CHECKING:
     from ..predict.flare import Flare, Frame
     from ..predict.occurrence import Flares
 
-# pixels across a flare that is drawn to be looked at
-SHOWN_PX = 240
 # wavelengths of pictures to be looked at, evenly spread, and of those that judge, by Gauss
 SHOWN_NM, JUDGED_NM = 15, 9
 
@@ -70,7 +69,6 @@ def scene_flare(
     threads : int or None
     """
     if camera.model is not None:
-        from .predict_measured import SIDE_PX
         from .predict_measured_scene import model_in_scene
 
         return model_in_scene(camera, light, SHOWN_PX if shown else SIDE_PX)

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..errors import ProjectError
-from .predict_flares import SHOWN_PX
+from .predict_sizes import SHOWN_PX, SIDE_PX, WIDTH_MM
 
 if TYPE_CHECKING:
     from ..model import Layer
@@ -19,10 +19,6 @@ if TYPE_CHECKING:
     from ..predict.flare import Flare
     from ..predict.occurrence import Flares
 
-# pixels across a measured flare that is drawn for statistics
-SIDE_PX = 192
-# of a sensor that nobody told
-WIDTH_MM = 36.0
 # a sensor whose proportions differ by a larger part is not that of the captures
 _OTHER_SHAPE = 0.03
 

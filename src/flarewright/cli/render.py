@@ -399,8 +399,9 @@ def render(
     if half and float32:
         raise ProjectError("--half and --float both say how many bits a value has; keep one")
     from .art_flags import naming_rules
+    from .flag_set import Flags
     from .look_flags import photographed, put_look, said_by
-    from .render_flags import Flags, build_project
+    from .render_flags import build_project
 
     state = _read_state(resume)
     flags = Flags(

@@ -12,6 +12,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from .hand import Hand
 from .screen import Screen
 from .session import Session
+from .sharpening import sharpen
 from .snapshot import picture_of, solve_of, state_of
 from .solving import Seeing, Solver
 
@@ -21,7 +22,7 @@ class Desk:
 
     def __init__(self, session: Session, greeting: str = "") -> None:
         self.session, self.greeting = session, greeting
-        self.screen = Screen(session)
+        self.screen = Screen(session, sharpen)
         self.solver = Solver(session, lambda: Seeing(session.view, self.screen.exposure_stops))
         self.hand = Hand(self.screen)
         self.screen.idle = self.hand.prepare

@@ -19,9 +19,9 @@ from ..render.moving import Sheet, Still, moving_picture
 from . import studio
 from .edit_wishes import target_project
 from .ladder import levels_at
+from .picture import Picture
 from .screen import Screen, pixels_of_picture
 from .shown import jpeg
-from .studio import Picture
 from .view import View
 from .viewing import packed_target
 

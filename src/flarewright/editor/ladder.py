@@ -8,7 +8,6 @@ measured once, by matrices and by traced rays, while nothing else is to be done.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from math import atan, atan2, cos, degrees, hypot, log, radians, sin, tan
 
 import numpy as np
@@ -16,9 +15,9 @@ from numpy.typing import NDArray
 
 from ..measure.rendering import is_measured
 from ..model import Light, Project
+from .draft_match import LEAST, MOST, STEP, Ladder, Levels, Match, Rung
 from .jobs import Check
 from .seen import see
-from .studio import LEAST, MOST, STEP, Levels, Match
 
 Floats = NDArray[np.float64]
 
@@ -31,41 +30,6 @@ DARKEST, BRIGHTEST = LEAST / 16.0, 2.0 * MOST
 # the side of the square picture in which all ghosts within the frame's circle are measured
 SIDE_PX = 540
 EVERY = ("all",)
-
-
-@dataclass(frozen=True)
-class Rung:
-    """The ghosts of a lens at one field angle.
-
-    Attributes
-    ----------
-    angle_deg : float
-    parts : dict of str to float
-        Of each ghost that matrices light up: its traced flux by its drafted one.
-    total : float
-        Traced light of all ghosts by that of all drafted ones that are multiplied so.
-    """
-
-    angle_deg: float
-    parts: dict[str, float]
-    total: float
-
-
-@dataclass(frozen=True)
-class Ladder:
-    """Rungs of one lens by angle, as arrays.
-
-    Attributes
-    ----------
-    rungs : tuple of Rung
-    names : tuple of str, length N
-    parts : ndarray, shape (A, N)
-        What is dark at an angle takes what its neighbours have.
-    """
-
-    rungs: tuple[Rung, ...]
-    names: tuple[str, ...]
-    parts: Floats
 
 
 def with_rung(ladder: Ladder | None, rung: Rung) -> Ladder:

@@ -16,13 +16,13 @@ from ..errors import FlarewrightError, ProjectError
 from ..model import Project
 from ..render.display import view_sum
 from . import studio
+from .draft_match import Match
 from .jobs import Check, Lane, Overtaken
+from .picture import Picture
 from .pictures import in_short
 from .seen import Seen
 from .session import Session
-from .sharpening import sharpen
 from .shown import jpeg, pixels_of, plate_for
-from .studio import Match, Picture
 from .view import View
 
 # of a picture that rests
@@ -35,16 +35,21 @@ HOLD_S = 0.15
 FETCH_S = 0.08
 
 
+Sharpen = Callable[["Screen", Project, View, Check], None]
+
+
 class Screen:
     """The pictures of a session.
 
     Parameters
     ----------
     session : Session
+    sharpen : callable
+        Draws a project for this screen, step by step (`sharpening.sharpen`).
     """
 
-    def __init__(self, session: Session) -> None:
-        self.session = session
+    def __init__(self, session: Session, sharpen: Sharpen) -> None:
+        self.session, self._sharpen = session, sharpen
         self.picture: Picture | None = None
         self.seen: Seen | None = None
         self.match = Match()
@@ -100,7 +105,7 @@ class Screen:
 
     def _work(self, project: Project, view: View, check: Check) -> None:
         try:
-            sharpen(self, project, view, check)
+            self._sharpen(self, project, view, check)
         except FlarewrightError as error:
             check()
             self.problem = in_short(str(error), project, self.session.file)

@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from ..measure.rendering import is_measured, render_any
 from ..model import Art, Layer, Output, Project, Quality, Rule
-from .studio import Grade, spread, staged
+from .picture import Grade
+from .studio import spread, staged
 
 Floats = NDArray[np.float32]
 

@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 from ..model import Project
 from . import studio
+from .draft_match import Levels, Match, levels_of, matched
 from .jobs import Check
 from .ladder import levels_at, measured, missing, with_rung
+from .picture import Grade, Picture
 from .seen import Seen, see
-from .studio import Match, Picture
 from .view import View
 
 if TYPE_CHECKING:
@@ -66,7 +67,7 @@ def _sharpen(screen: Screen, shown: Picture | None, project: Project, view: View
     working = view.grey or view.unclipped
     followed = screen.moved is not None and studio.same_scene(screen.moved, project)
     draft: Picture | None = None
-    levels: studio.Levels = ()
+    levels: Levels = ()
     if changed or working or (screen.final_s > SOON_S and not followed):
         room = screen.room if working else None
         levels = () if changed else levels_at(screen.match, project)
@@ -122,7 +123,7 @@ def _show_soon(screen: Screen, project: Project, view: View, check: Check) -> No
 
 
 def _show_final(
-    screen: Screen, project: Project, view: View, drafted: tuple[Picture | None, studio.Levels], fresh: bool,
+    screen: Screen, project: Project, view: View, drafted: tuple[Picture | None, Levels], fresh: bool,
     check: Check,
 ) -> None:  # fmt: skip
     """Trace a project in full, and learn from it how bright drafts shall be."""
@@ -140,7 +141,7 @@ def _show_final(
         levels = levels_at(screen.match, project)
         draft = studio.take(project, "draft", view, levels=levels)
         check()
-    screen.match = studio.matched(draft, final, screen.match, levels)
+    screen.match = matched(draft, final, screen.match, levels)
     screen.session.tell({"type": "matched"})
 
 
@@ -167,7 +168,7 @@ def _enlarge(screen: Screen, shown: Picture, view: View, check: Check) -> None:
     screen.show(shown)
 
 
-def _look(screen: Screen, project: Project, grade: studio.Grade, check: Check) -> None:
+def _look(screen: Screen, project: Project, grade: Grade, check: Check) -> None:
     """Find out which ghosts are where, and tell."""
     screen.seen = see(project, grade, _progress(screen, "ghosts", check))
     check()
@@ -177,12 +178,12 @@ def _look(screen: Screen, project: Project, grade: studio.Grade, check: Check) -
 def _match_ghosts(screen: Screen, project: Project, view: View, seen: Seen, check: Check) -> None:
     """Learn from the final picture how bright each ghost of the next drafts shall be."""
     drafted = see(project, "draft", lambda *_: check())
-    levels = studio.levels_of(*({ghost.name: ghost.flux for ghost in each.ghosts} for each in (drafted, seen)))
+    levels = levels_of(*({ghost.name: ghost.flux for ghost in each.ghosts} for each in (drafted, seen)))
     draft = studio.take(project, "draft", view, levels=levels)
     check()
     final = screen.picture
     if final is not None:
-        screen.match = studio.matched(draft, final, screen.match, levels)
+        screen.match = matched(draft, final, screen.match, levels)
         screen.session.tell({"type": "matched"})
 
 

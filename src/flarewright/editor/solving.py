@@ -28,12 +28,13 @@ from ..io.sentences import count
 from ..model import AsLens, CoatingChoice, Design, Everywhere, InTurn, Lens, PerRow, Project, Surface
 from ..optics.pack import resolve_coatings
 from ..render.prepare import as_lens, first_order, settle
+from .draft_match import Match as Held
 from .edit_wishes import clear_wishes, wish_names
 from .jobs import Check, Lane
+from .picture import Grade
 from .session import Session
 from .shown import jpeg, pixels_of
-from .studio import Grade, exposure_of, is_dark, light_of, take
-from .studio import Match as Held
+from .studio import exposure_of, is_dark, light_of, take
 from .view import View
 
 CANDIDATES = 5

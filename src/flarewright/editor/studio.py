@@ -3,32 +3,24 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
 from functools import lru_cache
-from math import log, sqrt
-from typing import TYPE_CHECKING, Literal
+from math import sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import FlarewrightError
 from ..io.library import lens_path
 from ..measure.rendering import is_measured, render_any
-from ..model import Art, Layer, Lens, Light, Output, Project, Quality, Rule
+from ..model import Art, Layer, Lens, Output, Project, Quality, Rule
 from ..render.display import auto_exposure
 from ..render.edge_rings import untabled
 from ..render.ghosts_final import SCREEN_PX
 from ..render.prepare import load_lens
 from ..render.working import working_ghosts
+from .draft_match import EVEN, Levels, Match
+from .picture import Floats, Grade, Picture
 from .view import View
-
-if TYPE_CHECKING:
-    from .ladder import Ladder
-
-Floats = NDArray[np.float32]
-Grade = Literal["moving", "draft", "soon", "final", "working"]
-Levels = tuple[tuple[float, tuple[str, ...]], ...]
 
 # the viewport's picture fits into this
 WIDEST, HIGHEST = 960, 540
@@ -44,42 +36,6 @@ NO_RINGS = (
     "the screen leaves out rings inside ghosts, which are slow through an image, dirt or cylinders and for spectral "
     "lines; files have them"
 )
-# gains of a draft's ghosts: their step, the least and the largest
-# (one that a rim hides now may come out as the hand goes on, so it is never dimmed altogether)
-STEP, LEAST, MOST = 2.0**0.25, 2.0**-1.5, 2.0
-EVEN = (1.0, 1.0, 1.0)
-
-
-@dataclass(frozen=True)
-class Picture:
-    """A rendered picture, linear.
-
-    Attributes
-    ----------
-    project : Project
-        That it shows.
-    grade : {"moving", "draft", "soon", "final", "working"}
-    ghosts, rest : ndarray, shape (H, W, 3)
-        The ghosts, and everything else: starburst and scatter.
-    seconds : float
-        It took.
-    remarks : tuple of str
-    grey : bool
-        Every ghost reflects alike, so that its brightness is none of the lens'.
-    """
-
-    project: Project
-    grade: Grade
-    ghosts: Floats
-    rest: Floats
-    seconds: float
-    remarks: tuple[str, ...] = ()
-    grey: bool = False
-
-    @property
-    def ghost_light(self) -> NDArray[np.float64]:
-        """Mean of the ghosts, R, G, B."""
-        return np.asarray(self.ghosts.mean(axis=0, dtype=np.float64).mean(axis=0))
 
 
 def view_size(project: Project, scale: float = 1.0) -> tuple[int, int]:
@@ -233,82 +189,6 @@ def spread(layers: Sequence[Layer], size_px: tuple[int, int]) -> Floats:
         x, y, width, height = layer.window
         sheet[y : y + height, x : x + width] += layer.pixels
     return sheet
-
-
-@dataclass(frozen=True)
-class Match:
-    """What gives drafts the light of final pictures.
-
-    Matrices know no inner rims, so a draft's ghosts are too bright, and its few wavelengths shift its colours.
-
-    Attributes
-    ----------
-    levels : tuple of (float, names)
-        Gains of single ghosts, alike ones together.
-    lights : tuple of Light
-        Where `levels` and `gain` were learned.
-    ladder : Ladder or None
-        What is known of other places (`ladder.levels_at`).
-    gain : tuple of float
-        Of a draft's ghosts, R, G, B.
-    exposure_stops : float
-        Found for the lens, and held while the light moves or the lens is edited.
-    grey : float
-        Of a grey picture, whose brightness means nothing, so that it is seen at this exposure.
-    """
-
-    gain: tuple[float, float, float] = EVEN
-    exposure_stops: float = 0.0
-    grey: float = 1.0
-    levels: Levels = ()
-    lights: tuple[Light, ...] = ()
-    ladder: Ladder | None = None
-
-
-def matched(draft: Picture | None, final: Picture, held: Match, levels: Levels | None = None) -> Match:
-    """Compare a draft with the final picture of the same project.
-
-    Parameters
-    ----------
-    draft : Picture or None
-    final : Picture
-    held : Match
-        What holds until now; kept where there is nothing to compare.
-    levels : Levels, optional
-        That the draft was drawn with; None: those that hold.
-
-    Returns
-    -------
-    Match
-    """
-    if draft is None or draft.project != final.project:
-        return held
-    ours, theirs = draft.ghost_light, final.ghost_light
-    if min(ours.min(), theirs.min()) <= 0.0:
-        return held
-    red, green, blue = (float(gain) for gain in np.clip(theirs / ours, 0.02, 4.0))
-    levels = held.levels if levels is None else levels
-    return replace(held, gain=(red, green, blue), levels=levels, lights=final.project.lights)
-
-
-def levels_of(drafted: Mapping[str, float], final: Mapping[str, float]) -> Levels:
-    """Compare the light of single ghosts in a draft and in the final picture of the same project.
-
-    Parameters
-    ----------
-    drafted, final : mapping of str to float
-        Flux by name; a ghost that is missing is dark.
-
-    Returns
-    -------
-    Levels
-        In steps of `STEP`; ghosts that need no gain are left out.
-    """
-    groups: dict[int, list[str]] = {}
-    for name, flux in drafted.items():
-        ratio = min(max(final.get(name, 0.0) / flux, LEAST), MOST) if flux > 0.0 else 1.0
-        groups.setdefault(round(log(ratio, STEP)), []).append(name)
-    return tuple((STEP**step, tuple(names)) for step, names in sorted(groups.items()) if step != 0)
 
 
 def _levelled(art: Art, levels: Levels) -> Art:

@@ -11,10 +11,11 @@ from . import studio
 from .edit_ghosts import is_shown
 from .edit_wishes import new_discs, target_project
 from .ladder import levels_at
+from .picture import Grade, Picture
 from .screen import QUALITY, Screen, pixels_of_picture
 from .seen import alone, is_there, outline, under
 from .shown import jpeg, png
-from .studio import Picture, same_ghosts
+from .studio import same_ghosts
 
 OUTLINE = (240, 176, 84)
 # ghosts under the pointer that are looked at closely before one is believed
@@ -91,6 +92,6 @@ def outline_png(screen: Screen, ghost: str) -> bytes:
     return png(outline(alone(screen.session.project, ghost, _grade(screen)), OUTLINE))
 
 
-def _grade(screen: Screen) -> studio.Grade:
+def _grade(screen: Screen) -> Grade:
     view = screen.session.view
     return "draft" if view.grey or view.unclipped or screen.picture is None else "final"

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-import threading
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
@@ -137,7 +136,8 @@ def start(share: Sequence[str]) -> subprocess.Popen[bytes]:
     if getattr(sys, "frozen", False) or not sys.executable:
         raise OSError("there is no interpreter to start")
     # the parent's search path, and never the working folder in its place
-    code = f"import sys; sys.path[:] = {sys.path!r}; from {__name__} import help_out; help_out({list(share)!r})"
+    called = f"from {__package__}.first_run import help_out; help_out({list(share)!r})"
+    code = f"import sys; sys.path[:] = {sys.path!r}; {called}"
     return subprocess.Popen(
         [sys.executable, "-c", code],
         stdin=subprocess.PIPE,
@@ -146,24 +146,3 @@ def start(share: Sequence[str]) -> subprocess.Popen[bytes]:
         env={**os.environ, _MARK: "1"},
         creationflags=getattr(subprocess, "CREATE_NO_WINDOW", 0),
     )
-
-
-def help_out(names: Sequence[str]) -> None:
-    """Compile roots in a helper, and end the process.
-
-    Parameters
-    ----------
-    names : sequence of str
-        Keys of `first_run.ROOTS`.
-    """
-
-    def end_with_parent() -> None:
-        # the pipe closes when the command ends, however it ends
-        os.read(0, 1)
-        os._exit(1)
-
-    threading.Thread(target=end_with_parent, daemon=True).start()
-    from .first_run import absent, compile_roots
-
-    compile_roots(absent(names))
-    os._exit(0)

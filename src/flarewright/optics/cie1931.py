@@ -1,8 +1,17 @@
-"""Standard tables of the CIE in steps of 5 nm from 360 to 830 nm.
+"""The CIE 1931 observer and daylight D65: standard tables in steps of 5 nm from 360 to 830 nm, and what lies between.
 
 Sources: the colour matching functions of the CIE 1931 2-degree observer, ISO/CIE 11664-1 table 1 (every fifth
 nanometre), and illuminant D65, ISO/CIE 11664-2 table 1.
 """
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Floats = NDArray[np.float64]
 
 FIRST_NM = 360
 STEP_NM = 5
@@ -75,3 +84,43 @@ D65_POWER = (
     51.959, 54.6998, 57.4406, 58.8766, 60.3125,
 )
 # fmt: on
+
+LAST_NM = FIRST_NM + STEP_NM * (len(Y_BAR) - 1)
+"""The colour matching functions cover FIRST_NM to LAST_NM, 360 to 830 nm."""
+
+
+def cie_1931(wavelength_nm: ArrayLike) -> Floats:
+    """Colour matching functions of the CIE 1931 2-degree observer.
+
+    Parameters
+    ----------
+    wavelength_nm : array_like, shape (...)
+
+    Returns
+    -------
+    ndarray, shape (..., 3)
+        x-bar, y-bar, z-bar; 0 outside 360 to 830 nm.
+
+    Notes
+    -----
+    The 5 nm table is interpolated by cubics through four neighbours, within 0.0024 of the 1 nm table (linear: 0.016).
+    """
+    wave = np.asarray(wavelength_nm, dtype=np.float64)
+    nm, table = cmf_at_1_nm()
+    return np.stack([np.interp(wave, nm, column, left=0.0, right=0.0) for column in table.T], axis=-1)
+
+
+@lru_cache
+def cmf_at_1_nm() -> tuple[Floats, Floats]:
+    """Return wavelengths (L,) and colour matching functions (L, 3) in steps of 1 nm, by Lagrange's cubic."""
+    table = np.array([X_BAR, Y_BAR, Z_BAR]).T
+    last = len(table) - 1
+    nm = np.arange(FIRST_NM, LAST_NM + 1, dtype=np.float64)
+    at = (nm - FIRST_NM) / STEP_NM
+    first = np.clip(np.floor(at).astype(np.intp) - 1, 0, last - 3)
+    t = at - first
+    a, b, c, d = t, t - 1.0, t - 2.0, t - 3.0
+    basis = (-b * c * d / 6.0, a * c * d / 2.0, -a * b * d / 2.0, a * b * c / 6.0)
+    cmf: Floats = sum((w[:, None] * table[first + k] for k, w in enumerate(basis)), np.zeros((len(nm), 3)))
+    # The cubic may dip below 0 by 1e-6 where the functions fade; the functions themselves never do.
+    return nm, np.maximum(cmf, 0.0)

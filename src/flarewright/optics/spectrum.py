@@ -11,13 +11,11 @@ from flarewright.errors import FlarewrightError
 from flarewright.model.camera import Colorspace
 from flarewright.model.light import D65, BlackBody, EqualEnergy, Lines, Rgb, Spectrum
 
-from .cie1931 import D65_POWER, FIRST_NM, STEP_NM, X_BAR, Y_BAR, Z_BAR
+from .cie1931 import D65_POWER, FIRST_NM, STEP_NM, Y_BAR, cie_1931, cmf_at_1_nm
 from .color import xyz_to_rgb_matrix
+from .uplift import smooth_curve, uplift
 
 Floats = NDArray[np.float64]
-
-LAST_NM = FIRST_NM + STEP_NM * (len(Y_BAR) - 1)
-"""The colour matching functions cover FIRST_NM to LAST_NM, 360 to 830 nm."""
 
 VISIBLE_NM = (360.0, 780.0)
 """Colours of coatings are integrated from here to here; what is beyond counts with the ends. The functions begin at
@@ -26,15 +24,12 @@ VISIBLE_NM = (360.0, 780.0)
 _H, _C, _KB = 6.62607015e-34, 299792458.0, 1.380649e-23  # exact SI values
 
 __all__ = [
-    "FIRST_NM",
-    "LAST_NM",
     "VISIBLE_NM",
     "at_its_lines",
     "band_contents",
     "band_parts",
     "band_shares",
     "band_weights",
-    "cie_1931",
     "hats",
     "luminance_shares",
     "planck",
@@ -43,27 +38,6 @@ __all__ = [
     "spectrum_xyz",
     "traced_wavelengths",
 ]
-
-
-def cie_1931(wavelength_nm: ArrayLike) -> Floats:
-    """Colour matching functions of the CIE 1931 2-degree observer.
-
-    Parameters
-    ----------
-    wavelength_nm : array_like, shape (...)
-
-    Returns
-    -------
-    ndarray, shape (..., 3)
-        x-bar, y-bar, z-bar; 0 outside 360 to 830 nm.
-
-    Notes
-    -----
-    The 5 nm table is interpolated by cubics through four neighbours, within 0.0024 of the 1 nm table (linear: 0.016).
-    """
-    wave = np.asarray(wavelength_nm, dtype=np.float64)
-    nm, table = _cmf_at_1_nm()
-    return np.stack([np.interp(wave, nm, column, left=0.0, right=0.0) for column in table.T], axis=-1)
 
 
 def planck(wavelength_nm: ArrayLike, temperature_k: float) -> Floats:
@@ -115,8 +89,6 @@ def spectral_power(spectrum: Spectrum, wavelength_nm: ArrayLike) -> Floats:
         raise ValueError("spectral lines have power but no power per nm; use band_weights")
     if isinstance(spectrum, Rgb):
         # few lights have a colour, and fitting it needs this module
-        from .uplift import smooth_curve, uplift
-
         return spectral_power(D65(), wave) * smooth_curve(uplift(spectrum.rgb), wave)
     return np.interp(wave, spectrum.wavelength_nm, spectrum.power, left=0.0, right=0.0)
 
@@ -400,29 +372,13 @@ def _table_nm() -> Floats:
     return FIRST_NM + STEP_NM * np.arange(len(Y_BAR), dtype=np.float64)
 
 
-@lru_cache
-def _cmf_at_1_nm() -> tuple[Floats, Floats]:
-    """Wavelengths (L,) and colour matching functions (L, 3) in steps of 1 nm, by Lagrange's cubic."""
-    table = np.array([X_BAR, Y_BAR, Z_BAR]).T
-    last = len(table) - 1
-    nm = np.arange(FIRST_NM, LAST_NM + 1, dtype=np.float64)
-    at = (nm - FIRST_NM) / STEP_NM
-    first = np.clip(np.floor(at).astype(np.intp) - 1, 0, last - 3)
-    t = at - first
-    a, b, c, d = t, t - 1.0, t - 2.0, t - 3.0
-    basis = (-b * c * d / 6.0, a * c * d / 2.0, -a * b * d / 2.0, a * b * c / 6.0)
-    cmf: Floats = sum((w[:, None] * table[first + k] for k, w in enumerate(basis)), np.zeros((len(nm), 3)))
-    # The cubic may dip below 0 by 1e-6 where the functions fade; the functions themselves never do.
-    return nm, np.maximum(cmf, 0.0)
-
-
 def _stimulus(spectrum: Spectrum) -> tuple[Floats, Floats]:
     """Wavelengths (L,) and what each adds to XYZ (L, 3), scaled to a sum of Y = 1."""
     if isinstance(spectrum, Lines):
         wave = np.array([line[0] for line in spectrum.lines])
         power = np.array([line[1] for line in spectrum.lines])
     else:
-        wave = _cmf_at_1_nm()[0]
+        wave = cmf_at_1_nm()[0]
         power = spectral_power(spectrum, wave)
     largest = float(power.max())
     # Scaled first, so that a very cold black body does not underflow.

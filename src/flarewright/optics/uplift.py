@@ -7,9 +7,8 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from .cie1931 import D65_POWER, FIRST_NM, STEP_NM
+from .cie1931 import D65_POWER, FIRST_NM, STEP_NM, cie_1931
 from .color import xyz_to_rgb_matrix
-from .spectrum import cie_1931
 
 Floats = NDArray[np.float64]
 

@@ -9,9 +9,10 @@ from math import acos, cos, degrees, radians
 from ..errors import LensError
 from ..model import Camera, Dirt, Layer, Output, Project, Quality
 from ..optics.constellation import field_angles
+from ..render.opening import make_opening
 from ..render.prepare import Settled, as_lens, settle
 from ..render.render import render
-from ..render.shot import make_opening, make_shots
+from ..render.shots import make_shots
 from .flare import Flare, Frame
 from .wavelengths import luminous_lines
 

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..model.light import Lines, Spectrum
-from ..optics.spectrum import cie_1931, luminance_shares
+from ..optics.cie1931 import cie_1931
+from ..optics.spectrum import luminance_shares
 
 Floats = NDArray[np.float64]
 

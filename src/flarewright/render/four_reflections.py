@@ -23,7 +23,8 @@ from ..optics.iris import blade_edges
 from ..optics.pack import PackedLens, facing
 from ..optics.paths import LightPath, four_path
 from .montecarlo import Batch, batches_in_order, ray_source, run_batch
-from .shot import Opening, Shot
+from .opening import Opening
+from .shot import Shot
 
 # a batch has so many points squared; from the first ones it is told how many are needed
 SIDE, PILOT = 24, 4

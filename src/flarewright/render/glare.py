@@ -16,9 +16,11 @@ from ..optics.glare import from_surround
 from ..optics.pack import facing
 from ..optics.paths import direct_path, ghost_paths
 from ..optics.scatter import ScatterTables
+from .opening import make_opening
 from .prepare import settle
 from .scatter import gather, scatter_of
-from .shot import Shot, make_opening, make_shots
+from .shot import Shot
+from .shots import make_shots
 
 Floats = NDArray[np.float64]
 

@@ -22,10 +22,12 @@ from ..optics.paths import ghost_paths
 from .art import resolve_art
 from .direct import DirectImage, defocus_mm, direct_image
 from .ghosts import render_ghosts
+from .opening import make_opening
 from .path_color import direct_spectrum
 from .prepare import Settled, settle
 from .scatter import chosen_scatter
-from .shot import Shot, make_opening, make_shots
+from .shot import Shot
+from .shots import make_shots
 from .starburst_pass import OUT_OF_FOCUS_PX, read_soil, starburst_of
 
 Floats = NDArray[np.float32]

@@ -28,10 +28,12 @@ from ..model import Layer, Quality
 from ..model.reference_state import ReferenceState
 from .ledger import Ledger, ledger_of
 from .montecarlo import GHOSTS, HEROES, Sums, batches_in_order, run_batch
+from .opening import make_opening
 from .prepare import Settled
 from .reference_rays import ReferenceRays, reference_rays, relative_spread
 from .scatter import chosen_scatter, scatter_of
-from .shot import Shot, make_opening, make_shots
+from .shot import Shot
+from .shots import make_shots
 
 Floats = NDArray[np.float64]
 Progress = Callable[[float, str], None]

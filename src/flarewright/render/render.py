@@ -28,11 +28,13 @@ from .direct import DirectImage, direct_image, widest_defocus_mm
 from .gamut import within
 from .ghosts import plain_level, render_ghosts
 from .given import Settings, naming_settings, project_of
+from .opening import make_opening, soiled_opening
 from .placing import outside, veiled
 from .prepare import Settled, settle
 from .room import need, spare_bytes
 from .scatter import dimmed, render_scatter, scatter_facts, scatter_of
-from .shot import Shot, make_opening, make_shots, soiled_opening
+from .shot import Shot
+from .shots import make_shots
 from .shown_layer import ShownLayer, shown_layers
 from .starburst_pass import OUT_OF_FOCUS_PX, read_soil, starburst_of
 

@@ -44,7 +44,7 @@ from .kept import Kept, Shelf
 if TYPE_CHECKING:
     from ..optics.bundle import Bundle
     from .canvas import Plane
-    from .shot import Opening
+    from .opening import Opening
 
 Floats = NDArray[np.float64]
 Singles = NDArray[np.float32]

@@ -10,8 +10,10 @@ from ..model import Layer, Project, Quality
 from ..optics.paths import ghost_paths
 from .art import resolve_art
 from .ghosts import render_ghosts
+from .opening import make_opening
 from .prepare import settle
-from .shot import Shot, make_opening, make_shots
+from .shot import Shot
+from .shots import make_shots
 
 # every surface reflects so little that how many surfaces a path passes makes no difference
 GREY_R = 1e-4

@@ -1,0 +1,106 @@
+"""Every light of a project as it is drawn: area lights in parts, what is hidden left out."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..errors import ProjectError
+from ..model import Light, Project
+from ..optics.border import closed
+from ..optics.bundle import Incidence, incidence, least_distance
+from ..optics.coating_curves import BandCurves, band_curves, coating_curves
+from ..optics.pack import PackedLens, facing, pack_lens, resolve_coatings
+from ..optics.source import parts
+from ..optics.spectrum import at_its_lines, sampled_wavelengths, traced_wavelengths
+from .holdout import read_plates, seen_part
+from .opening import Opening
+from .prepare import Settled
+from .shot import Shot
+
+
+def make_shots(settled: Settled, opening: Opening, *, sampled: bool = False) -> tuple[Shot, ...]:
+    """Prepare every light of a project; an area light in parts.
+
+    Parameters
+    ----------
+    settled : Settled
+    opening : Opening
+    sampled : bool
+        Whether the wavelengths stand for all light by themselves (`optics.spectrum.sampled_wavelengths`), for random
+        rays.
+
+    Returns
+    -------
+    tuple of Shot
+    """
+    project: Project = settled.project
+    width, height = project.camera.size_px
+    sensor = project.camera.sensor
+    to_pixels = np.array([width / 2.0, height / 2.0, width / sensor[0], height / sensor[1]])
+    coatings = resolve_coatings(settled.lens, settled.coating)
+    quality = project.quality
+    bridged = quality.bridge and quality.mode != "reference"
+    curves = coating_curves(settled.lens, coatings, settled.sensor) if bridged else None
+    choose = sampled_wavelengths if sampled else traced_wavelengths
+    packs: dict[tuple[object, ...], tuple[PackedLens, BandCurves | None]] = {}
+    shots: list[Shot] = []
+    for number, light in enumerate(project.lights):
+        wavelengths_nm = choose(quality.wavelengths, light.spectrum)
+        # the lines of a spectrum are traced as they are
+        banded = curves is not None and not at_its_lines(light.spectrum, wavelengths_nm)
+        traced = tuple(wavelengths_nm.tolist())
+        key = (traced, light.spectrum if banded else None)
+        if key not in packs:
+            bands = band_curves(curves, light.spectrum, traced) if banded and curves is not None else None
+            lens = pack_lens(
+                settled.lens, settled.order, coatings, wavelengths_nm, sensor=settled.sensor,
+                in_bands=None if bands is None else bands.tables[:, : len(settled.lens.rows)],
+            )  # fmt: skip
+            packs[key] = lens, bands
+        of_light, bands = packs[key]
+        whole = []
+        for part in parts(light, quality.source_step_deg):
+            changes = {"field_deg": part.field_deg, "intensity": light.intensity * part.share, "holdout": None}
+            point = light.replace(**changes, diameter_deg=0.0, shape=None) if light.extended else light
+            seen = _seen(settled, of_light, number, point)
+            packed = facing(of_light, seen.axes, seen.nearness)
+            whole.append(
+                Shot(
+                    point,
+                    seen,
+                    packed,
+                    opening,
+                    to_pixels,
+                    (width, height),
+                    project.output.colorspace,
+                    number=number,
+                    share=part.share,
+                    border=closed(part.corners) if light.extended else None,
+                    grating=project.camera.sensor_grating,
+                    curves=bands,
+                )
+            )
+        shots += whole if project.holdout is None and light.holdout is None else _unhidden(settled, light, whole)
+    return tuple(shots)
+
+
+def _unhidden(settled: Settled, light: Light, whole: list[Shot]) -> list[Shot]:
+    """Return what is seen of the parts of a light; one dark point when all of it is hidden."""
+    plates = read_plates(settled.project, light)
+    seen = [shot for part in whole if (shot := seen_part(settled.lens, part, plates)) is not None]
+    return seen or [replace(whole[0], light=whole[0].light.replace(intensity=0.0), share=0.0, border=None)]
+
+
+def _seen(settled: Settled, packed: PackedLens, number: int, light: Light) -> Incidence:
+    """Find where a light stands, and refuse one that stands in the lens."""
+    if light.distance is None:
+        return incidence(light.field_deg)
+    least = least_distance(packed)
+    if light.distance <= least:
+        raise ProjectError(
+            f"lights[{number}].distance: a light at {light.distance:g} mm stands in the lens {settled.lens.name} or "
+            f"behind its entrance pupil; give more than {least:.4g} mm"
+        )
+    return incidence(light.field_deg, light.distance, settled.order.entrance_pupil_z)
