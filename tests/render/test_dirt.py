@@ -150,6 +150,28 @@ def test_roughness_takes_its_share_of_the_spike_and_keeps_the_flux():
     assert E[350:, 400:460].sum() > 3 * smooth[350:, 400:460].sum()
 
 
+def test_the_light_of_rough_edges_goes_where_their_normals_point():
+    """Second method: the Fourier transform of drawn rough irises, in a ring, by direction; but for what spikes keep."""
+    iris = Iris(blades=4, roughness_um=60.0, roughness_length_um=250.0)
+    drawn = []
+    for seed in range(4):
+        pattern = pupil_pattern(iris.replace(roughness_seed=seed), radius_mm=8.0)
+        P = np.diff(np.diff(pattern.table, axis=0), axis=1)
+        y, x = np.mgrid[: len(P), : len(P)] - (len(P) - 1) / 2
+        s = np.hypot(x, y) / pattern.knots_per_s
+        ring = (s > 40.0) & (s < 58.0)
+        place = np.round(np.degrees(np.arctan2(y, x))[ring] / 9.0).astype(int) % 20
+        light = (P * pattern.knots_per_s**2 * s**3)[ring]
+        drawn.append(np.bincount(place, light, 20) / np.bincount(place, minlength=20))
+    fans = pattern.rough.angular
+    place = np.round(np.arange(len(fans)) * 20.0 / len(fans)).astype(int) % 20
+    expected = np.bincount(place, fans, 20) / np.bincount(place, minlength=20)
+    beside = np.arange(20) % 10 != 0
+    found = np.mean(drawn, axis=0)
+    np.testing.assert_allclose(found[beside], expected[beside], atol=0.2 * expected.max())
+    assert found[beside].sum() == pytest.approx(expected[beside].sum(), rel=0.08)
+
+
 SPIKE_AT = np.array([15.0, 25.0, 35.0])
 
 

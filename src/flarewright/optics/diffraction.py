@@ -93,8 +93,8 @@ class Pattern:
         Continues P beyond the reach.
     roughness : float
         Rms of the blades' edge; straight spikes give way to their fans by exp(-(2 pi roughness s)^2).
-    rough_half_fan : float
-        Half the angle of a rough blade's fan.
+    rough : FanWings or None
+        What roughness makes of the blades' wings where it leaves no spike; None for smooth blades.
     veil : Veil
         What dirt adds to the wings.
     transmittance : float
@@ -106,7 +106,7 @@ class Pattern:
     reach: float
     wings: FanWings | BladeWings
     roughness: float = 0.0
-    rough_half_fan: float = 0.0
+    rough: FanWings | None = None
     veil: Veil = ()
     transmittance: float = 1.0
 
@@ -191,7 +191,8 @@ def pupil_pattern(
     its reach and the whole of it: the law of any sharp border, measured direction by direction. The reach of a mask is
     an eighth of its pixels a side at most.
 
-    A rough edge of rms sigma keeps exp(-(2 pi sigma s)^2) of a spike; the rest is a fan as wide as the edge's slopes.
+    A rough edge of rms sigma keeps exp(-(2 pi sigma s)^2) of a spike; the rest goes where the edge's normals point
+    (`_rough_fans`).
     Dirt's wings add to those of the border (`dirt.scattered`).
     """
     if iris.roughness_um == 0.0 and soil is None:
@@ -270,12 +271,35 @@ def _pattern(
         table[row] += table[row - 1]
     table.flags.writeable = False
     rough = 1e-3 * iris.roughness_um / radius_mm
-    half_fan = 0.0
+    fans = None
     if rough > 0.0 and isinstance(wings, BladeWings):
-        slope = math.sqrt(2.0) * iris.roughness_um / iris.roughness_length_um
-        # a flat fan of the same variance as the slopes
-        half_fan = min(math.hypot(wings.half_fan, math.sqrt(3.0) * math.atan(slope)), 0.4 * math.pi)
-    return Pattern(table, WINDOW, trusted, wings, rough, half_fan, veil, pupil.transmittance)
+        fans = _rough_fans(wings, math.sqrt(2.0) * iris.roughness_um / iris.roughness_length_um)
+    return Pattern(table, WINDOW, trusted, wings, rough, fans, veil, pupil.transmittance)
+
+
+def _rough_fans(wings: BladeWings, slope: float) -> FanWings:
+    """Return where the light of rough blades goes, by stationary phase: along the normals of their edges.
+
+    A height of Gaussian statistics with the correlation exp(-(u / L)^2) and the rms sigma has slopes of a normal
+    distribution with the rms sqrt(2) sigma / L (Beckmann and Spizzichino 1963, chapter 5), on top of the turning of a
+    blade's arc. The edge is longer where it is steep, so an angle theta has the density
+    exp(-tan^2 theta / (2 slope^2)) / cos^3 theta.
+    """
+    fine = FAN_BINS * 8
+    theta = np.arange(-fine, fine + 1) * math.pi / fine
+    steep = np.abs(theta) < 0.49 * math.pi
+    normal = np.zeros_like(theta)
+    normal[steep] = np.exp(-0.5 * (np.tan(theta[steep]) / max(slope, math.pi / fine)) ** 2) / np.cos(theta[steep]) ** 3
+    # an odd number of steps lies around its middle
+    steps = 1 + 2 * round(wings.half_fan * fine / math.pi)
+    arc = np.convolve(normal / normal.sum(), np.full(steps, 1.0 / steps), mode="same")
+    angular = np.zeros(FAN_BINS)
+    for normal_angle in wings.angle:
+        at = (theta + normal_angle) * FAN_BINS / math.pi
+        angular += np.bincount(np.round(at).astype(np.intp) % FAN_BINS, arc, FAN_BINS)
+    # an element ds of the border with normal phi sends ds / (4 pi^2 A s^2) ds' along phi, and the area A is pi
+    per_angle = wings.multiplicity * wings.length * FAN_BINS / math.pi
+    return FanWings(angular * per_angle / (4.0 * math.pi**3))
 
 
 def _dimmed(wings: FanWings | BladeWings, factor: float) -> FanWings | BladeWings:

@@ -64,7 +64,7 @@ def _plain(pattern: Pattern) -> bool:
     """Tell whether a pattern is of a clean iris, round or of smooth, straight blades."""
     wings = pattern.wings
     plain = wings.half_fan == 0.0 if isinstance(wings, BladeWings) else len(wings.angular) == 1
-    return plain and not pattern.veil and pattern.rough_half_fan == 0.0
+    return plain and not pattern.veil and pattern.rough is None
 
 
 def draw_stars(

@@ -20,7 +20,7 @@ THIRDS = (4.0, 4.5, 5.0, 5.6, 6.3, 7.1, 8.0, 9.0, 10.0, 11.0, 13.0, 14.0, 16.0, 
 """F-numbers engraved in thirds of a stop."""
 
 ROUNDING = 0.2
-ROUGHNESS_UM, ROUGHNESS_LENGTH_UM = 5.0, 25.0
+ROUGHNESS_UM, ROUGHNESS_LENGTH_UM = 5.0, 50.0
 """Rms of the blades' edges and how far along it hangs together: cut steel is true to some micrometres. Without it the
 fans of light that rounded blades make have hard borders, and widen; with it spikes taper and the core is round."""
 

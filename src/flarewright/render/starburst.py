@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from flarewright.errors import ProjectError
 from flarewright.kernels.resample import blend_blade_wings, blend_fan_wings, deposit_core
 from flarewright.model.iris import Iris
-from flarewright.optics.diffraction import BladeWings, FanWings, Pattern, SpikeProfile, pupil_pattern, spike_profile
+from flarewright.optics.diffraction import BladeWings, FanWings, Pattern, pupil_pattern, spike_profile
 from flarewright.optics.dirt import VeilTerm
 
 Floats = NDArray[np.float64]
@@ -184,39 +184,47 @@ class Painter:
         x, y = 0.5 * (x_edges[1:] + x_edges[:-1]), 0.5 * (y_edges[1:] + y_edges[:-1])
         wings = self.pattern.wings
         if isinstance(wings, FanWings):
-            colour = 2.0 * self.f_number * (self.wave * 1e-6) @ self.weights
-            cumulative = np.concatenate([[0.0], np.cumsum(wings.angular) / len(wings.angular)])
-
-            def blend_fans(y: Floats, out: NDArray[np.float32] | Floats) -> None:
-                blend_fan_wings(x, y, np.array(pixel_mm), cumulative, colour, self.inner, self.outer, out)
-
-            _in_bands(blend_fans, y, out, threads)
-        elif self.pattern.rough_half_fan > 0.0:
-            spread = out.copy()
-            profile = spike_profile(wings, self.wave, self.weights, self.f_number, pixel_mm)
-            self._blades(wings, profile, wings.half_fan, x, y, pixel_mm, out, threads)
-            self._blades(wings, profile, self.pattern.rough_half_fan, x, y, pixel_mm, spread, threads)
-            out += (1.0 - self._coherence(np.hypot(x, y[:, None]))) * (spread - out)
+            self._fans(wings, x, y, pixel_mm, out, threads)
         else:
-            profile = spike_profile(wings, self.wave, self.weights, self.f_number, pixel_mm)
-            self._blades(wings, profile, wings.half_fan, x, y, pixel_mm, out, threads)
+            spread = None if self.pattern.rough is None else out.copy()
+            self._blades(wings, x, y, pixel_mm, out, threads)
+            if self.pattern.rough is not None and spread is not None:
+                self._fans(self.pattern.rough, x, y, pixel_mm, spread, threads)
+                out += (1.0 - self._coherence(np.hypot(x, y[:, None]))) * (spread - out)
         for term in self.pattern.veil:
             self._add_veil(term, x, y, out)
 
-    def _blades(
+    def _fans(
         self,
-        wings: BladeWings,
-        profile: SpikeProfile,
-        half_fan: float,
+        wings: FanWings,
         x: Floats,
         y: Floats,
         pixel_mm: tuple[float, float],
         out: NDArray[np.float32] | Floats,
         threads: int | None,
     ) -> None:
+        colour = 2.0 * self.f_number * (self.wave * 1e-6) @ self.weights
+        cumulative = np.concatenate([[0.0], np.cumsum(wings.angular) / len(wings.angular)])
+
+        def blend(y: Floats, out: NDArray[np.float32] | Floats) -> None:
+            blend_fan_wings(x, y, np.array(pixel_mm), cumulative, colour, self.inner, self.outer, out)
+
+        _in_bands(blend, y, out, threads)
+
+    def _blades(
+        self,
+        wings: BladeWings,
+        x: Floats,
+        y: Floats,
+        pixel_mm: tuple[float, float],
+        out: NDArray[np.float32] | Floats,
+        threads: int | None,
+    ) -> None:
+        profile = spike_profile(wings, self.wave, self.weights, self.f_number, pixel_mm)
+
         def blend(y: Floats, out: NDArray[np.float32] | Floats) -> None:
             blend_blade_wings(
-                x, y, np.array(pixel_mm), wings.angle, half_fan, profile.cumulative, profile.density,
+                x, y, np.array(pixel_mm), wings.angle, wings.half_fan, profile.cumulative, profile.density,
                 profile.half_total, profile.tail, profile.step, 0.5 / self.f_number, self.inner, self.outer, out,
             )  # fmt: skip
 
