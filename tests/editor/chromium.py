@@ -14,6 +14,7 @@ from sample import few_ghosts
 FLAGS = ["--no-sandbox", "--disable-gpu", "--disable-background-networking", "--disable-component-update", "--no-pings"]
 SRC = Path(__file__).parents[2] / "src"
 
+
 def chromium():
     """Return Debian's browser, or whatever is called alike; None where there is none."""
     return next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)

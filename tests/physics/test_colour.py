@@ -80,9 +80,7 @@ def off_by(case, spectrum, wavelengths, mode="final"):
     brightest = max(np.abs(rgb).max() for rgb in sums.values())
     counted = {name: rgb for name, rgb in sums.items() if np.abs(rgb).max() > FAINTEST * brightest}
     assert len(counted) >= 10
-    return {
-        name: np.abs(found[name].sum(axis=(0, 1)) - rgb).max() / np.abs(rgb).max() for name, rgb in counted.items()
-    }
+    return {name: np.abs(found[name].sum(axis=(0, 1)) - rgb).max() / np.abs(rgb).max() for name, rgb in counted.items()}
 
 
 @pytest.mark.parametrize("spectrum", [D65(), BlackBody(temperature_k=2856.0)])

@@ -99,8 +99,7 @@ def check_exposure(look: PreviewLook | None, project: Project) -> None:
 
     if opening_of(project, flare_of(project).model) is None:
         raise ProjectError(
-            f"--ev needs an f-number, and {project.lens} does not know that of its captures; give "
-            "--shutter instead"
+            f"--ev needs an f-number, and {project.lens} does not know that of its captures; give --shutter instead"
         )
 
 

@@ -80,9 +80,7 @@ def _learned(sprite: Sprite, packed: Packed, model: GhostModel, threads: int | N
     return out
 
 
-def _told_by(
-    pictures: Pixels, angles: Sequence[float], unit: float, pool: ThreadPoolExecutor
-) -> tuple[Floats, Floats]:
+def _told_by(pictures: Pixels, angles: Sequence[float], unit: float, pool: ThreadPoolExecutor) -> tuple[Floats, Floats]:
     """Return by how much photographs are missed that others foretell by their moves, and the moves halfway."""
     onward = _steps(pictures[:-1], pictures[1:], unit, pool)
     back = _steps(pictures[1:], pictures[:-1], unit, pool)

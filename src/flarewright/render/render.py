@@ -193,8 +193,13 @@ def render(
         shown_layers(layers, settled.project),
         {**summary, "ledger": account.as_data()} if ledger and account is not None else summary,
         (
-            *settled.remarks, *drawn.remarks, *told, *outside(shots, images), *_veiled(drawn.passes),
-            *_remarks(settled, seen), *_stretched(mask),
+            *settled.remarks,
+            *drawn.remarks,
+            *told,
+            *outside(shots, images),
+            *_veiled(drawn.passes),
+            *_remarks(settled, seen),
+            *_stretched(mask),
         ),
         account if ledger else None,
     )
