@@ -9,7 +9,6 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import ProjectError
 from ..io.library import shipped
 from ..io.look_file import read_look, shipped_looks
 from ..model import Camera, Light, Project
@@ -100,20 +99,6 @@ def card_picture(card: Card, size_px: tuple[int, int]) -> NDArray[np.uint8]:
     project = card_project(card, size_px)
     drawn = render(project.replace(quality=project.quality.replace(ringing="off")))
     return view(drawn.layers[0].pixels, layers_exposure(drawn.layers))
-
-
-def card_of(kind: Kind, name: str) -> Card:
-    """Return the picture of one lens or look.
-
-    Raises
-    ------
-    ProjectError
-        When the library has none of that name.
-    """
-    for card in cards():
-        if (card.kind, card.name) == (kind, name):
-            return card
-    raise ProjectError(f"{name!r} is no {kind} of the library")
 
 
 def _lens_card(name: str) -> Card:
