@@ -20,6 +20,7 @@ from ..optics.color import luminance_weights
 from ..optics.paths import LightPath
 from .art import PLAIN, PathArt
 from .canvas import DETAILS, Plane, blank, merge, to_layer
+from .final_pass import FinalPass
 from .ghosts_draft import (
     draft_alone,
     draft_colors,
@@ -34,7 +35,6 @@ from .ghosts_draft import (
 from .ghosts_final import (
     SCREEN,
     STEP_CONTRAST,
-    FinalPass,
     coarser,
     contrast,
     detail_of,

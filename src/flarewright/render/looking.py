@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from ..optics.paths import LightPath
 from ..optics.region import Region, first_look, front_box, join_boxes
 from .art import PLAIN, PathArt
-from .ghosts_final import FinalPass, find_entry, find_final
+from .final_pass import FinalPass
+from .ghosts_final import find_entry, find_final
 from .shot import Shot
 
 Floats = NDArray[np.float64]

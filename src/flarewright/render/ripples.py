@@ -16,7 +16,7 @@ from .path_color import place_of
 from .surroundings import Surroundings, unit
 
 if TYPE_CHECKING:
-    from .ghosts_final import FinalPass
+    from .final_pass import FinalPass
     from .ringing import Rings
 
 Floats = NDArray[np.float64]

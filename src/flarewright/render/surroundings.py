@@ -12,7 +12,7 @@ from ..kernels.bundle import draw_bundle, measure_bundle, node_densities
 from ..kernels.raster import blank_plane, to_pixels
 from ..optics.border import points
 from ..optics.bundle import Bundle, trace_grid
-from .ghosts_final import FinalPass
+from .final_pass import FinalPass
 from .spread import shape_kernel, spread
 
 Floats = NDArray[np.float64]
