@@ -60,7 +60,7 @@ ROOTS = {
     "ghosts' light": (
         "matrix.weigh_matrix_ghosts",
         "i8[::1], i8[::1], i8[::1], i8[::1], f8[::1], none, f8[::1], f8[::1], f8[:,::1], f8, f8, f8, f8, f8, "
-        "f8[:,::1], f8, f8[:,::1], f8[::1], f8, f8, f8, f8[:,::1]",
+        "f8[:,::1], f8, f8[:,::1], f8[::1], f8, f8, f8, i8, f8[:,::1]",
         1.7,
     ),
     "path matrices": ("matrix.path_matrices", "i8[::1], i8[::1], f8[::1], f8[::1], f8[::1], f8, f8[:,:,::1]", 0.1),
@@ -85,6 +85,7 @@ ROOTS = {
     ),
     "seen": ("standing.seen_rays", "f8[:,::1], f8, f8[:,::1], f8[:,::1], f8[:,::1], f8, f8", 0.2),
     "standing": ("standing.standing_rays", "f8[:,::1], i8[:,::1], b1[::1], i8, i8", 0.2),
+    "passing area": ("standing.passing_area", "f8[:,::1], i8[:,::1], b1[::1]", 0.1),
     "traced angles": (
         "standing.traced_squares",
         "i8[::1], i8[::1], f8[::1], f8[::1], f8[::1], f8[::1], f8, f8, f8, f8[::1], f8[::1], f8[:,::1]",

@@ -240,7 +240,7 @@ def draw_matrix_ghosts(
     squares = np.empty(rows.size)
     to_stop = np.empty((MOST_CROSSINGS, 2, 2))
     across = to_stop if curvature_x is None else np.empty((MOST_CROSSINGS, 2, 2))
-    rim = _rim(entrance)
+    rim = _rim(entrance, RIM)
     if mask is not None:
         texture = mask_texture(mask, MOST_CROSSINGS, width)
         corner, stops = np.empty((3, 2)), np.empty((MOST_CROSSINGS, 3, 2))
@@ -270,7 +270,7 @@ def draw_matrix_ghosts(
 @compiled
 def weigh_matrix_ghosts(
     rows, actions, starts, crossings, curvature, curvature_x, z_vertex, n_gap, reflectance, sensor_z,
-    entrance, slope, slope_x, nearness, edges, iris_radius, axes, to_pixels, gain, width, height, found,
+    entrance, slope, slope_x, nearness, edges, iris_radius, axes, to_pixels, gain, width, height, sides, found,
 ):  # fmt: skip
     """Tell how bright the ghosts of `draw_matrix_ghosts` are, and how much of each is in the picture.
 
@@ -284,6 +284,8 @@ def weigh_matrix_ghosts(
         As there.
     width, height : float
         Pixels.
+    sides : int
+        Straight edges that stand for the round rim of the entrance; `RIM` as they are drawn.
     found : ndarray, shape (P, 2)
         Filled with the flux within the picture, and the flux per pixel where the ghost is.
     """
@@ -292,7 +294,7 @@ def weigh_matrix_ghosts(
     squares = np.empty(rows.size)
     to_stop = np.empty((MOST_CROSSINGS, 2, 2))
     across = to_stop if curvature_x is None else np.empty((MOST_CROSSINGS, 2, 2))
-    rim = _rim(entrance)
+    rim = _rim(entrance, sides)
     for p in range(starts.size - 1):
         found[p, 0] = found[p, 1] = 0.0
         count, even = _place_ghost(
@@ -368,13 +370,13 @@ def _centre(to_stop, slope, iris_radius, entrance):
 
 
 @inner
-def _rim(entrance):
-    """Return the rim of the entrance as a polygon, shape (RIM, 2)."""
+def _rim(entrance, sides):
+    """Return the rim of the entrance as a polygon, shape (sides, 2)."""
     # circumscribed a little, so that the polygon has the area of the circle
-    radius = entrance * sqrt(2.0 * np.pi / (RIM * np.sin(2.0 * np.pi / RIM)))
-    rim = np.empty((RIM, 2))
-    for k in range(RIM):
-        angle = 2.0 * np.pi * k / RIM
+    radius = entrance * sqrt(2.0 * np.pi / (sides * np.sin(2.0 * np.pi / sides)))
+    rim = np.empty((sides, 2))
+    for k in range(sides):
+        angle = 2.0 * np.pi * k / sides
         rim[k, 0], rim[k, 1] = radius * np.cos(angle), radius * np.sin(angle)
     return rim
 
@@ -382,7 +384,7 @@ def _rim(entrance):
 @inner
 def _project_entrance(polygon, rim, slope, slope_x, a, b, ax, bx, to_stop, across, crossings, axes):
     """Fill a polygon with the rim of the entrance: its images on the sensor and at each crossing of the stop."""
-    for k in range(RIM):
+    for k in range(rim.shape[0]):
         x, y = rim[k, 0], rim[k, 1]
         polygon[k, PX], polygon[k, PY] = ax * x + bx * slope_x, a * y + b * slope
         polygon[k, PREL], polygon[k, PW] = 0.0, 1.0
@@ -391,5 +393,4 @@ def _project_entrance(polygon, rim, slope, slope_x, a, b, ax, bx, to_stop, acros
             u, v = across[c, 0, 0] * x + across[c, 0, 1] * slope_x, to_stop[c, 0, 0] * y + to_stop[c, 0, 1] * slope
             polygon[k, PSTOP + 2 * c] = u * axes[0, 0] + v * axes[1, 0]
             polygon[k, PSTOP + 2 * c + 1] = u * axes[0, 1] + v * axes[1, 1]
-    # a bare constant would be a type of its own and compile what it is given to twice
-    return np.int64(RIM)
+    return np.int64(rim.shape[0])

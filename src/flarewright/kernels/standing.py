@@ -121,6 +121,31 @@ def standing_rays(pupil, triangles, passing, step, count):
 
 
 @compiled
+def passing_area(pupil, triangles, passing):
+    """Tell how much of the pupil the nodes of a bundle that pass stand for.
+
+    Parameters
+    ----------
+    pupil, triangles, passing
+        As in `standing_rays`.
+
+    Returns
+    -------
+    float
+        mm^2: each node stands for a third of its triangles.
+    """
+    total = 0.0
+    for t in range(triangles.shape[0]):
+        a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+        count = int(passing[a]) + int(passing[b]) + int(passing[c])
+        if count > 0:
+            x1, y1 = pupil[b, 0] - pupil[a, 0], pupil[b, 1] - pupil[a, 1]
+            x2, y2 = pupil[c, 0] - pupil[a, 0], pupil[c, 1] - pupil[a, 1]
+            total += count * abs(x1 * y2 - y1 * x2)
+    return total / 6.0
+
+
+@compiled
 def traced_squares(rows, actions, curvature, conic, z_vertex, n_gap, sensor_z, tilt, nearness, px, py, squares):
     """Compute at which angles rays meet the surfaces of a path.
 

@@ -79,12 +79,16 @@ class BandCurves:
     @cached_property
     def tables(self) -> Floats:
         """Means over the bands as `PackedLens.reflectance` holds them, shape (W, K, REFLECTANCE_SAMPLES)."""
-        means = np.ascontiguousarray(np.moveaxis(self.reflectance[:, :, len(CURVE_NM) :], 2, 0))
+        means = np.moveaxis(self.reflectance[:, :, len(CURVE_NM) :], 2, 0)
         place = np.linspace(0.0, COSINES - 1.0, REFLECTANCE_SAMPLES)
         cell = np.minimum(place.astype(np.intp), COSINES - 2)
-        low, high = means[:, :, cell], means[:, :, cell + 1]
-        # what is picked out lies in another order, and kernels would be compiled for it once more
-        return np.ascontiguousarray(low + (place - cell) * (high - low))
+        low = np.ascontiguousarray(means[:, :, :-1])
+        rise = means[:, :, 1:] - low
+        # kernels would be compiled for another order in memory once more; `take` keeps it
+        tables = np.take(rise, cell, axis=2)
+        tables *= place - cell
+        tables += np.take(low, cell, axis=2)
+        return tables
 
 
 @dataclass(frozen=True)
@@ -127,7 +131,7 @@ def coating_curves(
     """
     n_d = gap_indices(lens, D_LINE_NM)
     films = [
-        ((), ()) if isinstance(row, Stop) else film_stack(coatings[k], n_d[k], n_d[k + 1])
+        ((), ()) if isinstance(row, Stop) else _films(coatings[k], float(n_d[k]), float(n_d[k + 1]))
         for k, row in enumerate(lens.rows)
     ]
     if not any(indices for indices, _ in films):
@@ -143,6 +147,11 @@ def coating_curves(
 
 
 # every frame of a sequence asks for the same
+@lru_cache(maxsize=1024)
+def _films(coating: Coating | None, n_front: float, n_back: float) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    return film_stack(coating, n_front, n_back)
+
+
 @lru_cache(maxsize=16)
 def _stacked(surfaces: tuple[_Surface, ...], sensor: float | None) -> CoatingCurves:
     rows = [_curves(*surface) for surface in surfaces]

@@ -53,7 +53,7 @@ def compile_for_render(
     if project.quality.mode == "final":
         names += ["draw" if iris.mask is None else "draw masked", "densities", "pixels", "double"]
         if project.quality.bridge and project.quality.wavelengths > 1:
-            names += ["shifts", "seen", "standing"]
+            names += ["shifts", "seen", "standing", "passing area"]
             names += ["traced angles", "path curves"] if coated else []
         if project.quality.ringing != "off":
             names += ["path matrices", "reached edges", "edge's part"]
@@ -68,7 +68,8 @@ def compile_for_render(
 
         names += ["matrices", "path matrices", "row sums"]
         names += ["matrix angles", "path curves"] if coated else []
-        if len(ghost_paths(settled.lens, project.quality.paths)) * len(project.lights) >= CROWD:
+        bridged = project.quality.bridge and project.quality.wavelengths > 1
+        if bridged or len(ghost_paths(settled.lens, project.quality.paths)) * len(project.lights) >= CROWD:
             names += ["ghosts' light"]
     if project.output.starburst:
         names += ["fan wings" if iris.blades == 0 or iris.mask is not None else "blade wings"]

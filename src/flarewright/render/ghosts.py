@@ -307,8 +307,9 @@ def _draft(
             for together in shifted.values():
                 placed = together[0][1].place(shot.to_pixels, None)
                 alike_placed = [path for path, _ in together]
-                graded = draft_colors(shot, alike_placed) * np.array([changed.rgb for _, changed in together])[:, None]
-                draw_draft(replace(shot, to_pixels=placed), alike_placed, picture, graded)
+                elsewhere = replace(shot, to_pixels=placed)
+                grades = np.array([changed.rgb for _, changed in together])[:, None]
+                draw_draft(elsewhere, alike_placed, picture, draft_colors(elsewhere, alike_placed) * grades)
             for path, changed in by_hand:
                 if changed.framed and not changed.alone:
                     draw_draft_by_hand(shot, path, changed, picture)

@@ -15,23 +15,32 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernels.matrix import draw_matrix_ghosts, matrix_squares, path_matrices, weigh_matrix_ghosts
+from ..kernels.matrix import RIM, draw_matrix_ghosts, matrix_squares, path_matrices, weigh_matrix_ghosts
 from ..kernels.raster import sum_rows
 from ..kernels.spread_marks import spread_marks
-from ..optics.coating_curves import joined_steps
+from ..optics.coating_curves import PathSpectrum, joined_steps, path_spectra
 from ..optics.color import luminance_weights
 from ..optics.paths import LightPath
 from .art import Frame, PathArt
+from .between import FINE_NM
 from .canvas import DETAIL_CONTRAST, DETAILS, Plane, merge
 from .grade import coarseness, finish
-from .path_color import draft_weights
 from .shot import Shot
 from .spread import shape_kernel, spread_within
+from .steep import bent_weights, steep_paths
 
 Floats = NDArray[np.float64]
 
 # of the largest, what sums of differences may be wrong by
 ROUNDING = 1e-12
+# what carries less than this part of the light is totally reflected somewhere
+TOTAL = 1e-13
+# farther than any ghost is from the picture, pixels
+EVERYWHERE = 10**7
+# every so manieth of the many wavelengths is looked at where few suffice
+FINE_STEP = 3
+# straight edges of the entrance there: what is asked is how fluxes compare
+SIDES = 12
 
 
 def draw_draft(
@@ -76,12 +85,82 @@ def draft_colors(shot: Shot, paths: Sequence[LightPath]) -> Floats:
     ndarray, shape (P, W, 3)
     """
     packed = shot.packed
-    if shot.curves is None or not paths:
-        return np.repeat(shot.weights(packed.wavelengths_nm)[None], len(paths), axis=0)
+    if not paths:
+        return np.zeros((0, len(packed.wavelengths_nm), 3))
+    spectra, squares = _spectra(shot, paths)
+    plain = shot.weights(packed.wavelengths_nm, spectra)
+    colors = np.repeat(plain[None], len(paths), axis=0) if spectra is None else plain
+    if shot.between is None:
+        return colors
+    flux = _fluxes(shot, paths, packed.n_gap, packed.reflectance)
+    for steep, every in zip(steep_paths(shot, flux, spectra), (FINE_STEP, 1), strict=True):
+        if steep.size == 0:
+            continue
+        fine, bands = shot.between.finer
+        few = [paths[int(k)] for k in steep]
+        found = _fluxes(shot, few, fine.n_gap[::every], fine.reflectance[::every])
+        own, carried = None, None
+        if spectra is not None and bands is not None:
+            starts = joined_steps(tuple(paths))[2]
+            angles = np.concatenate([squares[starts[k] : starts[k + 1]] for k in steep])
+            own = PathSpectrum(spectra.passed[steep], spectra.carried[steep])
+            carried = path_spectra(bands, few, angles[None]).carried[:, ::every]
+        colors[steep] = bent_weights(shot, flux[steep], own, FINE_NM[::every], found, carried)
+    return colors
+
+
+def _spectra(shot: Shot, paths: Sequence[LightPath]) -> tuple[PathSpectrum | None, Floats]:
+    """Compute what coatings let pass along paths, and at which angles: of the rays that they have their colours from.
+
+    The angles are joined as `path_spectra` takes them.
+    """
+    if shot.curves is None:
+        return None, np.empty(0)
+    middle = len(shot.packed.n_gap) // 2
+    squares = _squares(shot, paths, middle)
+    spectra = path_spectra(shot.curves, paths, squares[None])
+    # a ray may be totally reflected at one wavelength, and not at another
+    starts = joined_steps(tuple(paths))[2]
+    for w in sorted(range(len(shot.packed.n_gap)), key=lambda w: abs(w - middle))[1:]:
+        dark = np.flatnonzero(spectra.carried.max(axis=1) < TOTAL)
+        if dark.size == 0:
+            break
+        few = [paths[int(k)] for k in dark]
+        other = _squares(shot, few, w)
+        squares[np.concatenate([np.arange(starts[k], starts[k + 1]) for k in dark])] = other
+        found = path_spectra(shot.curves, few, other[None])
+        spectra.passed[dark], spectra.carried[dark] = found.passed, found.carried
+    return spectra, squares
+
+
+def _squares(shot: Shot, paths: Sequence[LightPath], w: int) -> Floats:
+    """Compute the angles of one ray of each path at a traced wavelength."""
     steps, view, _ = _steps(shot, paths)
     squares = np.empty(len(steps[0]))
-    matrix_squares(*steps, packed.n_gap[len(packed.n_gap) // 2], packed.sensor_z, *view, shot.opening.radius, squares)
-    return draft_weights(shot, paths, squares)
+    matrix_squares(*steps, shot.packed.n_gap[w], shot.packed.sensor_z, *view, shot.opening.radius, squares)
+    return squares
+
+
+def _fluxes(shot: Shot, paths: Sequence[LightPath], n_gap: Floats, reflectance: Floats) -> Floats:
+    """Compute what each ghost brings into the picture at some wavelengths, per unit irradiance, shape (P, M).
+
+    `n_gap` and `reflectance` are as in `PackedLens`, at these. Of an area light, which brings in what lands beside the
+    picture, all that it brings anywhere.
+    """
+    packed, opening = shot.packed, shot.opening
+    steps, view, axes = _steps(shot, paths)
+    to_pixels, (width, height) = shot.to_pixels, shot.size_px
+    if shot.border is not None:
+        to_pixels = to_pixels + np.array([EVERYWHERE, EVERYWHERE, 0.0, 0.0])
+        width, height = 2 * EVERYWHERE, 2 * EVERYWHERE
+    found, seen = np.empty((len(paths), len(n_gap))), np.empty((len(paths), 2))
+    for m in range(len(n_gap)):
+        weigh_matrix_ghosts(
+            *steps, n_gap[m], reflectance[m], packed.sensor_z, *view, opening.edges, opening.radius, axes,
+            to_pixels, 1.0, float(width), float(height), SIDES, seen,
+        )  # fmt: skip
+        found[:, m] = seen[:, 0]
+    return found
 
 
 def _steps(shot: Shot, paths: Sequence[LightPath]) -> tuple[tuple[Any, ...], tuple[float, float, float, float], Floats]:
@@ -132,7 +211,7 @@ def weigh_drafts(shot: Shot, paths: Sequence[LightPath], colors: Floats) -> Floa
     seen = np.empty((len(paths), 2))
     weigh_matrix_ghosts(
         *steps, packed.n_gap[middle], packed.reflectance[middle], packed.sensor_z, *view, opening.edges, opening.radius,
-        axes, shot.to_pixels, shot.gain, float(width), float(height), seen,
+        axes, shot.to_pixels, shot.gain, float(width), float(height), RIM, seen,
     )  # fmt: skip
     light: Floats = colors.sum(axis=1) @ luminance_weights(shot.colorspace)
     return seen * light[:, None]
@@ -210,8 +289,8 @@ def draw_draft_by_hand(shot: Shot, path: LightPath, art: PathArt, differences: F
     differences : ndarray, shape (H, W, 3), float64
         As in `draw_draft`.
     """
-    placed = art.place(shot.to_pixels, _frame(shot, path) if art.framed else None)
-    draw_draft(replace(shot, to_pixels=placed), [path], differences, draft_colors(shot, [path]) * art.rgb)
+    moved = replace(shot, to_pixels=art.place(shot.to_pixels, _frame(shot, path) if art.framed else None))
+    draw_draft(moved, [path], differences, draft_colors(moved, [path]) * art.rgb)
 
 
 def draft_alone(
@@ -248,7 +327,7 @@ def draft_alone(
     places = [each.place(shot.to_pixels, frame) / 2.0**detail for each, frame in zip(art, frames, strict=True)]
     for (lit, path), each, placed in zip(ghosts, art, places, strict=True):
         moved = replace(lit, to_pixels=placed + np.array([mx, my, 0.0, 0.0]))
-        draw_draft(moved, [path], sheet, draft_colors(lit, [path]) * each.rgb)
+        draw_draft(moved, [path], sheet, draft_colors(replace(lit, to_pixels=placed * 2.0**detail), [path]) * each.rgb)
     sum_rows(sheet, sheet)
     if kernel is not None:
         sheet = spread_within(sheet, kernel)
@@ -287,9 +366,9 @@ def mark_spread(
         scratch = np.zeros(sides).ravel()
     marks = scratch[: np.prod(sides)].reshape(sides)
     for (lit, path), each in zip(ghosts, art, strict=True):
-        placed = each.place(shot.to_pixels, _frame(lit, path) if each.framed else None) / 2.0**halved
-        moved = replace(lit, to_pixels=placed + np.array([mx, my, 0.0, 0.0]))
-        draw_draft(moved, [path], marks, draft_colors(lit, [path]) * each.rgb)
+        placed = each.place(shot.to_pixels, _frame(lit, path) if each.framed else None)
+        moved = replace(lit, to_pixels=placed / 2.0**halved + np.array([mx, my, 0.0, 0.0]))
+        draw_draft(moved, [path], marks, draft_colors(replace(lit, to_pixels=placed), [path]) * each.rgb)
     held = sheets[halved]
     if held is None:
         held = sheets[halved] = np.zeros((height, width, 3))

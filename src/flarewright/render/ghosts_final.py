@@ -35,9 +35,10 @@ from .few_colors import gathered_weights
 from .final_pass import FinalPass
 from .grade import coarseness, finish
 from .path_color import seen_of, traced_spectrum
-from .shot import Shot
+from .shot import Shot, finer
 from .sources import NARROW_PX, halvings, motion, spread_border
 from .spread import shape_kernel, spread_within
+from .steep import bundle_is_steep
 
 if TYPE_CHECKING:
     from ..optics.fresnel import Box
@@ -219,6 +220,9 @@ def draw_final(
     )  # fmt: skip
     count = len(shot.packed.wavelengths_nm)
     spectrum = traced_spectrum(shot, path, bundle, item.to_pixels)
+    if not few and bundle_is_steep(shot, bundle, spectrum, item.to_pixels):
+        draw_final(_finer(item), quality, canvas, visibility, stop, around)
+        return
     if few and _drawn_in_few(item, bundle, spectrum, canvas.plane(detail), to_pixels, careful=not quality.screen):
         return
     rings, step_px, sharp = None, BRIDGE_PX, bundle
@@ -271,6 +275,16 @@ def draw_final(
                     data, whole.pupil, whole.triangles, densities, path.stop_crossings, opening.blades,
                     opening.levels, shot.incidence.axes, place, shot.gain, rgb * share, plane, whole.halves,
                 )  # fmt: skip
+
+
+def _finer(item: FinalPass) -> FinalPass:
+    """Look again where a path accepts light, at more wavelengths."""
+    shot = finer(item.shot)
+    found = find_region(shot.packed, item.path, shot.incidence.tilt, shot.opening.radius, item.view_radius)
+    orders = item.orders
+    if orders and shot.grating is not None and item.path.second_reflection is not None:
+        orders = grating_orders(shot.packed, item.path.second_reflection, shot.grating)
+    return replace(item, shot=shot, region=item.region if found is None else found, orders=orders)
 
 
 def _places(item: FinalPass, to_pixels: Floats, w: int, part: float) -> list[tuple[Floats, float]]:

@@ -22,7 +22,7 @@ RAYS = 48
 # and these are looked for among so many triangles of its grid
 TRIANGLES = 512
 
-__all__ = ["direct_flux", "direct_spectrum", "draft_weights", "place_of", "seen_of", "spread_rays", "traced_spectrum"]
+__all__ = ["direct_flux", "direct_spectrum", "place_of", "seen_of", "spread_rays", "traced_spectrum"]
 
 
 def traced_spectrum(shot: Shot, path: LightPath, bundle: Bundle, to_pixels: Floats) -> PathSpectrum | None:
@@ -191,22 +191,3 @@ def direct_flux(shots: Sequence[Shot], lens: Lens, throughputs: Sequence[Floats]
             passed = np.interp(fine_nm, CURVE_NM, spectrum.passed)
             flux[k] = np.interp(fine_nm, traced_nm, throughput / spectrum.carried) * passed
     return flux
-
-
-def draft_weights(shot: Shot, paths: Sequence[LightPath], squares: Floats) -> Floats:
-    """Return the RGB weights of the traced wavelengths for each of some paths.
-
-    Parameters
-    ----------
-    shot : Shot
-    paths : sequence of LightPath
-        Of two reflections each.
-    squares : ndarray, shape (steps,)
-        From `kernels.matrix.matrix_squares`.
-
-    Returns
-    -------
-    ndarray, shape (P, W, 3)
-    """
-    assert shot.curves is not None, "no row has a film"
-    return shot.weights(shot.packed.wavelengths_nm, path_spectra(shot.curves, paths, squares[None]))

@@ -17,6 +17,7 @@ from ..optics.bundle import Incidence, incidence
 from ..optics.coating_curves import CURVE_NM, BandCurves, PathSpectrum
 from ..optics.pack import PackedLens, facing
 from ..optics.spectrum import band_parts, band_weights, hats
+from .between import Between
 from .opening import Opening
 
 if TYPE_CHECKING:
@@ -55,6 +56,8 @@ class Shot:
     curves : BandCurves or None
         What coatings do between the traced wavelengths, whose rays carry the means over bands; None where rays carry
         the reflectances at the traced wavelengths, and colours between them are straight.
+    between : Between or None
+        The lens between the traced wavelengths; None where there is no light, or none is drawn.
     """
 
     light: Light
@@ -70,6 +73,7 @@ class Shot:
     border: Floats | None = None
     grating: SensorGrating | None = None
     curves: BandCurves | None = None
+    between: Between | None = None
 
     @property
     def gain(self) -> float:
@@ -134,6 +138,14 @@ def moved(shot: Shot, slope: Floats) -> Shot:
     seen = incidence((x, y), light.distance, shot.packed.first_order.entrance_pupil_z)
     packed = facing(shot.packed, seen.axes, seen.nearness)
     return replace(shot, light=light, incidence=seen, packed=packed, border=None)
+
+
+def finer(shot: Shot) -> Shot:
+    """Return a shot at the many wavelengths that its `between` has."""
+    assert shot.between is not None, "no light between the traced wavelengths"
+    packed, bands = shot.between.finer
+    seen = shot.incidence
+    return replace(shot, packed=facing(packed, seen.axes, seen.nearness), curves=bands, between=None)
 
 
 @lru_cache(maxsize=512)

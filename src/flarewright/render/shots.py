@@ -10,10 +10,11 @@ from ..errors import ProjectError
 from ..model import Light, Project
 from ..optics.border import closed
 from ..optics.bundle import Incidence, incidence, least_distance
-from ..optics.coating_curves import BandCurves, band_curves, coating_curves
-from ..optics.pack import PackedLens, facing, pack_lens, resolve_coatings
+from ..optics.coating_curves import BandCurves, coating_curves
+from ..optics.pack import PackedLens, facing, resolve_coatings
 from ..optics.source import parts
 from ..optics.spectrum import at_its_lines, sampled_wavelengths, traced_wavelengths
+from .between import FINE_NM, Between, lens_between
 from .holdout import read_plates, seen_part
 from .opening import Opening
 from .prepare import Settled
@@ -44,22 +45,20 @@ def make_shots(settled: Settled, opening: Opening, *, sampled: bool = False) -> 
     bridged = quality.bridge and quality.mode != "reference"
     curves = coating_curves(settled.lens, coatings, settled.sensor) if bridged else None
     choose = sampled_wavelengths if sampled else traced_wavelengths
-    packs: dict[tuple[object, ...], tuple[PackedLens, BandCurves | None]] = {}
+    packs: dict[tuple[object, ...], tuple[PackedLens, BandCurves | None, Between | None]] = {}
     shots: list[Shot] = []
     for number, light in enumerate(project.lights):
         wavelengths_nm = choose(quality.wavelengths, light.spectrum)
         # the lines of a spectrum are traced as they are
         banded = curves is not None and not at_its_lines(light.spectrum, wavelengths_nm)
         traced = tuple(wavelengths_nm.tolist())
-        key = (traced, light.spectrum if banded else None)
+        key = (traced, light.spectrum)
         if key not in packs:
-            bands = band_curves(curves, light.spectrum, traced) if banded and curves is not None else None
-            lens = pack_lens(
-                settled.lens, settled.order, coatings, wavelengths_nm, sensor=settled.sensor,
-                in_bands=None if bands is None else bands.tables[:, : len(settled.lens.rows)],
-            )  # fmt: skip
-            packs[key] = lens, bands
-        of_light, bands = packs[key]
+            of_bands = curves if banded else None
+            between = lens_between(settled.lens, settled.order, coatings, settled.sensor, of_bands, light.spectrum)
+            steep = bridged and not at_its_lines(light.spectrum, wavelengths_nm) and 1 < len(traced) < len(FINE_NM)
+            packs[key] = *between.packed_at(wavelengths_nm), between if steep else None
+        of_light, bands, between_them = packs[key]
         whole = []
         for part in parts(light, quality.source_step_deg):
             changes = {"field_deg": part.field_deg, "intensity": light.intensity * part.share, "holdout": None}
@@ -80,6 +79,7 @@ def make_shots(settled: Settled, opening: Opening, *, sampled: bool = False) -> 
                     border=closed(part.corners) if light.extended else None,
                     grating=project.camera.sensor_grating,
                     curves=bands,
+                    between=between_them,
                 )
             )
         shots += whole if project.holdout is None and light.holdout is None else _unhidden(settled, light, whole)
