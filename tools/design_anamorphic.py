@@ -1,10 +1,17 @@
 """Design the adapter of `lenses/anamorphic-heliar-2x.toml`: two doublets of cylinders, afocal, in front of the Heliar.
 
-Thin lenses give the start: a front doublet of focal length -F / 2 and a rear one of F, F / 2 apart, each corrected for
-colour. Then the six radii across and the gap between the doublets are chosen by least squares, so that in the x-z plane
-the focal length is half of that along y, both foci fall together, and rays at four angles and three wavelengths meet.
-Prints the radii, rounded, the gap, and the misses in micrometres before rounding. Needs SciPy:
-`python tools/design_anamorphic.py`.
+Thin lenses give the start: a front doublet of focal length -F / 2 and a rear one of F, each corrected for colour. Then
+the six radii across and the gap between the doublets are chosen by least squares, so that in the x-z plane the focal
+length is half of that along y, both foci fall together, rays at four angles and three wavelengths meet, and the streak
+is even.
+
+Every two of the four faces between glass and air make a streak on the line through the light. To first order light that
+enters at the height h across lands at S00 h, so per mm of a streak there is the more light the smaller S00 is. The two
+faces that look at each other make the one that is wanted: it is longer than the picture is wide, and even where the
+five others, which end within the picture, are faint beside it.
+
+Prints the radii, rounded, the gap, the misses in micrometres before rounding, and of each pair of faces its light per
+mm over that of the wanted one and its length at f/8. Needs SciPy: `python tools/design_anamorphic.py`.
 """
 
 from __future__ import annotations
@@ -14,12 +21,13 @@ from scipy.optimize import brentq, least_squares
 
 from flarewright.io.media import attach
 from flarewright.model import Lens, Surface
-from flarewright.optics.paraxial import first_order
+from flarewright.optics.paraxial import D_LINE_NM, FirstOrder, first_order, path_matrices
+from flarewright.optics.paths import ghost_path
 from flarewright.optics.shape import transposed
 from flarewright.optics.trace import trace_polylines
 from flarewright.render.prepare import load_lens
 
-REAR_MM = 150.0
+REAR_MM = 100.0
 FRONT_MM = -REAR_MM / 2.0
 CROWN, FLINT = (attach(name, None, None)[0] for name in ("N-LAK9", "N-SF5"))
 THICKNESS = (5.0, 18.0, 4.0, 12.0, 4.0)  # front crown, front flint, rear flint, rear crown, air to the lens
@@ -27,6 +35,12 @@ ANGLES = (0.0, 5.0, 10.0, 14.0)
 WAVELENGTHS_NM = {587.56: 1.0, 486.1: 0.5, 656.3: 0.5}
 PUPIL = np.array([-0.8, -0.4, 0.0, 0.4, 0.8])
 PER_MM = 4.0
+# faces between glass and air, in pairs: the wanted streak's first
+WANTED, OTHERS = (3, 2), ((2, 0), (3, 0), (5, 0), (5, 2), (5, 3))
+# how much the others' light per mm of the sensor counts
+EVEN = 0.3
+# the most curved face must still pass the beam, whose half width is 23 mm
+LEAST_RADIUS_MM = 36.0
 BASE = load_lens("heliar-tronnier")
 OWN = first_order(BASE)
 
@@ -45,19 +59,19 @@ def adapter(values: np.ndarray) -> Lens:
 
 
 def start() -> np.ndarray:
-    """Return thin achromats: powers P V / (V - V') of crown and flint, bent about evenly."""
+    """Return thin achromats: powers P V / (V - V') of crown and flint, bent towards the gap between them."""
     split = CROWN.v_d - FLINT.v_d
     crown, flint = CROWN.v_d / split / (CROWN.n_d - 1.0), -FLINT.v_d / split / (FLINT.n_d - 1.0)
-    first = 0.35 * crown / FRONT_MM
+    first = 0.6 * crown / FRONT_MM
     second = first - crown / FRONT_MM
     third = second - flint / FRONT_MM
     last = -0.45 * crown / REAR_MM
     fifth = last + crown / REAR_MM
-    return np.array([first, second, third, fifth + flint / REAR_MM, fifth, last, REAR_MM + FRONT_MM])
+    return np.array([first, second, third, fifth + flint / REAR_MM, fifth, last, 15.0])
 
 
 def misses(values: np.ndarray) -> np.ndarray:
-    """Return how far focal length and focus are off, and where rays land beside their chief ray, weighted."""
+    """Return how far focal length and focus are off, rays land beside their chief ray, and the streak is uneven."""
     lens = adapter(values)
     order = first_order(lens)
     assert order.efl_x is not None
@@ -78,7 +92,17 @@ def misses(values: np.ndarray) -> np.ndarray:
             places = np.interp(PUPIL * 0.8 * OWN.stop_semi_diameter, at_stop[rising], landed[rising])
             middle = places[2] if middle is None else middle
             found += list(weight * PER_MM * (places - middle))
+    wanted = streak(lens, order, WANTED)[0]
+    found += [EVEN * wanted / streak(lens, order, pair)[0] for pair in OTHERS]
+    found.append(20.0 * max(0.0, LEAST_RADIUS_MM * np.abs(values[:6]).max() - 1.0))
     return np.array(found)
+
+
+def streak(lens: Lens, order: FirstOrder, pair: tuple[int, int]) -> tuple[float, float]:
+    """Return across S00 of a ghost and its height on the sensor over that in the stop."""
+    sensor_z = sum(row.thickness for row in lens.rows[:-1]) + order.sensor_distance
+    (*_, to_stop), total = path_matrices(lens, ghost_path(lens, *pair), D_LINE_NM, sensor_z, across=True)
+    return float(total[0, 0]), float(total[0, 0] / to_stop[0, 0])
 
 
 def _apart(radii: np.ndarray, gap: float) -> float:
@@ -90,7 +114,7 @@ def _apart(radii: np.ndarray, gap: float) -> float:
 def main() -> None:
     """Design it and tell."""
     scale = np.abs(start())
-    solved = least_squares(lambda x: misses(x * scale), start() / scale, diff_step=1e-4, max_nfev=25)
+    solved = least_squares(lambda x: misses(x * scale), start() / scale, diff_step=1e-4, max_nfev=100)
     values = solved.x * scale
     radii = np.round(1.0 / values[:6], 2)
     gap = brentq(lambda gap: _apart(radii, gap), values[6] - 10.0, values[6] + 10.0)
@@ -98,7 +122,14 @@ def main() -> None:
     order = first_order(adapter(np.array([*1.0 / radii, gap])))
     print(f"efl {order.efl:.3f} along y, {order.efl_x:.3f} across")
     weights = np.repeat(np.tile(list(WAVELENGTHS_NM.values()), len(ANGLES)), len(PUPIL)) * PER_MM
-    print(np.round(1e3 * solved.fun[2:] / weights).reshape(len(ANGLES), len(WAVELENGTHS_NM), len(PUPIL)))
+    shape = len(ANGLES), len(WAVELENGTHS_NM), len(PUPIL)
+    print(np.round(1e3 * solved.fun[2 : 2 + len(weights)] / weights).reshape(shape))
+    lens = adapter(np.array([*1.0 / radii, gap]))
+    wanted = streak(lens, order, WANTED)[0]
+    half = first_order(lens, 8.0).stop_semi_diameter
+    for pair in (WANTED, *OTHERS):
+        own, height = streak(lens, order, pair)
+        print(f"{pair[0]}-{pair[1]}: light per mm {abs(wanted / own):.2f}, length {2.0 * half * abs(height):.1f} mm")
 
 
 if __name__ == "__main__":

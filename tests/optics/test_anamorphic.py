@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flarewright.model import Camera, Light, Output, Preset, Project, Quality
+from flarewright.model import Art, Camera, Everywhere, Light, Output, Preset, Project, Quality, Rule
+from flarewright.model.coating import Bare
 from flarewright.optics.pack import pack_lens
 from flarewright.optics.paraxial import D_LINE_NM, first_order
 from flarewright.optics.paths import direct_path, ghost_path
@@ -69,6 +70,40 @@ def test_two_faces_of_a_cylinder_make_a_streak(lens, packed):
             assert away.max() < 0.01 * max(float(np.ptp(x)), 3.0), (j, i)
             longest = max(longest, float(np.ptp(x)))
     assert longest > 10.0
+
+
+def streak(coating, field, f_number):
+    """Light of all pairs of faces between glass and air, column by column; blue, and red over blue."""
+    pairs = [Rule(select=pair, enable=True) for pair in ("2-0", "3-0", "5-0", "3-2", "5-2", "5-3")]
+    project = Project(
+        lens=LENS, lights=(Light(field_deg=field),), coating=coating, f_number=f_number,
+        camera=Camera(size_px=(180, 48), desqueeze=True), quality=Quality(wavelengths=3, ringing="off", bridge=False),
+        output=Output(starburst=False, layers="passes"), art=Art(rules=(Rule(select="all", enable=False), *pairs)),
+    )  # fmt: skip
+    layer = {layer.name: layer for layer in render(project).layers}["ghosts"]
+    light = np.zeros((180, 3))
+    x, _, width, _ = layer.window
+    light[x : x + width] = layer.pixels.sum(axis=0)
+    return light[:, 2], light[:, 0].sum() / light[:, 2].sum()
+
+
+@pytest.mark.parametrize(("field", "f_number"), [((6.0, 1.5), 8.0), ((2.0, 0.3), 8.0), ((9.0, 1.0), 4.0)])
+def test_the_streak_is_blue_and_even(field, f_number):
+    """From border to border: no pair of faces ends within the picture and is bright beside the one that does not."""
+    blue, red = streak(Preset(name="blue-streak"), field, f_number)
+    assert red < 0.25
+    even = blue / np.median(blue)
+    assert even.min() > 0.8
+    assert even.max() < 1.2
+    # what ends does so softly: no dashes
+    assert np.abs(np.diff(even)).max() < 0.04
+
+
+def test_the_streak_of_bare_glass_has_no_dashes():
+    """All six pairs count; of the former adapter one place had ten times as much light as another."""
+    light, _ = streak(Everywhere(coating=Bare()), (6.0, 1.5), 8.0)
+    assert light.max() < 4.0 * light.min()
+    assert np.abs(np.diff(light)).max() < 0.15 * np.median(light)
 
 
 def test_ghosts_of_the_lens_behind_it_are_ovals(lens, packed):

@@ -3,9 +3,9 @@
 import pytest
 
 from flarewright.io.library import shipped
-from flarewright.model import Bare, Preset
+from flarewright.model import Bare, Light, Preset, Project
 from flarewright.optics.pack import resolve_coatings
-from flarewright.render.photographed import plausible_preset, stopped_down
+from flarewright.render.photographed import as_photographed, plausible_preset, stopped_down
 from flarewright.render.prepare import load_lens
 
 
@@ -36,3 +36,12 @@ def test_a_lens_without_films_of_its_time_wears_the_first_that_it_names():
     assert plausible_preset(bare) == "staggered"
     coatings = lens.coating_presets["single-coated"]
     assert plausible_preset(bare.replace(coating_presets={"single-coated": coatings, "maker": coatings})) == "maker"
+
+
+def test_rings_behind_cylinders_are_left_out_unless_they_are_asked_for():
+    shot = Project(lens="anamorphic-heliar-2x", lights=(Light(field_deg=(6.0, 3.0)),))
+    filled, told = as_photographed(shot)
+    assert filled.quality.ringing == "off"
+    assert "no rings in ghosts, which take most of the time behind cylinders" in told
+    assert as_photographed(shot, {"quality.ringing"})[0].quality.ringing == "collins"
+    assert as_photographed(shot.replace(lens="heliar-tronnier"))[0].quality.ringing == "collins"

@@ -68,6 +68,7 @@ def said_by(flags: Flags) -> frozenset[str]:
         "iris.roughness_um": flags.roughness is not None,
         "iris.mask": flags.iris_image is not None,
         "lights": any(sizes),
+        "quality.ringing": flags.ringing is not None,
     }
     return frozenset(name for name, value in given.items() if value)
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Set as AbstractSet
 
 from ..io.library import is_shipped, lens_path
-from ..model import Iris, Lens, Light, Preset, Project
+from ..model import Iris, Lens, Light, Preset, Project, Surface
 from ..optics.pack import PERIOD, STAGGERED
 from .prepare import load_lens
 
@@ -40,7 +40,8 @@ def as_photographed(project: Project, said: AbstractSet[str] = frozenset()) -> t
     project : Project
         Of a shipped lens by its name; any other is returned as it is.
     said : set of str
-        What stays: "f_number", "coating", "iris.blades", "iris.rounding", "iris.roughness_um", "iris.mask", "lights".
+        What stays: "f_number", "coating", "iris.blades", "iris.rounding", "iris.roughness_um", "iris.mask", "lights",
+        "quality.ringing".
 
     Returns
     -------
@@ -78,6 +79,9 @@ def as_photographed(project: Project, said: AbstractSet[str] = frozenset()) -> t
     if "lights" not in said and all(_point(light) for light in project.lights):
         changes["lights"] = tuple(light.replace(diameter_deg=LIGHT_DEG) for light in project.lights)
         told.append(f"lights of {LIGHT_DEG:g} degrees")
+    if "quality.ringing" not in said and project.quality.ringing != "off" and _has_cylinders(lens):
+        changes["quality"] = project.quality.replace(ringing="off")
+        told.append("no rings in ghosts, which take most of the time behind cylinders")
     filled: Project = project.replace(**changes) if changes else project
     return filled, tuple(told)
 
@@ -96,6 +100,10 @@ def plausible_preset(lens: Lens) -> str:
     if PERIOD in lens.coating_presets:
         return PERIOD
     return next((name for name in lens.coating_presets if name not in (STAGGERED, "single-coated")), STAGGERED)
+
+
+def _has_cylinders(lens: Lens) -> bool:
+    return any(isinstance(row, Surface) and row.toroidal for row in lens.rows)
 
 
 def _straight(iris: Iris) -> bool:
